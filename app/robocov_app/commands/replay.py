@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.run import Run
     from robocov_app.runs.saved import Saved
     from robocov_app.terminal.interruption import Interruption
+    from robocov_app.viewer.session.session import Session
 
 
 _NO_DISPLAY = (
@@ -95,16 +96,30 @@ def command(options: Arguments) -> int:
     from robocov_app.runs.saved import load_saved
 
     check_layers(options.film())
+    story = options.run / "session.robocov" if (options.run / "story.json").is_file() else options.run
+    if story.suffix == ".robocov":
+        return told(options, story)
     saved = load_saved(options.run)
     return filmed(options, saved) if options.headless else watched(options, saved)
+
+
+def told(options: Arguments, path: Path) -> int:
+    """Show a session of the window from its beginning."""
+    from robocov_app.viewer.session.file import load_session
+    from robocov_app.viewer.session.session import Session
+
+    if options.headless:
+        raise ParameterError(f"{path}: a film of a session is made by robocov run {path} --video")
+    session = Session.opened(load_session(path, options.controller))
+    session.recorded_until = session.end
+    session.look_at(0.0)
+    session.playing = True
+    return shown(options, session, path)
 
 
 def watched(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
     from robocov.controllers import controller_kind
-    from robocov.mapfile import bundled_maps, load_map
-    from robocov_app.render.picture import checked_layers
-    from robocov_app.viewer.opening import NO_DISPLAY, Opening
     from robocov_app.viewer.session.replayed import replayed_session
 
     for controller in options.controller:
@@ -120,6 +135,15 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
     except InputError as error:
         where = str(options.run)
         raise InputError(str(error) if where in str(error) else f"{where}: {error}") from error
+    return shown(options, session)
+
+
+def shown(options: Arguments, session: Session, file: Path | None = None) -> int:
+    """Open the window with a session, and the file that it is from."""
+    from robocov.mapfile import bundled_maps, load_map
+    from robocov_app.render.picture import checked_layers
+    from robocov_app.viewer.opening import NO_DISPLAY, Opening
+
     same = (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
     opening = Opening(
@@ -131,6 +155,7 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
         laws=options.controller,
+        file=file,
     )
     try:
         with opening.window() as window:

@@ -112,3 +112,17 @@ def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
     curve = again.lanes[0].curve
     assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
     assert curve.at(2.0) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from robocov_app.commands import replay
+
+    path, seen = saved(played(), tmp_path), []
+    monkeypatch.setattr(replay, "shown", lambda options, session, file: seen.append((session, file)) or 0)
+    assert main(["replay", path]) == 0
+    ((session, file),) = seen
+    assert str(file) == path and session.time == 0.0 and session.playing
+    for _ in range(60):
+        session.advance(1 / 60)
+    assert session.at_end_of_record and not session.playing, "it stops where the story does"
+    assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
