@@ -11,7 +11,7 @@ from robocov.environment import Environment
 from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.record import Record
 from robocov.robots import Team
-from robocov_app.report.gathering import FIGURES, Entry, Result
+from robocov_app.report.results import FIGURES, Entry, Result
 from robocov_app.runs.run import Run, save_numbers
 from robocov_app.runs.saved import Saved
 from robocov_app.terminal.output import finite, write_json

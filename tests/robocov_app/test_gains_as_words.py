@@ -16,9 +16,9 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.report.dependence_plots import dependence_plots
-from robocov_app.report.gathering import gathered
 from robocov_app.report.groups import dependences, gain_text, styles
+from robocov_app.report.plots import dependence_plots
+from robocov_app.report.results import gathered
 from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gains import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study

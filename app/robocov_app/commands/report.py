@@ -15,7 +15,7 @@ from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 
 if TYPE_CHECKING:
-    from robocov_app.report.gathering import Result
+    from robocov_app.report.results import Result
 
 
 @dataclass
@@ -47,7 +47,7 @@ def command(options: Arguments) -> None:
     if not options.folders:
         raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
     from robocov_app.report.document import report
-    from robocov_app.report.gathering import gathered
+    from robocov_app.report.results import gathered
 
     target = options.folders[0] / REPORT if options.out is None else options.out
     if options.out is not None:
@@ -93,7 +93,7 @@ def _readable(result: Result, *, quiet: bool) -> Result:
 
 def _with_references(result: Result, options: Arguments) -> Result:
     """Return the result with the references that are known, or searched for."""
-    from robocov_app.report.references import with_references
+    from robocov_app.report.results import with_references
     from robocov_app.terminal.progress import progress
 
     quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})

@@ -2,22 +2,105 @@
 
 from __future__ import annotations
 
+import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Literal, TypeAlias
 
+from robocov.errors import OutputError, ParameterError, shown
+from robocov.files.atomic import writable, written
 from robocov_app.render.camera import length_label, round_length
+from robocov_app.render.theme import Colour, Theme
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-    from robocov_app.render.theme import Colour, Theme
+
+_METADATA: dict[str, dict[str, str | None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""What would differ from one time, or one version of matplotlib, to the next is left out."""
+
+_STYLE: Any = {
+    "savefig.bbox": None,
+    "svg.hashsalt": "robocov",
+    # outlines: an SVG cannot hold a font, and others than ours would not fit their places
+    "svg.fonttype": "path",
+    # the whole letters as TrueType: publishers refuse Type 3, and the words can be searched and copied
+    "pdf.fonttype": 42,
+}
+
+
+def figure_png(figure: Figure) -> bytes:
+    """Return a figure as PNG, of exactly the page's pixels."""
+    file = io.BytesIO()
+    _write(figure, file, "png")
+    return file.getvalue()
+
+
+def save_figure(figure: Figure, path: Path | str) -> None:
+    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all.
+
+    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts
+    themselves, so that both look the same everywhere. None holds a date: the same plot gives the same bytes.
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    ParameterError
+        When the suffix is another.
+    """
+    path = Path(path)
+    kind = figure_kind(path)
+    with written(path) as part:
+        _write(figure, part, kind)
+
+
+def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
+    import matplotlib
+
+    with plain_style(), matplotlib.rc_context(_STYLE):
+        figure.savefig(
+            file, format=kind, dpi=figure.dpi, metadata=_METADATA[kind], facecolor=figure.get_facecolor()
+        )
+
+
+def check_figure_path(path: Path) -> None:
+    """Make sure, before any work is done, that a figure can be written there.
+
+    Raises
+    ------
+    OutputError
+        When there is no such folder, or something else than a file in its place.
+    ParameterError
+        When the suffix is neither PNG, SVG nor PDF.
+    """
+    figure_kind(path)
+    if not writable(path).parent.is_dir():
+        raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
+
+
+def figure_kind(path: Path) -> str:
+    """Return ``png``, ``svg`` or ``pdf``, by the suffix of a path.
+
+    Raises
+    ------
+    ParameterError
+        When the suffix is another.
+    """
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in _METADATA:
+        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png, .svg or .pdf was wanted")
+    return kind
+
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5
 """Text sizes in points."""

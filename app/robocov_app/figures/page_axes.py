@@ -19,7 +19,7 @@ class PageAxes(Axes):
 
     def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
         """Return the page as PNG, how wide it is to be shown, and its words for who cannot see it."""
-        from robocov_app.figures.figure_files import figure_png
+        from robocov_app.figures.page import figure_png
 
         page = cast("Figure", self.figure)
         words = [text.get_text() for text in page.texts if text.get_text()]

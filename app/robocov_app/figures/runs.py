@@ -13,9 +13,6 @@ import numpy as np
 from robocov.errors import ParameterError, shown
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
-from robocov_app.figures.figure_files import check_figure_path as check_figure_path
-from robocov_app.figures.figure_files import figure_kind as figure_kind
-from robocov_app.figures.figure_files import save_figure as save_figure
 from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, plain_style
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.layout import columns_for, united

@@ -14,8 +14,6 @@ from robocov import __version__
 from robocov.errors import ParameterError, counted
 from robocov_app.figures.curves import MARKS
 from robocov_app.render.theme import theme_named
-from robocov_app.report.choosing import MOST_RUNS, chosen
-from robocov_app.report.dependence_plots import dependence_plots
 from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
 from robocov_app.report.facts import (
     facts,
@@ -28,12 +26,28 @@ from robocov_app.report.facts import (
     troubles,
     weighed_text,
 )
-from robocov_app.report.groups import setting_label, settings, styles, variants
-from robocov_app.report.measure_plots import measure_plots
-from robocov_app.report.pairs import comparisons, contenders, pairs_words
+from robocov_app.report.groups import (
+    MOST_RUNS,
+    chosen,
+    comparisons,
+    contenders,
+    pairs_words,
+    setting_label,
+    settings,
+    styles,
+    variants,
+)
 from robocov_app.report.pictures import map_picture, run_picture
+from robocov_app.report.plots import (
+    MOST_PANELS,
+    Curves,
+    cost_plots,
+    dependence_plots,
+    final_plots,
+    measure_plots,
+    paired_plots,
+)
 from robocov_app.report.replay import MOST_PANES, asset, replay_css, replay_js, replay_part, script
-from robocov_app.report.result_plots import MOST_PANELS, Curves, cost_plots, final_plots, paired_plots
 from robocov_app.report.tables import (
     controllers_table,
     failures_table,
@@ -49,9 +63,9 @@ if TYPE_CHECKING:
     from jinja2 import Template
     from markupsafe import Markup
 
-    from robocov_app.report.choosing import Choice
-    from robocov_app.report.gathering import Result
-    from robocov_app.report.result_plots import Looks
+    from robocov_app.report.groups import Choice
+    from robocov_app.report.plots import Looks
+    from robocov_app.report.results import Result
 
 MOST_MAPS = 12
 """Maps that are drawn."""

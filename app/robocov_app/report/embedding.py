@@ -1,32 +1,56 @@
-"""Runs as small JSON for the browser: quantised positions and costs at even times, maps rounded.
-
-A position is two numbers of 16 bits between the corners of its map's region: in a hall of 10 m they are
-0.15 mm apart, far below a pixel. Moments lie ``1/rate`` seconds apart, and the last is the run's last.
-"""
+"""Runs and maps as small JSON for the browser: quantised positions and costs at even times, maps rounded."""
 
 from __future__ import annotations
 
 import base64
+import io
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
-from robocov_app.figures.curves import MARKS
-from robocov_app.report.density_picture import density_picture
+from robocov.arrays import Array
+from robocov.environment import Environment, Obstacle
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov_app.figures.curves import MARKS, CurveStyle
+from robocov_app.render.density import shading
+from robocov_app.render.theme import DARK, LIGHT, mix
 from robocov_app.runs.saved import roster_of
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+_DOTS = 80
+"""Dots along the longer side of a map."""
 
-    from robocov.arrays import Array
-    from robocov.environment import Environment, Obstacle
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
-    from robocov_app.figures.curves import CurveStyle
+
+def density_picture(environment: Environment) -> str:
+    """Return the address, ``data:image/png;...``, of a picture of the density over the region's box.
+
+    The more a place counts, the less is seen through; outside the region all is. Empty where every place
+    counts the same.
+    """
+    from PIL import Image
+
+    density = environment.density
+    if density is None or density.uniform:
+        return ""
+    low_x, low_y, high_x, high_y = bounds = environment.region.bounds
+    step = max(high_x - low_x, high_y - low_y) / _DOTS
+    columns, rows = (max(round(side / step), 1) for side in (high_x - low_x, high_y - low_y))
+    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
+    y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
+    dots = shading(density, bounds, x, y, LIGHT)
+    # one colour for light and dark: it is between the two
+    dots[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
+    places = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
+    dots[~environment.region.contains(places).reshape(rows, columns), 3] = 0
+    file = io.BytesIO()
+    Image.fromarray(dots).save(file, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+
 
 RATE = 5.0
 """Moments of a run per simulated second, where there is room."""

@@ -10,13 +10,12 @@ import numpy as np
 
 from robocov.errors import counted
 from robocov_app.render.density import density_words
-from robocov_app.report.groups import gain_text, setting_label, variants
-from robocov_app.report.pairs import MOST_SAID
+from robocov_app.report.groups import MOST_SAID, gain_text, setting_label, variants
 from robocov_app.sweep.study import UNITS, parameter_text
 
 if TYPE_CHECKING:
-    from robocov_app.report.gathering import Entry, Result
-    from robocov_app.report.pairs import Comparison
+    from robocov_app.report.groups import Comparison
+    from robocov_app.report.results import Entry, Result
 
 
 def title_of(result: Result) -> str:
@@ -24,7 +23,7 @@ def title_of(result: Result) -> str:
     labels = list(dict.fromkeys(entry.label for entry in result.entries))
     maps = list(result.maps)
     if result.kind == "sweep":
-        from robocov_app.report.gathering import printable
+        from robocov_app.report.results import printable
 
         return f"Sweep {printable(result.folder.resolve().name)}"
     return f"{_listed(labels)} on {_listed(maps)}"

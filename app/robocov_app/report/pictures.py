@@ -15,8 +15,7 @@ from robocov_app.render.density import density_words
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import MovingObstacle, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
-from robocov_app.report.density_picture import density_picture
-from robocov_app.report.embedding import has_path, lives
+from robocov_app.report.embedding import density_picture, has_path, lives
 from robocov_app.runs.saved import roster_of
 
 if TYPE_CHECKING:

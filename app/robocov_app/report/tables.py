@@ -11,22 +11,23 @@ import numpy as np
 from robocov.controllers.gains import value_text
 from robocov.errors import counted
 from robocov_app.report.groups import (
+    Comparison,
     Group,
     gain_text,
     medians,
+    ratio_text,
     relative,
     setting_label,
     settings,
     shown_groups,
     variants,
 )
-from robocov_app.report.pairs import Comparison, ratio_text
-from robocov_app.report.references import RESTARTS
+from robocov_app.report.results import RESTARTS
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
     from robocov_app.figures.curves import CurveStyle
-    from robocov_app.report.gathering import Entry, Result
+    from robocov_app.report.results import Entry, Result
 
 NOTHING = "–"
 """Stands where there is no number."""

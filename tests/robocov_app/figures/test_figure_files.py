@@ -13,7 +13,7 @@ import pytest
 from drawn_run import HALL, ROOMS, run_of
 
 from robocov.errors import OutputError, ParameterError
-from robocov_app.figures.figure_files import check_figure_path, save_figure
+from robocov_app.figures.page import check_figure_path, save_figure
 from robocov_app.figures.runs import plot_cost, plot_environment, plot_trajectories
 
 T = np.linspace(0.0, 60.0, 121)
@@ -78,7 +78,8 @@ def test_the_bytes_do_not_depend_on_the_hashes_of_a_process(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "from drawn_run import ROOMS, run_of\n"
-        "from robocov_app.figures.runs import plot_trajectories, save_figure\n"
+        "from robocov_app.figures.page import save_figure\n"
+        "from robocov_app.figures.runs import plot_trajectories\n"
         "for kind in ('svg', 'pdf'):\n"
         "    save_figure(plot_trajectories(run_of(ROOMS, 4)), f'{sys.argv[2]}.{kind}')\n"
     )

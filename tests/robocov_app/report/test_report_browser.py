@@ -20,8 +20,8 @@ from robocov_app.figures.curves import curve_styles
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.document import report
 from robocov_app.report.embedding import embedded_map, embedded_run
-from robocov_app.report.gathering import Damaged
 from robocov_app.report.replay import ReplayRun, asset, replay_html
+from robocov_app.report.results import Damaged
 
 pytestmark = [
     pytest.mark.slow,

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from reported_results import entry, result_of
 
-from robocov_app.report.choosing import MOST_RUNS, chosen
+from robocov_app.report.groups import MOST_RUNS, chosen
 
 MANY = st.lists(
     st.tuples(

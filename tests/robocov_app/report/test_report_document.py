@@ -15,7 +15,7 @@ from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
 from robocov_app.figures.curves import MARKS
 from robocov_app.report.document import MOST_LETTERS, report
-from robocov_app.report.gathering import Damaged
+from robocov_app.report.results import Damaged
 from robocov_app.runs.saved import Saved
 
 SWEEP = [

@@ -10,7 +10,7 @@ from robocov.metrics.run_metrics import run_metrics
 from robocov.robots import Team
 from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.groups import styles
-from robocov_app.report.measure_plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
+from robocov_app.report.plots import MOST_MEASURED, MOST_ROBOTS, measure_plots
 
 ENTRIES = [entry("rapf"), entry("rpf")]
 RESULT = replace(result_of(ENTRIES), kind="comparison")

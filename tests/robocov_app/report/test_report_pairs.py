@@ -5,7 +5,7 @@ import pytest
 from reported_results import entry, result_of
 
 from robocov_app.figures.statistics import bootstrap, mean_with_t_interval
-from robocov_app.report.pairs import comparisons, contenders, pairs_words
+from robocov_app.report.groups import comparisons, contenders, pairs_words
 
 
 def found(entries):

@@ -17,10 +17,8 @@ from robocov_app.report.facts import (
     title_of,
     troubles,
 )
-from robocov_app.report.gathering import Damaged
-from robocov_app.report.groups import styles
-from robocov_app.report.pairs import comparisons, contenders
-from robocov_app.report.references import Reference
+from robocov_app.report.groups import comparisons, contenders, styles
+from robocov_app.report.results import Damaged, Reference
 from robocov_app.report.tables import (
     MOST_ROWS,
     NOTHING,

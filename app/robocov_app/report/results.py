@@ -1,4 +1,4 @@
-"""Results from the disk, all in one form: a run, a comparison or a sweep is a list of entries."""
+"""Results read from folders: a run, a comparison or a sweep is a list of entries, with its references."""
 
 from __future__ import annotations
 
@@ -7,27 +7,80 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from robocov import __version__
 from robocov.controllers import CONTROLLERS, gains_of
-from robocov.errors import InputError, RobocovError, shown
+from robocov.controllers.gains import Value
+from robocov.environment import Environment
+from robocov.errors import InputError, ParameterError, RobocovError, shown
+from robocov.files.array_files import ArrayCache
 from robocov.files.result_folder import settle
-from robocov.mapfile import from_json
-from robocov.metrics import mean_over_run
+from robocov.mapfile import from_json, to_json
+from robocov.metrics import CostHistory, mean_over_run
 from robocov.metrics.results import read_history, read_results
+from robocov.optimum import optimum
 from robocov.record import Record
-from robocov_app.runs.saved import load_saved, roster_of
+from robocov_app.runs.saved import Saved, load_saved, roster_of
 from robocov_app.sweep.study import UNITS, parameter_column
 from robocov_app.sweep.table import gain_column
 
-if TYPE_CHECKING:
-    from robocov.controllers.gains import Value
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
-    from robocov_app.report.references import Reference
-    from robocov_app.runs.saved import Saved
+RESTARTS = 24
+"""Searches of which the best counts."""
+
+
+class Reference(NamedTuple):
+    """The lowest cost found for a team that knows the map: J_ref in m, and the uncovered area in m²."""
+
+    mean_distance: float
+    uncovered_area: float
+
+
+def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
+    """Return the result with the references in the user's cache; `search` for others takes some seconds each.
+
+    There are none where obstacles move or robots fail or join: the best places are of one moment. `tell` is
+    called with the number of maps and teams that are done.
+    """
+    lattice = result.facts.get("lattice")
+    first = {entry.setting: entry for entry in reversed(result.fine)}
+    found = {}
+    for done, (setting, entry) in enumerate(first.items(), start=1):
+        record = result.record(entry)
+        environment = record.environment
+        everybody = bool(record.present.all() and record.working.all())
+        if isinstance(lattice, int) and everybody and not environment.moves:
+            radius = float(record.team.radius.max())
+            reference = _reference(environment, len(record.team), radius, lattice, search=search)
+            if reference is not None:
+                found[setting] = reference
+        if tell is not None:
+            tell(done)
+    return replace(result, references=found)
+
+
+def _reference(
+    environment: Environment, robots: int, radius: float, lattice: int, *, search: bool
+) -> Reference | None:
+    cache = ArrayCache.of_user()
+    content = json.dumps(to_json(environment), sort_keys=True)
+    key = ArrayCache.key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
+    kept = None if cache is None else cache.load(key)
+    if kept is not None:
+        return Reference(*kept["reference"].tolist())
+    if not search:
+        return None
+    try:
+        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
+    except ParameterError:
+        return None  # more robots than have room at rest
+    reference = Reference(best.mean_distance, best.uncovered_area)
+    if cache is not None:
+        cache.save(key, {"reference": np.array(reference)})
+    return reference
+
 
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 
@@ -88,7 +141,7 @@ class Result:
 
     `facts` are what all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
     ``versions``. `loaded` are runs that were read already, `damaged` those that cannot be read and are no
-    entries, `references` the centralised references of settings (`robocov_app.report.references`).
+    entries, `references` the centralised references of settings (`robocov_app.report.results`).
     """
 
     kind: Kind
