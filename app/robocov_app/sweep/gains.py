@@ -153,7 +153,7 @@ def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: P
     gain = _known(known, name, path)
     if gain.optional and value in (NO_LIMIT, math.inf):
         return None
-    return _at(path, lambda: gain.validated(value, ""))
+    return placed(path, lambda: gain.validated(value, ""))
 
 
 def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain | Option:
@@ -173,8 +173,8 @@ def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, 
     for end in ("low", "high"):
         if getattr(given, end) is None:
             raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
-    low = _at((*path, "low"), lambda: gain.validated(given.low, ""))
-    high = _at((*path, "high"), lambda: gain.validated(given.high, ""))
+    low = placed((*path, "low"), lambda: gain.validated(given.low, ""))
+    high = placed((*path, "high"), lambda: gain.validated(given.high, ""))
     assert low is not None and high is not None
     if given.scale not in get_args(Scale):
         raise ParameterError(
@@ -188,8 +188,8 @@ def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, 
     return Range(low, high, given.scale)
 
 
-def _at(path: Place, check: Callable[[], T]) -> T:
-    """Return what `check` returns; its complaint is told of `path`."""
+def placed(path: Place, check: Callable[[], T]) -> T:
+    """Return what `check` returns; its complaint is told of `path`, in place of what it names."""
     try:
         return check()
     except ParameterError as error:

@@ -25,7 +25,7 @@ from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.spec import MOST_ROWS
-from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, whole
+from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, placed, whole
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
@@ -109,11 +109,8 @@ def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
             raise ParameterError(f"{place(path)}: {error}") from None
     if name == "message_rate" and value in (None, NO_LIMIT):
         return None
-    try:
-        made = Conditions(**{name: value, **({} if name == "forget_after" else {"forget_after": 1e6})})  # type: ignore[arg-type]
-    except ParameterError as error:
-        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
-    number: float = getattr(made, name)
+    given: dict[str, Any] = {"forget_after": 1e6, name: value}
+    number: float = getattr(placed(path, lambda: Conditions(**given)), name)
     return number
 
 
@@ -417,11 +414,9 @@ def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float 
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
-    try:
-        Team.homogeneous(1, **{name: float(value)})
-    except ParameterError as error:
-        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
-    return float(value)
+    number = float(value)
+    placed(path, lambda: Team.homogeneous(1, **{name: number}))
+    return number
 
 
 def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
