@@ -13,10 +13,12 @@ from touched_run import HALL, RAPF, begun
 
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.ui import Shown
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.window import Window
 
@@ -169,12 +171,15 @@ class Driver:
 
     # the panel
 
-    def widget(self, kind: str, name: str) -> Any:
-        widgets = self.window.panel.widgets
-        assert widgets is not None, "the panel is hidden"
-        found = widgets.find(kind, name)
+    def widget(self, kind: str, name: str) -> Shown:
+        self.window.draw()
+        assert not self.window.panel.hidden, "the panel is hidden"
+        found = self.find(kind, name)
         assert found is not None, f"no {kind} {name}"
         return found
+
+    def find(self, kind: str, name: str) -> Shown | None:
+        return self.window.panel.ui.find(kind, name)
 
     def push(self, name: str) -> None:
         """Press a button of the panel."""
@@ -188,19 +193,16 @@ class Driver:
 
     def choose(self, menu: str, option: str) -> None:
         """Open a menu of the panel and choose from it, scrolling as far as is needed."""
-        widget = self.widget("menu", menu)
-        self.click(*widget.rect.center)
-        options = widget.current_state.options_selection_list
-        for _ in range(30):
-            for item in options.item_list:
-                button = item["button_element"]
-                inside = button is not None and options.rect.contains(button.rect)
-                if inside and item["text"].strip() == option:
-                    self.click(*button.rect.center)
-                    return
-            self.wheel(*options.rect.center, -1)
-            self.frames(2, 0.05)
-        raise AssertionError(f"no {option} in {[item['text'] for item in options.item_list]}")
+        self.click(*self.widget("menu", menu).rect.center)
+        found = self.window.panel.ui.open_list
+        assert found is not None and option in found.options, f"no {option} in {menu}"
+        item = found.item(found.options.index(option))
+        for _ in range(100):
+            if found.rect.contains(item):
+                break
+            self.wheel(*found.rect.center, 1 if item.top < found.rect.top else -1)
+            item = found.item(found.options.index(option))
+        self.click(*item.center)
 
     def write(self, field: str, text: str) -> None:
         """Click into a field, and type."""
@@ -209,10 +211,19 @@ class Driver:
 
     def slide(self, name: str, part: float) -> None:
         """Drag a slider's knob to a part of its width."""
-        slider = self.widget("slider", name)
-        knob = slider.sliding_button.rect
-        x = slider.rect.left + 1 + knob.width / 2 + part * slider.scrollable_width
+        knob, free = self.knob(name)
+        x = self.widget("slider", name).rect.left + knob.width / 2 + part * free
         self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
+
+    def knob(self, name: str) -> tuple[pygame.Rect, float]:
+        """Return where a slider's knob is, and how far it can move."""
+        slider = self.widget("slider", name)
+        low, high = (0.0, 1.0) if name != "speed" else (0.0, len(SPEEDS) - 1.0)
+        knob = pygame.Rect(slider.rect.left, slider.rect.top, round(12 * self.window.layout.scale), 0)
+        free = slider.rect.width - knob.width
+        knob.x += round(free * (slider.value - low) / (high - low))
+        knob.height = slider.rect.height
+        return knob, free
 
     def picture(self) -> Any:
         """Return the pixels of the window."""

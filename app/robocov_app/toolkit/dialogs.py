@@ -85,7 +85,7 @@ class Question:
         for line in lines[:_MOST_LINES]:
             ui.words(line, size=TEXT + 1)
         if len(lines) > _MOST_LINES:
-            ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, faint=True)
+            ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, colour=ui.theme.faint)
         ui.space(12)
         widths = [
             label(each.text, ui.px(TEXT), (0, 0, 0), True).get_width() / ui.scale + 36
@@ -164,7 +164,7 @@ class Choice:
     def page(self, ui: Ui) -> None:
         """Show the field and the lines below it."""
         if self.title:
-            ui.words(self.title, faint=True, bold=True)
+            ui.words(self.title, colour=ui.theme.faint, bold=True)
         if ui.edit is None or ui.focus != "text":
             ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
         ui.row(height=32, below=8)
@@ -173,7 +173,7 @@ class Choice:
         if ui.edit.text != self.text:
             self.text, self.chosen, self.top, self.trouble = ui.edit.text, 0, 0, ""
         if self.trouble:
-            ui.words(self.trouble, bold=True)
+            ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
         found = list(self.options(self.text))
         self.chosen = min(self.chosen, max(len(found) - 1, 0))
         ui.row(height=26, below=1)

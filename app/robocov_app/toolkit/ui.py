@@ -122,6 +122,8 @@ class Ui:
         Whether what was drawn is not what there is any more; otherwise `draw` copies its last picture.
     shown : dict of ``kind:key`` to Shown
         The widgets of the last run.
+    surface : pygame.Surface or None
+        What a page may draw on in its cells; None while it runs for an event.
     """
 
     def __init__(self, page: Callable[[Ui], None], theme: Theme, scale: float = 1.0) -> None:
@@ -137,7 +139,7 @@ class Ui:
         self.open_list: _List | None = None
         self._open_key = ""
         self._event: pygame.event.Event | None = None
-        self._surface: pygame.Surface | None = None
+        self.surface: pygame.Surface | None = None
         self._picture: pygame.Surface | None = None
         self._folded: set[str] = set()
         self._scrolled: dict[str, float] = {}
@@ -162,11 +164,11 @@ class Ui:
         self.shown = {}
 
     def _run(self, event: pygame.event.Event | None, surface: pygame.Surface | None) -> None:
-        self._event, self._surface = event, surface
+        self._event, self.surface = event, surface
         self._begin()
         self.page(self)
         self.end_row()
-        self._event = self._surface = None
+        self._event = self.surface = None
         if self.focus not in self._order:  # its widget is gone
             self.focus = self.edit = None
 
@@ -396,8 +398,8 @@ class Ui:
             top = self._bar(key, rect, needed, top)
             self.wide -= max(BAR + 4 - margin, 0.0)
         self._clip = self._clip.clip(rect)
-        if self._surface is not None:
-            self._surface.set_clip(self._clip)
+        if self.surface is not None:
+            self.surface.set_clip(self._clip)
         self.y -= top
         began, self._cells = self.y, []
         yield
@@ -407,8 +409,8 @@ class Ui:
             self._heights[key], self._again = ended, True
         self.x, self.y, self.wide, self._clip = before
         self.y += room
-        if self._surface is not None:
-            self._surface.set_clip(None)
+        if self.surface is not None:
+            self.surface.set_clip(None)
 
     def scroll_to(self, key: str, top: float = 0.0) -> None:
         """Scroll a region to a height."""
@@ -435,10 +437,10 @@ class Ui:
             top = (self.at[1] - self._grabbed - track.top) / free * (needed - room)
         top = self._scrolled[key] = min(max(top, 0.0), needed - room)
         self.shown[name] = Shown("bar", key, knob, value=top)
-        if self._surface is not None:
+        if self.surface is not None:
             strength = 0.55 if self.active == name else 0.45 if self._hovers(track) else 0.3
             fill = mix(self.theme.panel, self.theme.ink, strength)
-            rounded(self._surface, knob.inflate(-self.px(4), -self.px(2)), fill, fill, self.px(BAR / 2))
+            rounded(self.surface, knob.inflate(-self.px(4), -self.px(2)), fill, fill, self.px(BAR / 2))
         return top
 
     # what widgets share
@@ -496,16 +498,16 @@ class Ui:
         else:
             fill = mix(field, theme.final, 0.28 if held else 0.14 if hovered else 0.0)
             edge = theme.final if held or hovered else line
-        if self._surface is not None:
-            rounded(self._surface, rect, fill, edge, self.px(4), max(1, self.px(0.75)))
+        if self.surface is not None:
+            rounded(self.surface, rect, fill, edge, self.px(4), max(1, self.px(0.75)))
             if self.focus == key:
                 self._ring(rect)
         return ink
 
     def _ring(self, rect: pygame.Rect) -> None:
-        if self._surface is not None:
+        if self.surface is not None:
             width = max(2, self.px(1.5))
-            pygame.draw.rect(self._surface, self.theme.final, rect, width, border_radius=self.px(4))
+            pygame.draw.rect(self.surface, self.theme.final, rect, width, border_radius=self.px(4))
 
     def _write(
         self,
@@ -517,11 +519,11 @@ class Ui:
         bold: bool = False,
         at: str = "left",
     ) -> None:
-        if self._surface is not None and text and self._visible(rect):
+        if self.surface is not None and text and self._visible(rect):
             words = shortened(text, self.px(size), rect.width, bold)
             picture = label(words, self.px(size), colour, bold)
             side = "center" if at == "center" else f"mid{at}"
-            self._surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
+            self.surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
 
     # widgets
 
@@ -539,12 +541,21 @@ class Ui:
         colour = self.theme.faint if faint else self.theme.ink
         self._write(text, rect, colour, SMALL if faint else TEXT, bold=bold, at=at)
 
-    def words(self, text: str, *, size: float = TEXT, faint: bool = False, bold: bool = False) -> None:
+    def words(
+        self,
+        text: str,
+        *,
+        size: float = TEXT,
+        colour: Colour | None = None,
+        bold: bool = False,
+        indent: float = 0.0,
+    ) -> None:
         """Write a paragraph over the whole width, in as many lines as it needs."""
-        colour = self.theme.faint if faint else self.theme.ink
-        self.row(height=size + 4, below=1)
-        for line in wrapped(text, self.px(size), self.px(self.wide), bold):
-            self._write(line, self.cell(), colour, size, bold=bold)
+        self.row(*((indent, 0.0) if indent else (0.0,)), height=size + 4, gap=0, below=1)
+        for line in wrapped(text, self.px(size), self.px(self.wide - indent), bold):
+            if indent:
+                self.cell()
+            self._write(line, self.cell(), colour or self.theme.ink, size, bold=bold)
         self.row()
 
     def button(
@@ -561,7 +572,7 @@ class Ui:
         key, rect = key or text, self.cell()
         self._noted("button", key, rect, text, chosen, tip, why)
         clicked = self._clicks(key, rect, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             ink = self._face(rect, key, why, chosen=chosen)
             size = SMALL if small else TEXT
             self._write(text, rect.inflate(-self.px(6), 0), ink, size, bold=chosen and not small, at="center")
@@ -574,11 +585,11 @@ class Ui:
         key, rect = key or text, self.cell()
         self._noted("option", key, rect, text, chosen, "", why)
         clicked = self._clicks(key, rect, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             if chosen or self._hovers(rect):
                 strength = 0.2 if chosen else 0.08
                 fill = mix(self.theme.panel, self.theme.final, strength)
-                rounded(self._surface, rect, fill, fill, self.px(4))
+                rounded(self.surface, rect, fill, fill, self.px(4))
             inner = rect.inflate(-self.px(16), 0)
             self._write(aside, inner, self.theme.faint, SMALL, at="right")
             inner.width -= text_width(aside, self.px(SMALL)) + self.px(12) if aside else 0
@@ -610,9 +621,9 @@ class Ui:
             self.stale = True
         is_open = key not in self._folded
         self._noted("section", key, rect, title, is_open, "", "")
-        if self._hovers(rect) and self._surface is not None:
+        if self._hovers(rect) and self.surface is not None:
             fill = mix(self.theme.panel, self.theme.ink, 0.06)
-            rounded(self._surface, rect, fill, fill, self.px(4))
+            rounded(self.surface, rect, fill, fill, self.px(4))
         self._write(f"{'▾' if is_open else '▸'} {title}", rect, self.theme.faint, SMALL, bold=True)
         if self.focus == key:
             self._ring(rect)
@@ -624,14 +635,14 @@ class Ui:
         key, rect = key or text, self.cell()
         self._noted("check", key, rect, text, now, tip, why)
         clicked = self._clicks(key, rect, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             box = pygame.Rect(0, 0, self.px(16), self.px(16))
             box.midleft = rect.midleft
             theme, hovered = self.theme, self._hovers(rect) and not why
             field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
             on = mix(theme.panel, theme.ink, 0.35) if why else theme.final
             edge = on if now or hovered else mix(theme.panel, theme.ink, 0.35)
-            rounded(self._surface, box, on if now else field, edge, self.px(3), max(1, self.px(0.75)))
+            rounded(self.surface, box, on if now else field, edge, self.px(3), max(1, self.px(0.75)))
             if now:
                 self._tick(box)
             words = rect.move(self.px(23), 0)
@@ -642,7 +653,7 @@ class Ui:
         return (not now) if clicked else None
 
     def _tick(self, box: pygame.Rect) -> None:
-        assert self._surface is not None
+        assert self.surface is not None
         side = box.width
         points = [(0.22, 0.52), (0.42, 0.72), (0.78, 0.28)]
         large = pygame.Surface((side * 4, side * 4), pygame.SRCALPHA, 32)
@@ -650,7 +661,7 @@ class Ui:
         for start, end in pairwise(corners):
             pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side * 0.5)))
         picture = pygame.transform.smoothscale(large.premul_alpha(), box.size)
-        self._surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        self.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
     def slider(
         self,
@@ -692,25 +703,25 @@ class Ui:
             value = value if value != now else None
         part = min(max(((now if value is None else value) - low) / span, 0.0), 1.0)
         self._noted("slider", key, track, "", now if value is None else value, tip, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             self._draw_slider(key, track, part, why)
         return value
 
     def _draw_slider(self, key: str, track: pygame.Rect, part: float, why: str) -> None:
-        assert self._surface is not None
+        assert self.surface is not None
         theme, groove = self.theme, track.inflate(0, -self.px(8))
         quiet = mix(theme.panel, theme.ink, 0.18)
-        rounded(self._surface, groove, quiet, quiet, groove.height // 2)
+        rounded(self.surface, groove, quiet, quiet, groove.height // 2)
         filled = groove.copy()
         filled.width = max(round(part * (track.width - self.px(_KNOB))) + self.px(_KNOB / 2), groove.height)
         accent = mix(theme.panel, theme.ink, 0.35) if why else theme.final
         pale = mix(theme.panel, accent, 0.6)
-        rounded(self._surface, filled, pale, pale, groove.height // 2)
+        rounded(self.surface, filled, pale, pale, groove.height // 2)
         strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
         fill = mix(accent, theme.ink, strength)
         knob = pygame.Rect(0, 0, self.px(_KNOB), self.px(14))
         knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
-        rounded(self._surface, knob, fill, fill, self.px(5))
+        rounded(self.surface, knob, fill, fill, self.px(5))
         if self.focus == key:
             self._ring(track)
 
@@ -741,7 +752,7 @@ class Ui:
             given = edit.text
         shown = edit.text if edit is not None else text
         self._noted("entry", key, rect, shown, text, tip, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             self._draw_field(rect, edit, shown, ghost, why)
         return given
 
@@ -770,7 +781,7 @@ class Ui:
         return max(before - (rect.width - self.px(14)), 0)
 
     def _draw_field(self, rect: pygame.Rect, edit: TextEdit | None, text: str, ghost: str, why: str) -> None:
-        screen, theme, size = self._surface, self.theme, self.px(TEXT)
+        screen, theme, size = self.surface, self.theme, self.px(TEXT)
         assert screen is not None
         line = mix(theme.panel, theme.ink, 0.14 if why else 0.24)
         edge = theme.final if edit is not None or (self._hovers(rect) and not why) else line
@@ -819,14 +830,14 @@ class Ui:
             self._event = None
             self._unfold(key, rect, list(options), now)
         self._noted("menu", key, rect, now, now, tip, why)
-        if self._surface is not None and self._visible(rect):
+        if self.surface is not None and self._visible(rect):
             ink = self._face(rect, key, why)
             words = rect.inflate(-self.px(18), 0)
             words.width -= self.px(12)
             self._write(now, words, ink, TEXT)
             middle, side = (rect.right - self.px(13), rect.centery + self.px(1)), self.px(4)
             corners = [(middle[0] - side, middle[1] - side // 2), (middle[0] + side, middle[1] - side // 2)]
-            pygame.draw.polygon(self._surface, ink, [*corners, (middle[0], middle[1] + side // 2 + 1)])
+            pygame.draw.polygon(self.surface, ink, [*corners, (middle[0], middle[1] + side // 2 + 1)])
         return picked if picked != now else None
 
     def _unfold(self, key: str, rect: pygame.Rect, options: list[str], now: str) -> None:

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from robocov_app.viewer.actions import Action
     from robocov_app.viewer.overlays import CommandList
-    from robocov_app.viewer.paged import Paged
 
 _ALSO_WHILE_TYPING = (pygame.K_F1, pygame.K_F9, pygame.K_F12)
 
@@ -26,6 +25,24 @@ class Commanded(Protocol):
 
     def command(self, text: str) -> None:
         """Do what was typed."""
+
+
+class Widgeted(Protocol):
+    """Widgets that come before everything else."""
+
+    @property
+    def typing(self) -> bool:
+        """Whether letters go into a field."""
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether a list is open."""
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Give an event to the widgets."""
+
+    def stop_typing(self) -> None:
+        """Take the keys away from all fields."""
 
 
 class Keyboard:
@@ -45,7 +62,7 @@ class Keyboard:
     def __init__(
         self,
         desk: Commanded,
-        panel: Paged,
+        panel: Widgeted,
         palette: CommandList,
         actions: Iterable[Action],
         do: Callable[[str], None],

@@ -2,40 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
 
 from robocov.controllers import controller_kind, short_name
 from robocov.errors import ParameterError
-from robocov_app.render.theme import LIGHT
-from robocov_app.viewer.actions import all_actions
-from robocov_app.viewer.paged import Paged
-from robocov_app.viewer.pages import (
-    GAP,
-    MARGIN,
-    WIDE,
-    columns,
-    keep_page,
-    parameters_page,
-    robot_page,
-    show_page,
-)
-from robocov_app.viewer.parameters import Pick
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import shortened
+from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.toolkit.overlay import FLAT
+from robocov_app.toolkit.ui import SMALL, Ui
+from robocov_app.viewer.actions import all_actions, key_words
+from robocov_app.viewer.inspector import NOTHING, Line, Report
+from robocov_app.viewer.layout import Layout
+from robocov_app.viewer.parameters import Parameter, Pick
+from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.scenario import MOST_PANES
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from robocov_app.viewer.presenter import Desk
-    from robocov_app.viewer.widgets import Widgets
-
 TABS = ("parameters", "show", "robot", "keep")
-_TAB_WIDTHS = (86, 64, 64, 64)
+
+NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
+"""Layers without a check box: a picture without them is no use; they have keys all the same."""
+
+_SHORT = {
+    "Nearest obstacle points": "Nearest obstacle",
+    "Repulsion from robots": "Repulsion: robots",
+    "Repulsion from obstacle": "Repulsion: wall",
+    "Path from the cursor": "Path from cursor",
+    "Communication range": "Comm. range",
+}
+
+_KEPT = (
+    (("Screenshot", "screenshot"), ("Record film", "film")),
+    (("Save session", "save:session"), ("Recover…", "recover")),
+    (("Save run", "save:run"), ("Save map", "save:map")),
+    (("◀ Branch", "branch:previous"), ("Branch ▶", "branch:next")),
+    (("Undo", "undo"), ("Redo", "redo")),
+    (("Keys", "help"), ("Commands…", "palette")),
+    (("Guided tour", "tour"), ("Full screen", "fullscreen")),
+)
+
+_ASKED_AGAIN = 0.25
+"""Seconds after which the panel looks again at what there is while the simulation goes on."""
+
+_NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
 
-class Panel(Paged):
-    """Builds the widgets, and keeps them as the desk is.
+class Panel:
+    """Shows the desk, and lets it be edited.
 
     Parameters
     ----------
@@ -44,173 +62,292 @@ class Panel(Paged):
         Of the layers.
     do : callable
         Does an action by its name.
+
+    Attributes
+    ----------
+    tab : str
+        The page that is open.
+    covered : bool
+        Something else is drawn in its place: it takes no events.
+    report : Report or None
+        What the inspector says of the robot that is asked about.
     """
 
-    tabs = TABS
-    tab_widths = _TAB_WIDTHS
-
     def __init__(self, desk: Desk, titles: dict[str, str], do: Callable[[str], None]) -> None:
-        super().__init__(desk, all_actions(titles), do)
-        self.desk, self.titles = desk, titles
+        self.desk, self.titles, self._do = desk, titles, do
+        self.tips = {}
+        for action in all_actions(titles):
+            keys = " or ".join(key_words(key) for key in action.keys)
+            self.tips[action.name] = f"{action.title} ({keys})" if keys else action.title
+        self.tab = TABS[0]
+        self.covered = self.hidden = False
+        self.report: Report | None = None
+        self.ui = Ui(self._page, LIGHT)
+        self._drawn: object = None
+        self._age = 0.0
 
-    # building
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Fit another layout and theme."""
+        self.hidden = not layout.panel[2]
+        if self.hidden:
+            self.ui.stop_typing()
+        if theme is not self.ui.theme or layout.scale != self.ui.scale:
+            self.ui = Ui(self._page, theme, layout.scale)
+        self.ui.box, self.ui.stale = pygame.Rect(layout.panel), True
 
-    def wanted(self) -> object:
-        """Return all on which it depends what widgets there are."""
+    def show_tab(self, name: str) -> None:
+        """Turn to a page."""
+        if name in TABS:
+            self.tab = name
+            self.desk.version += 1
+
+    def update(self, seconds: float) -> None:
+        """Let time pass: the page is drawn anew when something that it shows is different."""
+        self._age += seconds
+        if self.covered and self.ui.busy:
+            self.ui.stop_typing()
+        shows = (self.desk.version, self.tab, self.desk.theme, self.desk.session.playing, id(self.report))
+        if shows != self._drawn or (self._age >= _ASKED_AGAIN and self.desk.session.playing):
+            self._drawn, self._age, self.ui.stale = shows, 0.0, True
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw the panel and what hangs over it."""
+        self.ui.draw(screen)
+        self.ui.draw_over(screen)
+
+    @property
+    def typing(self) -> bool:
+        """Whether letters go into a field."""
+        return self.ui.typing
+
+    @property
+    def unfolded(self) -> bool:
+        """Whether a list is open, which may hang over other things."""
+        return self.ui.unfolded
+
+    def stop_typing(self) -> None:
+        """Take the keys away from all fields, and close lists."""
+        self.ui.stop_typing()
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Give an event to the widgets; return whether one of them took it."""
+        return not self.covered and not self.hidden and self.ui.take(event)
+
+    # the page
+
+    def _page(self, ui: Ui) -> None:
+        ui.inset(12, 8, 12)
+        self._environment(ui)
+        self._controllers(ui)
+        self._run(ui)
+        self._tools(ui)
+        if (tab := ui.tabs("tab", TABS, self.tab, 86, 64, 64, 64)) is not None:
+            self.show_tab(tab)
+        pages = {"parameters": self._parameters, "show": self._show, "robot": self._robot, "keep": self._keep}
+        pages[self.tab](ui)
+
+    def _does(self, ui: Ui, text: str, action: str, *, chosen: bool = False, small: bool = False) -> None:
+        if ui.button(text, key=action, tip=self.tips[action], chosen=chosen, small=small):
+            self._do(action)
+
+    def _environment(self, ui: Ui) -> None:
         desk, session = self.desk, self.desk.session
-        laws = tuple(session.circumstances(lane).law.name for lane in session.lanes)
-        starts = tuple(session.environment.starts)
-        return laws, desk.active, self.tab, desk.map_name, starts, session.scenario.start_name, *desk.laws
-
-    def build(self, widgets: Widgets) -> None:
-        """Make the widgets."""
-        y = self._environment(widgets, 8)
-        y = self._controllers(widgets, y)
-        y = self._run(widgets, y)
-        y = self._tools(widgets, y)
-        widgets.section("tabs", None, y, lambda: self._tabs(widgets))
-        y += 34
-        self._place_body(widgets, y)
-        if self.tab == "parameters":
-            parameters_page(widgets, self.desk, y)
-        elif self.tab == "show":
-            show_page(widgets, self.desk, y, self.titles)
-        elif self.tab == "robot":
-            robot_page(widgets, y)
-        else:
-            keep_page(widgets, y)
-
-    def _environment(self, widgets: Widgets, y: float) -> float:
-        desk, rect = self.desk, widgets.rect
-        maps, starts, start = desk.maps(), desk.starts(), desk.session.scenario.start_name
-        files = short_names(maps)
+        files = short_names(desk.maps())
         names = {name: file for file, name in files.items()}
+        ui.header("ENVIRONMENT")
+        ui.row(172, 0, height=28, below=5)
+        now = files.get(desk.map_name, desk.map_name)
+        if (name := ui.dropdown("map", list(names), now)) is not None:
+            desk.attempt(lambda: desk.open_map(names[name]))
+        if (start := ui.dropdown("start", desk.starts(), session.scenario.start_name)) is not None:
+            desk.attempt(lambda: desk.restart(start=start))
+        ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
+        ui.label("Robots")
+        if (robots := ui.text_entry("robots", str(desk.robots))) is not None:
+            desk.attempt(lambda: desk.command(f"robots {robots}"))
+        self._does(ui, "−", "fewer")
+        self._does(ui, "+", "more")
+        ui.cell()
+        ui.label("Seed")
+        if (seed := ui.text_entry("seed", str(session.scenario.seed))) is not None:
+            desk.attempt(lambda: desk.command(f"seed {seed}"))
+        self._does(ui, "↻", "seed")
 
-        def number(what: str, text: str) -> None:
-            desk.attempt(lambda: desk.command(f"{what} {text}"))
-
-        def open_map(name: str) -> None:
-            desk.attempt(lambda: desk.open_map(names.get(name, name)))
-
-        def begin(name: str) -> None:
-            desk.attempt(lambda: desk.restart(start=name))
-
-        def build() -> None:
-            widgets.label("ENVIRONMENT", rect(MARGIN, 0, WIDE, 18), style="#header")
-            now = files.get(desk.map_name, desk.map_name)
-            widgets.menu("map", list(names), now, rect(MARGIN, 20, 172, 28), open_map)
-            widgets.menu("start", starts, start, rect(MARGIN + 178, 20, 118, 28), begin)
-            widgets.label("Robots", rect(MARGIN, 53, 50, 26))
-            widgets.entry("robots", "", rect(MARGIN + 52, 53, 44, 26), lambda text: number("robots", text))
-            widgets.does("−", rect(MARGIN + 99, 53, 24, 26), "fewer")
-            widgets.does("+", rect(MARGIN + 126, 53, 24, 26), "more")
-            widgets.label("Seed", rect(MARGIN + 168, 53, 36, 26))
-            widgets.entry("seed", "", rect(MARGIN + 206, 53, 60, 26), lambda text: number("seed", text))
-            widgets.does("↻", rect(MARGIN + 270, 53, 26, 26), "seed")
-
-        widgets.section("environment", (desk.map_name, *maps, *starts, start), y, build)
-        return y + 87
-
-    def _controllers(self, widgets: Widgets, y: float) -> float:
-        desk, session, rect = self.desk, self.desk.session, widgets.rect
+    def _controllers(self, ui: Ui) -> None:
+        desk, session = self.desk, self.desk.session
         laws = [session.circumstances(lane).law for lane in session.lanes]
-        now = [law.name for law in laws]
         labels = law_labels(desk.laws, {law.name: law.label for law in laws})
         names = {label: name for name, label in labels.items()}
-        count = len(now)
+        count = len(laws)
+        ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
+        if count == 1:
+            ui.row(0, 0, height=28, below=4)
+        elif count == 2:  # three in a row, for which the third is small
+            ui.row(0, 24, 3, 0, 24, 3, 28, height=28, gap=2, below=4)
+        else:
+            ui.row(0, 24, 3, 0, 24, height=28, gap=2, below=4)
+        for k, law in enumerate(laws):
+            if (label := ui.dropdown(f"law:{k}", list(names), labels[law.name])) is not None:
+                desk.attempt(lambda k=k, label=label: desk.set_law(k, names[label]))  # type: ignore[misc]
+            if count > 1:
+                if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
+                    desk.active = k
+                    self._do("pane:remove")
+                if count == 2 or k % 2 == 0:
+                    ui.cell()
+        if count < MOST_PANES:
+            self._does(ui, "+ compare" if count != 2 else "+", "pane:add")
+        ui.space(4)
 
-        def pane(k: int, x: float, row: float, width: float) -> None:
-            def choose(label: str) -> None:
-                desk.attempt(lambda: desk.set_law(k, names[label]))
-
-            def close() -> None:
-                desk.active = k
-                self._do("pane:remove")
-
-            room = 26 if count > 1 else 0
-            place = rect(x, row, width - room, 28)
-            widgets.menu(f"law:{k}", list(names), labels[now[k]], place, choose)
-            if room:
-                place, name = rect(x + width - 24, row, 24, 28), f"close:{k}"
-                widgets.button("×", place, close, name=name, tip="Remove this pane", style="#small")
-
-        def build() -> None:
-            title = "CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE"
-            widgets.label(title, rect(MARGIN, 0, WIDE, 18), style="#header")
-            if count == 2:  # three in a row, for which the third is small
-                places = [(x, 20.0, width) for x, width in columns(2, WIDE - 28 - GAP)]
-                places.append((MARGIN + WIDE - 28.0, 20.0, 28.0))
-            else:
-                places = [(x, row, width) for row in (20.0, 52.0) for x, width in columns(2)]
-            for k in range(count):
-                pane(k, *places[k])
-            if count < MOST_PANES:
-                x, row, width = places[count]
-                widgets.does("+ compare" if count != 2 else "+", rect(x, row, width, 28), "pane:add")
-
-        widgets.section("controllers", (tuple(now), tuple(labels)), y, build)
-        return y + (56 if count < 3 else 88)
-
-    def _run(self, widgets: Widgets, y: float) -> float:
-        rect = widgets.rect
-        does = (("Pause", "pause"), ("Step", "step"), ("Settle", "settle"), ("Restart", "restart"))
-
-        def speed(place: float) -> None:
+    def _run(self, ui: Ui) -> None:
+        session = self.desk.session
+        ui.header("RUN")
+        ui.row(0, 0, 0, 0, height=28, below=5)
+        self._does(ui, "Pause" if session.playing else "Play", "pause", chosen=not session.playing)
+        self._does(ui, "Step", "step")
+        self._does(ui, "Settle", "settle", chosen=session.stop_when_settled)
+        self._does(ui, "Restart", "restart")
+        ui.row(46, 0, 42, height=22)
+        ui.label("Speed")
+        now = float(speed_index(session.clock.speed))
+        if (place := ui.slider("speed", now, 0.0, len(SPEEDS) - 1.0, step=1.0)) is not None:
             self.desk.attempt(lambda: self.desk.set_speed(SPEEDS[round(place)]))
+        ui.label(speed_words(session.clock.speed), key="speed")
 
-        def build() -> None:
-            widgets.label("RUN", rect(MARGIN, 0, WIDE, 18), style="#header")
-            for (x, width), (text, action) in zip(columns(len(does)), does, strict=True):
-                widgets.does(text, rect(x, 20, width, 28), action)
-            widgets.label("Speed", rect(MARGIN, 53, 50, 22))
-            place = rect(MARGIN + 52, 57, 194, 14)
-            widgets.slider("speed", place, SPEEDS.index(1.0), (0.0, len(SPEEDS) - 1.0), speed)
-            widgets.label("1×", rect(MARGIN + 254, 53, 42, 22), name="speed")
+    def _tools(self, ui: Ui) -> None:
+        ui.header("MOUSE")
+        ui.row(0, 0, 0, 0, 0, below=4)
+        for tool in self.desk.tools.values():
+            self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.desk.tool is tool, small=True)
+        ui.space(6)
 
-        widgets.section("run", None, y, build)
-        return y + 81
+    # pages
 
-    def _tools(self, widgets: Widgets, y: float) -> float:
-        def build() -> None:
-            widgets.label("MOUSE", widgets.rect(MARGIN, 0, WIDE, 18), style="#header")
-            for k, tool in enumerate(self.desk.tools.values()):
-                x, width = columns(5)[k % 5]
-                place = widgets.rect(x, 20 + 30 * (k // 5), width, 26)
-                widgets.does(tool.title, place, f"tool:{tool.name}", style="#small")
+    def _parameters(self, ui: Ui) -> None:
+        """Show sliders, fields and resets of the chosen controller's gains and of the team's limits."""
+        found = self.desk.parameters()
+        law = self.desk.session.circumstances(self.desk.lane).law
+        groups = {
+            f"GAINS OF {law.label.upper()}": [each for each in found if not each.name.startswith("team.")],
+            "ROBOTS": [each for each in found if each.name.startswith("team.")],
+        }
+        with ui.scroll(f"parameters:{law.name}"):
+            for title, group in groups.items():
+                if not ui.section(title, key=title.split()[0]):
+                    continue
+                if not group:
+                    ui.label("none", style="unit")
+                for each in group:
+                    if isinstance(each, Pick):
+                        self._words(ui, each)
+                    else:
+                        self._slider(ui, each)
+                ui.space(4)
 
-        widgets.section("tools", None, y, build)
-        return y + 86
+    def _set(self, name: str, value: float | str | None) -> None:
+        self.desk.attempt(lambda: self.desk.set_parameter(name, value))
 
-    # keeping up
+    def _slider(self, ui: Ui, each: Parameter) -> None:
+        ui.row(100, 0, 50, 34, 22, height=24, gap=3, below=3)
+        ui.label(each.label, tip=f"{each.meaning} ({each.unit})" if each.unit else each.meaning)
+        if (place := ui.slider(each.name, each.place(), 0.0, 1.0)) is not None:
+            self._set(each.name, each.at(place))
+        if (text := ui.text_entry(each.name, each.words())) is not None:
+            self.desk.attempt(lambda: self.desk.set_parameter(each.name, each.read(text)))
+        ui.label(each.unit, key=f"unit:{each.name}", style="unit")
+        usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}".rstrip()
+        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {usual}", small=True):
+            self._set(each.name, each.default)
 
-    def sync(self, widgets: Widgets) -> None:
-        """Let the widgets say what the desk says."""
-        desk, session = self.desk, self.desk.session
-        widgets.say("button", "pause", "Pause" if session.playing else "Play")
-        widgets.mark("pause", not session.playing)
-        widgets.mark("settle", session.stop_when_settled)
-        widgets.say("button", "film", "End film" if desk.filming else "Record film")
-        widgets.mark("film", desk.filming)
-        widgets.mark("fade", desk.fade)
-        widgets.say("button", "theme", "Dark" if self._theme is LIGHT else "Light")
-        self._mark_tabs(widgets)
-        for name in desk.tools:
-            widgets.mark(f"tool:{name}", desk.tool.name == name, ("#chosen_tab", "#small"))
-        widgets.fill("robots", str(session.scenario.robots))
-        widgets.fill("seed", str(session.scenario.seed))
-        speed = session.clock.speed
-        widgets.slide("speed", speed_index(speed))
-        widgets.say("label", "speed", speed_words(speed))
-        for each in desk.parameters():
-            if isinstance(each, Pick):
-                for word in each.offered:
-                    widgets.mark(f"{each.name}:{word}", word == each.value, ("#chosen_tab", "#small"))
-                widgets.say("button", f"next:{each.name}", f"{each.value} ›")
-                continue
-            widgets.slide(each.name, each.place())
-            widgets.fill(each.name, each.words())
-        for name in self.titles:
-            widgets.tick(name, name in desk.shown)
+    def _words(self, ui: Ui, each: Pick) -> None:
+        """Show buttons side by side, one for each word; where they do not fit, a list."""
+        count = len(each.offered)
+        width = (ui.wide - 103 - 25 - 3 * (count - 1)) / count
+        fits = all(shortened(word, round(SMALL), width - 6) == word for word in each.offered)
+        ui.row(100, *([0.0] * (count if fits else 1)), 22, height=24, gap=3, below=3)
+        ui.label(each.label, tip=each.meaning)
+        if not fits and (word := ui.dropdown(each.name, each.offered, each.value, tip=each.meaning)):
+            self._set(each.name, word)
+        for word in each.offered if fits else ():
+            key, chosen = f"{each.name}:{word}", word == each.value
+            if ui.button(word, key=key, tip=each.meaning, chosen=chosen, small=True):
+                self._set(each.name, word)
+        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {each.default}", small=True):
+            self._set(each.name, each.default)
+
+    def _show(self, ui: Ui) -> None:
+        """Show check boxes of the layers."""
+        desk = self.desk
+        names = [name for name in self.titles if name not in NOT_OFFERED]
+        rows = -(-len(names) // 2)
+        with ui.scroll("show"):
+            ui.row(0, 0, height=21, below=3)
+            for k in range(2 * rows):
+                place = k // 2 + k % 2 * rows  # down the first column, then the second
+                if place >= len(names):
+                    ui.cell()
+                    continue
+                name = names[place]
+                title = _SHORT.get(self.titles[name], self.titles[name])
+                tip = self.tips[f"layer:{name}"]
+                if ui.check(title, key=name, now=name in desk.shown, tip=tip) is not None:
+                    self._do(f"layer:{name}")
+            ui.space(5)
+            ui.row(0, 0, 0)
+            self._does(ui, "Fading", "fade", chosen=desk.fade)
+            self._does(ui, "Dark" if desk.theme == "light" else "Light", "theme")
+            self._does(ui, "Whole map", "fit")
+
+    def _robot(self, ui: Ui) -> None:
+        """Show what the inspector says, and what can be done to its robot."""
+        why = "" if self.desk.selected is not None else "no robot is chosen: click one first, or press Tab"
+        ui.row(0, 0, 0, 0, below=8)
+        self._does(ui, "◀", "robot:previous")
+        self._does(ui, "▶", "robot:next")
+        for text, action in (("Fail", "robot:fail"), ("Remove", "robot:remove")):
+            if ui.button(text, key=action, tip=self.tips[action], why=why):
+                self._do(action)
+        report = self.report
+        with ui.scroll(f"robot:{self.desk.selected}"):
+            if report is None:
+                ui.words(_NOBODY, colour=ui.theme.faint)
+                return
+            show_report(ui, report)
+
+    def _keep(self, ui: Ui) -> None:
+        """Show buttons for what is saved, and for help."""
+        ui.row(0, 0, height=28, below=5)
+        for text, action in (each for row in _KEPT for each in row):
+            filming = action == "film" and self.desk.filming
+            self._does(ui, "End film" if filming else text, action, chosen=filming)
+
+
+def show_report(ui: Ui, report: Report) -> None:
+    """Show what the inspector says of a robot, forces with their arrows."""
+    ui.words(report.title, size=14, bold=True)
+    ui.space(3)
+    ui.words(report.verdict, size=12.5, bold=True, colour=ui.theme.final)
+    ui.space(4)
+    largest = max((float(np.hypot(*e.vector)) for e in report.lines if e.vector is not None), default=1.0)
+    for each in report.lines:
+        if each.vector is not None:
+            _arrow(ui, each, largest)
+        ui.words(each.text, size=11.5, indent=34.0 if each.vector is not None else 0.0)
+        ui.space(3)
+
+
+def _arrow(ui: Ui, line: Line, largest: float) -> None:
+    """Draw the arrow of a force at the left of the line to come."""
+    assert line.vector is not None
+    size = float(np.hypot(*line.vector))
+    if ui.surface is None or size < NOTHING:
+        return
+    length = 13 * ui.scale * (0.35 + 0.65 * size / max(largest, NOTHING))
+    half = np.array(line.vector) / size * (length, -length)
+    middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
+    canvas = Canvas(ui.surface, FLAT, ui.theme, ui.scale, np.zeros(1, dtype=np.intp))
+    colour = ui.theme.forces.get(line.kind, ui.theme.ink)
+    canvas.arrow((middle - half).tolist(), (middle + half).tolist(), colour, 2 * ui.scale)
 
 
 def short_names(files: list[str]) -> dict[str, str]:

@@ -7,28 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
 from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.layout import inside
-from robocov_app.viewer.mouse import DOUBLE, Mouse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov_app.viewer.arena import Arena
     from robocov_app.viewer.chart import Chart
-    from robocov_app.viewer.layout import Box
     from robocov_app.viewer.panel import Panel
     from robocov_app.viewer.presenter import Desk
 
 _TAKES_ROBOTS = ("hand", "eraser", "failure")
 """Tools that take hold of a robot."""
 
-_SLIP = 5.0
-"""Pixels that a click may move."""
 
-
-class Pointer(Mouse):
-    """Turns events of the mouse into what panel, arena, chart and tools do.
+class Pointer:
+    """Turns events of the mouse into what panel, arena, chart and tools do: the panel comes first.
 
     Parameters
     ----------
@@ -40,16 +36,36 @@ class Pointer(Mouse):
     def __init__(
         self, desk: Desk, arena: Arena, chart: Chart, panel: Panel, interrupt: Callable[[], object]
     ) -> None:
-        super().__init__(panel)
-        self._desk, self._arena, self._chart = desk, arena, chart
+        self._desk, self._arena, self._chart, self._panel = desk, arena, chart, panel
         self._interrupt = interrupt
-        self._held = 0
+        self.at = (0, 0)
+        self._drag = ""
+        self._held = self._button = 0
+        self._pressed_at = (0, 0)
+        self._last_click = -1.0, (0, 0)
+        self._shape = -1
 
-    def _panel_box(self) -> Box:
-        return self._arena.layout.panel
+    @property
+    def dragging(self) -> bool:
+        """Whether a button is held down on something."""
+        return bool(self._drag)
 
-    def _over_panel(self) -> None:
-        self._desk.cursor = None
+    def take(self, event: pygame.event.Event, now: float) -> None:
+        """Take an event of the mouse at a time in seconds."""
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        taken = not self._drag and self._panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self._desk.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.stop_typing()
+            self._pressed(event, now)
+        else:
+            self._turned(WHEEL ** wheel_notches(event))
 
     def _turned(self, factor: float) -> None:
         if self._arena.pane_at(self.at) is None:
@@ -78,7 +94,9 @@ class Pointer(Mouse):
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
             offered = self._chart.offers(self.at)
             shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
-        self._show_cursor(shape)
+        if shape != self._shape:
+            self._shape = shape
+            show_cursor(shape)
 
     def leave(self) -> None:
         """The cursor is not in the window any more."""
@@ -113,7 +131,7 @@ class Pointer(Mouse):
             desk.active = pane
             desk.version += 1
         then, where = self._last_click
-        double = now - then < DOUBLE and _far(where, event.pos) < _SLIP
+        double = now - then < DOUBLE and _far(where, event.pos) < SLIP
         self._last_click = now, event.pos
         if double and desk.tool.name in ("polygon", "wall"):
             desk.attempt(lambda: desk.tool.finish(desk.session))
@@ -148,7 +166,7 @@ class Pointer(Mouse):
         if event.button != self._button:  # another one than the one that is held
             return
         self._drag = ""
-        clicked = _far(event.pos, self._pressed_at) < _SLIP
+        clicked = _far(event.pos, self._pressed_at) < SLIP
         if drag == "tool":
             point = self._arena.to_world(event.pos, self._pane())
             desk.attempt(lambda: desk.tool.release(desk.session, point))

@@ -122,6 +122,12 @@ class Desk:
         self.active = min(self.active, len(self.session.lanes) - 1)
         return self.session.lanes[self.active]
 
+    @property
+    def robots(self) -> int:
+        """How many robots there are in the chosen pane, those that failed with them."""
+        circumstances = self.session.circumstances(self.lane)
+        return len(circumstances.numbers) + len(circumstances.failed)
+
     def parameters(self) -> list[Parameter | Pick]:
         """Return all sliders and words: the chosen controller's gains, then the team's limits."""
         circumstances = self.session.circumstances(self.lane)
@@ -194,8 +200,8 @@ class Desk:
             "faster": lambda: self.change_speed(1),
             "seed": lambda: self.restart(seed=self.session.scenario.seed + 1),
             "start": self.next_start,
-            "more": lambda: self.restart(robots=self.session.scenario.robots + 1),
-            "fewer": lambda: self.restart(robots=self.session.scenario.robots - 1),
+            "more": lambda: self.restart(robots=self.robots + 1),
+            "fewer": lambda: self.restart(robots=self.robots - 1),
             "map:next": lambda: self.next_map(1),
             "map:previous": lambda: self.next_map(-1),
             "back": lambda: self.look_by(-1),

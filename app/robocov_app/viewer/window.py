@@ -22,12 +22,11 @@ from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film, pixels
 from robocov_app.viewer.inspector import report_on
 from robocov_app.viewer.keyboard import Keyboard
-from robocov_app.viewer.layout import inside, laid_out
+from robocov_app.viewer.layout import laid_out
 from robocov_app.viewer.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import plain
-from robocov_app.viewer.report_page import ReportPage
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
@@ -38,7 +37,6 @@ from robocov_app.viewer.tour import Tour
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.viewer.inspector import Report
     from robocov_app.viewer.presenter import Desk
 
 FPS = 60
@@ -46,9 +44,6 @@ FPS = 60
 
 _ASKED_AGAIN = 0.2
 """Seconds between two looks of the inspector."""
-
-_SELDOM = 0.1
-"""Seconds after which the panel looks at its widgets also while nobody is near."""
 
 _PAN = 60
 """Pixels that a key pans."""
@@ -101,20 +96,17 @@ class Window:
         self.chart = Chart(desk)
         self.panel = Panel(desk, self.titles, self.do)
         self.palette = Palette(desk, self.titles)
-        self.report_page = ReportPage()
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
         actions = all_actions(self.titles)
         self.keyboard = Keyboard(desk, self.panel, self.palette, actions, lambda name: self.do(name))
         self._patient = patient
         self._own = self._what_to_do()
         self._arranged: tuple[object, ...] | None = None
-        self._report: Report | None = None
         self._report_at = 0.0
         self._now = 0.0
         self._rate = float(FPS)
         self._steps_rate = 0.0
         self._serial = -1
-        self._unseen = 0.0
         self._arrange()
         self.draw()
 
@@ -160,7 +152,9 @@ class Window:
         self._pass_time(seconds)
         self._ask_costs()
         self._arrange()
-        self._update_panel(seconds)
+        self._inspect()
+        self.panel.covered = self.tour is not None
+        self.panel.update(seconds)
         self.pointer.show()
 
     def _pass_time(self, seconds: float) -> None:
@@ -239,15 +233,6 @@ class Window:
         if before is None or outer != before[0]:
             self.panel.arrange(layout, theme)
 
-    def _update_panel(self, seconds: float) -> None:
-        """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
-        self._unseen += seconds
-        self.panel.covered = self.tour is not None
-        near = inside(self.layout.panel, self.pointer.at) or self.panel.busy
-        if near or self._unseen >= _SELDOM:
-            self.panel.update(self._unseen)
-            self._unseen = 0.0
-
     def draw(self) -> None:
         """Draw everything, and show it."""
         layout, theme, desk = self.layout, self.theme, self.desk
@@ -261,10 +246,6 @@ class Window:
         if layout.panel[2] and self.tour is not None:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
-            self.panel.fill(self.screen)
-            if self.panel.tab == "robot":
-                self._inspect()
-                self.report_page.draw(self.screen, self.panel.body, theme, layout.scale, self._report)
             self.panel.draw(self.screen)
         if self.tour is not None and not layout.panel[2]:
             draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
@@ -275,18 +256,14 @@ class Window:
             self.palette.draw(self.screen, layout, theme)
         pygame.display.flip()
 
-    def _over_report(self) -> bool:
-        covered = self.tour is not None or self.panel.unfolded
-        return self.panel.tab == "robot" and inside(self.panel.body, self.pointer.at) and not covered
-
     def _inspect(self) -> None:
-        """Let the inspector explain the robot that is asked, a few times a second."""
-        number = self.desk.selected
-        if number is None:
-            self._report = None
-        elif self._report is None or not 0.0 <= self._now - self._report_at < _ASKED_AGAIN:
+        """Let the inspector explain the robot that is asked, a few times a second while that is in sight."""
+        number, panel = self.desk.selected, self.panel
+        if number is None or panel.tab != "robot" or panel.hidden:
+            panel.report = None
+        elif panel.report is None or not 0.0 <= self._now - self._report_at < _ASKED_AGAIN:
             self._report_at = self._now
-            self._report = report_on(self.desk, number)
+            panel.report = report_on(self.desk, number)
 
     # doing
 
@@ -304,7 +281,7 @@ class Window:
             self.desk.attempt(self._own[name])
         else:
             self.desk.do(name)
-        self._report = None
+        self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
 
@@ -404,8 +381,6 @@ class Window:
             self.keyboard.letters(event.text)
         elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
             self.help = self.palette.open = False
-        elif event.type == pygame.MOUSEWHEEL and self._over_report():
-            self.report_page.wheel(event.y, self.scale)
         elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:

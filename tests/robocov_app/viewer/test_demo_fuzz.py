@@ -158,15 +158,11 @@ class Monkey:
         what = rng.random()
         if what < 0.3:
             return rng.randint(-30, width + 30), rng.randint(-30, height + 30)
-        widgets = window.panel.widgets
-        if what < 0.55 and widgets is not None:
-            menu = widgets.open_menu
-            if menu is not None and rng.random() < 0.7:
-                items = menu.current_state.options_selection_list.item_list
-                found = [each["button_element"] for each in items if each["button_element"] is not None]
-            else:
-                found = [each for section in widgets._sections.values() for each in section.named.values()]
-            box = rng.choice(found).rect
+        panel = window.panel
+        if what < 0.55 and panel.ui.shown:
+            box = rng.choice(list(panel.ui.shown.values())).rect
+            if panel.ui.open_list is not None and rng.random() < 0.7:
+                box = panel.ui.open_list.rect
             return rng.randint(box.left, box.right), rng.randint(box.top, box.bottom)
         layout = window.layout
         boxes = [*layout.panes, layout.track, layout.chart, layout.panel, layout.panel]

@@ -103,8 +103,8 @@ def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_
         driver.frames(30)
         driver.session.playing = False
         driver.frames(15)
-        left, top, width, height = window.panel.body
-        window.pointer.at = (left + width // 2, top + height // 2)
+        left, top, width, height = window.layout.panel
+        driver.move(left + width // 2, top + height - 40)
         seen = [pixels(window.screen)[top:, left:].copy()]
         for notches in (-2, -100, -1, 200):
             window.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=notches))

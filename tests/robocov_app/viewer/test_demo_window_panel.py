@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from robocov_app.viewer.panel import TABS, law_labels
 def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     driver.choose("law:0", "RPF")
     assert driver.session.lanes[0].law.name == "rpf"
-    assert driver.window.panel.widgets.find("entry", "k_att") is None
+    assert driver.find("entry", "k_att") is None
     driver.choose("law:0", "Lloyd")
     assert driver.session.lanes[0].law.name == "lloyd"
 
@@ -43,12 +44,11 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
             driver.desk.attempt(lambda name=name: driver.desk.command(f"controller {name}"))
         driver.desk.attempt(lambda: driver.desk.set_law(0, "rapf"))
         driver.settle()
-        menu = driver.widget("menu", "law:1")
-        driver.click(*menu.rect.center)
-        items = [item["text"] for item in menu.current_state.options_selection_list.item_list]
+        driver.click(*driver.widget("menu", "law:1").rect.center)
+        items = driver.window.panel.ui.open_list.options
         assert len(set(items)) == len(items) == len(CONTROLLERS) + 2
         driver.key("escape")
-        driver.choose("law:1", items[-1].strip())
+        driver.choose("law:1", items[-1])
         assert driver.session.lanes[1].law.name == names[1]
 
 
@@ -91,18 +91,17 @@ def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
     """A choice from the list presses none of the buttons under it."""
     step = driver.widget("button", "step").rect
     driver.click(*driver.widget("menu", "map").rect.center)
-    options = driver.widget("menu", "map").current_state.options_selection_list
-    over = [i for i in options.item_list if i["button_element"] is not None]
-    item = next(i for i in over if i["button_element"].rect.collidepoint(driver.at[0], step.centery))
+    found = driver.window.panel.ui.open_list
+    name = found.options[found.at((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
-    assert driver.session.end == 0.0 and driver.desk.map_name == item["text"].strip()
+    assert driver.session.end == 0.0 and driver.desk.map_name == name
 
 
 def test_a_slider_that_is_dragged_sets_its_gain_as_it_moves(driver: Driver) -> None:
     driver.slide("k_rep", 0.75)
     value = driver.session.lanes[0].law.value("k_rep")
     assert value == pytest.approx(0.3 * 30**0.5, rel=0.2)
-    assert driver.widget("entry", "k_rep").get_text() == f"{value:.4g}"
+    assert driver.widget("entry", "k_rep").text == f"{value:.4g}"
     assert driver.session.events[-1].kind == "law"
 
 
@@ -110,29 +109,20 @@ def test_a_click_beside_the_knob_brings_it_there(driver: Driver) -> None:
     slider = driver.widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
     assert driver.session.lanes[0].circumstances.limits.max_speed > 4.0
-    assert slider.sliding_button.rect.collidepoint(driver.at)
-
-
-def test_sliding_builds_nothing_anew(driver: Driver) -> None:
-    made = driver.widget("entry", "k_rep")
-    driver.slide("k_rep", 0.2)
-    driver.slide("team.radius", 0.6)
-    assert driver.widget("entry", "k_rep") is made
+    assert driver.knob("team.max_speed")[0].collidepoint(driver.at)
 
 
 def test_the_knob_can_be_dragged_far_beyond_its_slider(driver: Driver) -> None:
-    slider = driver.widget("slider", "speed")
-    knob = slider.sliding_button.rect
+    knob, _ = driver.knob("speed")
     driver.drag(knob.center, (knob.centerx + 40, 10), (20, 590))
     assert driver.session.clock.speed == 0.1
 
 
 def test_the_speed_slider_rests_on_speeds(driver: Driver) -> None:
-    slider = driver.widget("slider", "speed")
     driver.slide("speed", 0.81)
     assert driver.session.clock.speed == 8.0
     driver.frames(3)
-    assert slider.get_current_value() == 6
+    assert driver.widget("slider", "speed").value == 6
     driver.slide("speed", 1.0)
     assert math.isinf(driver.session.clock.speed)
 
@@ -143,7 +133,7 @@ def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -
     driver.key("return")
     assert driver.session.lanes[0].law.value("k_rep") == 1.25
     assert not driver.window.panel.typing
-    assert driver.widget("slider", "k_rep").get_current_value() > 0.5
+    assert driver.widget("slider", "k_rep").value > 0.5
 
 
 def test_the_enter_of_the_key_pad_does_too(driver: Driver) -> None:
@@ -156,12 +146,12 @@ def test_the_enter_of_the_key_pad_does_too(driver: Driver) -> None:
 def test_a_wrong_value_is_told_and_the_field_shows_the_old_one_again(
     field: str, text: str, driver: Driver
 ) -> None:
-    before = driver.widget("entry", field).get_text()
+    before = driver.widget("entry", field).text
     driver.write(field, text)
-    assert driver.widget("entry", field).get_text() == text
+    assert driver.widget("entry", field).text == text
     driver.key("return")
     assert driver.desk.trouble and driver.desk.message
-    assert driver.widget("entry", field).get_text() == before
+    assert driver.widget("entry", field).text == before
 
 
 @pytest.mark.parametrize("how", ["escape", "click elsewhere", "another field"])
@@ -174,7 +164,7 @@ def test_what_was_typed_without_enter_is_forgotten(how: str, driver: Driver) -> 
     else:
         driver.click_at(MIDDLE)
     driver.frames(2)
-    assert driver.widget("entry", "k_rep").get_text() == "0.3"
+    assert driver.widget("entry", "k_rep").text == "0.3"
     assert driver.session.lanes[0].law == RAPF
 
 
@@ -202,17 +192,17 @@ def test_typing_goes_on_in_the_middle_after_a_second_click(driver: Driver) -> No
     driver.frames(40)
     driver.click(entry.rect.left + 8, entry.rect.centery)
     driver.type("9")
-    assert sorted(entry.get_text()) == ["1", "2", "3", "9"]
+    assert sorted(driver.widget("entry", "seed").text) == ["1", "2", "3", "9"]
 
 
 def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
     driver.desk.attempt(lambda: driver.desk.command("k_rep 4"))
     driver.settle()
-    assert driver.widget("slider", "k_rep").get_current_value() > 0.7
+    assert driver.widget("slider", "k_rep").value > 0.7
     driver.push("reset:k_rep")
     assert driver.session.lanes[0].law.value("k_rep") == 0.3
-    assert driver.widget("slider", "k_rep").get_current_value() == pytest.approx(0.5, abs=0.02)
-    assert driver.widget("entry", "k_rep").get_text() == "0.3"
+    assert driver.widget("slider", "k_rep").value == pytest.approx(0.5, abs=0.02)
+    assert driver.widget("entry", "k_rep").text == "0.3"
 
 
 def test_robots_and_seed_are_typed_and_counted(driver: Driver) -> None:
@@ -222,11 +212,11 @@ def test_robots_and_seed_are_typed_and_counted(driver: Driver) -> None:
     driver.push("fewer")
     driver.push("more")
     driver.push("more")
-    assert driver.session.scenario.robots == 6 and driver.widget("entry", "robots").get_text() == "6"
+    assert driver.session.scenario.robots == 6 and driver.widget("entry", "robots").text == "6"
     driver.write("seed", "41")
     driver.key("return")
     driver.push("seed")
-    assert driver.session.scenario.seed == 42 and driver.widget("entry", "seed").get_text() == "42"
+    assert driver.session.scenario.seed == 42 and driver.widget("entry", "seed").text == "42"
     assert driver.widget("button", "seed").text == "↻"
 
 
@@ -234,18 +224,18 @@ def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:
     for tab in TABS:
         driver.turn(tab)
         assert driver.window.panel.tab == tab
-        assert "#chosen_tab" in driver.widget("button", f"tab:{tab}").object_ids
+        assert driver.widget("button", f"tab:{tab}").value
     driver.turn("show")
     for name in ("cells", "grid"):
         assert name in driver.desk.shown
         driver.tick(name)
-        assert name not in driver.desk.shown and not driver.widget("check", name).is_checked
-    words = driver.widget("check", "cells").text_label.rect
-    driver.click(*words.center)
+        assert name not in driver.desk.shown and not driver.widget("check", name).value
+    box = driver.widget("check", "cells").rect
+    driver.click(box.left + 40, box.centery)  # on the words
     assert "cells" in driver.desk.shown
     driver.key("1")
     driver.frames(3)
-    assert "cells" not in driver.desk.shown and not driver.widget("check", "cells").is_checked
+    assert "cells" not in driver.desk.shown and not driver.widget("check", "cells").value
     driver.key("ctrl+tab")
     assert driver.window.panel.tab == "robot"
 
@@ -254,7 +244,7 @@ def test_panes_are_added_up_to_four_and_closed_again(driver: Driver) -> None:
     for count in (2, 3, 4):
         driver.push("pane:add")
         assert len(driver.session.lanes) == count
-    assert driver.window.panel.widgets.find("button", "pane:add") is None
+    assert driver.find("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1
     driver.frames(3)
     laws = [lane.law.name for lane in driver.session.lanes]
@@ -263,15 +253,15 @@ def test_panes_are_added_up_to_four_and_closed_again(driver: Driver) -> None:
     driver.push("close:0")
     driver.push("close:1")
     assert [lane.law.name for lane in driver.session.lanes] == [laws[2]]
-    assert driver.window.panel.widgets.find("button", "close:0") is None
+    assert driver.find("button", "close:0") is None
 
 
 def test_the_page_is_of_the_pane_that_was_clicked(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
-        assert driver.window.panel.widgets.find("entry", "k_att") is not None
+        assert driver.find("entry", "k_att") is not None
         driver.click(*driver.pixel(MIDDLE, 1))
         assert driver.desk.active == 1
-        assert driver.window.panel.widgets.find("entry", "k_att") is None
+        assert driver.find("entry", "k_att") is None
         driver.write("k_rep", "5")
         driver.key("return")
         assert [lane.law.value("k_rep") for lane in driver.session.lanes] == [0.3, 5.0]
@@ -289,13 +279,13 @@ def test_fail_and_remove_buttons_are_of_the_robot_that_is_asked(driver: Driver) 
 
 def test_the_panel_can_be_hidden_and_the_arena_takes_its_place(driver: Driver) -> None:
     driver.key("h")
-    assert driver.window.layout.panel[2] == 0 and driver.window.panel.widgets is None
+    assert driver.window.layout.panel[2] == 0 and driver.window.panel.hidden
     assert driver.window.layout.arena[2] == 900
     driver.click(880, 40)
     driver.key("space")
     driver.frames(3)
     driver.key("h")
-    assert driver.window.panel.widgets is not None and driver.session.end > 0.0
+    assert not driver.window.panel.hidden and driver.session.end > 0.0
 
 
 def test_pages_that_were_turned_to_before_look_as_they_did(tmp_path: Path) -> None:
@@ -343,15 +333,16 @@ def test_after_resizing_and_more_panes_the_panel_is_as_if_it_was_built_so(tmp_pa
 def test_tool_tips_tell_what_and_by_which_key(driver: Driver) -> None:
     button = driver.widget("button", "step")
     driver.move(*button.rect.center)
-    driver.frames(60)
-    assert button.tool_tip is not None
-    assert "Single step (.)" in button.tool_tip_text
+    before = driver.picture()
+    assert button.tip == "Single step (.)" and driver.window.panel.ui.due > 0.0
+    time.sleep(driver.window.panel.ui.due)
+    driver.frames(1)
+    assert not driver.same(before)
     driver.move(100, 100)
-    driver.frames(12)
-    assert button.tool_tip is None
+    assert driver.window.panel.ui.due is None
 
 
 def test_tool_tips_of_gains_tell_what_they_mean_and_no_letter_is_taken_for_a_sign(driver: Driver) -> None:
-    tips = [each.tool_tip_text for each in driver.window.panel.widgets.manager.ui_group.sprites()]
+    tips = [each.tip for each in driver.window.panel.ui.shown.values()]
     assert any(tip and "N m³" in tip for tip in tips)
     assert not any(tip and "<" in tip for tip in tips)

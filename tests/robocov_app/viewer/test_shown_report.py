@@ -5,11 +5,12 @@ import pygame
 import pytest
 
 from robocov_app.render.theme import THEMES
+from robocov_app.toolkit.ui import Ui
 from robocov_app.viewer.inspector import Line, Report
-from robocov_app.viewer.report_page import BUTTONS, ReportPage
+from robocov_app.viewer.panel import show_report
 
 SIZE = (320, 300)
-ARROWS = 45  # pixels from the left: arrows are before, words behind
+ARROWS = 33  # pixels from the left: arrows are before, words behind
 
 
 def drawn(*lines: Line) -> np.ndarray:
@@ -18,17 +19,19 @@ def drawn(*lines: Line) -> np.ndarray:
     theme = THEMES["light"]
     screen.fill(theme.panel)
     report = Report("Robot 1", "at rest", lines)
-    ReportPage().draw(screen, (0.0, 0.0, *SIZE), theme, 1.0, report)
+    ui = Ui(lambda ui: show_report(ui, report), theme)
+    ui.box = screen.get_rect()
+    ui.draw(screen)
     return np.any(pygame.surfarray.array3d(screen) != np.array(theme.panel), axis=2)
 
 
 @pytest.mark.parametrize(("size", "arrow"), [(2.0, True), (0.001, True), (0.0004, False), (0.0, False)])
 def test_what_is_written_as_no_force_has_no_arrow(size: float, arrow: bool) -> None:
     page = drawn(Line("the text of a force", (size, 0.0), "resultant"))
-    below = page[:, round(BUTTONS) + 45 :]
+    below = page[:, 45:]
     assert below[:ARROWS].any() == arrow
     assert below[ARROWS:].any()
 
 
 def test_a_line_that_is_no_force_begins_at_the_left() -> None:
-    assert drawn(Line("hears 4 robots", None, ""))[:ARROWS, round(BUTTONS) + 45 :].any()
+    assert drawn(Line("hears 4 robots", None, ""))[:ARROWS, 45:].any()
