@@ -13,7 +13,7 @@ from driven_window import MIDDLE, Driver, opened, resized
 from touched_run import RAPF, RPF
 
 from robocov.controllers import CONTROLLERS
-from robocov_app.viewer.actions import KEY_REPEAT
+from robocov_app.toolkit.input import DOUBLE, KEY_REPEAT
 from robocov_app.viewer.panel import TABS, law_labels
 
 # the panel
@@ -189,7 +189,7 @@ def test_keys_repeat_as_before_after_something_was_typed(driver: Driver) -> None
 def test_typing_goes_on_in_the_middle_after_a_second_click(driver: Driver) -> None:
     entry = driver.widget("entry", "seed")
     driver.write("seed", "123")
-    driver.frames(40)
+    time.sleep(DOUBLE)
     driver.click(entry.rect.left + 8, entry.rect.centery)
     driver.type("9")
     assert sorted(driver.widget("entry", "seed").text) == ["1", "2", "3", "9"]

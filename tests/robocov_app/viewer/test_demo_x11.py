@@ -71,7 +71,7 @@ def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, 
         track = np.s_[SIZE[1] - 26 :]
         assert not np.array_equal(alone[track], played[track])  # its time is 0 again
         assert np.abs(together - alone)[:400, :600].max() > 60
-        hands.key("ctrl+s")
+        hands.key("ctrl+shift+s")
         hands.until(lambda: (tmp_path / "square-1.json").exists(), "saved map")
         (pillar,) = json.loads((tmp_path / "square-1.json").read_text())["obstacles"]
         assert pillar["kind"] == "circle" and pillar["radius"] > 0.3
