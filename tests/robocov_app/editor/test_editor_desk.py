@@ -412,3 +412,17 @@ def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -
         hands.type("array")
         hands.key("return")
         assert hands.window.palette.open and hands.window.palette.text == "array "
+
+
+def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
+    hands.desk.change(create.drawn(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
+    hands.settle()
+    hands.key("ctrl+tab", times=3)
+    hands.frames(3)
+    found = hands.window.panel.list
+    (left, top, width, _) = found.box
+    hands.click(left + 40, top + 14)
+    assert hands.desk.problem is not None and hands.desk.problem.kind == "outside"
+    hands.wait()
+    hands.click(left + width - 30, top + 14)
+    assert hands.said == "circle “lamp” deleted"

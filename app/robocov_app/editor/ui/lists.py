@@ -9,9 +9,11 @@ import numpy as np
 import pygame
 
 from robocov_app.editor.canvas.findings import draw_badge
+from robocov_app.editor.edits.fixes import TITLES
 from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.model.validation import Problem
+from robocov_app.editor.ui.deeds import fix_problem
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened
 from robocov_app.render.theme import mix
@@ -223,7 +225,7 @@ class ProblemList(PanelList):
         rows: list[Row] = []
         y = 2.0
         for problem in self._desk.problems[:MOST_ROWS]:
-            lines = tuple(wrapped(problem.words, 12, wide - 36))
+            lines = tuple(wrapped(problem.words, 12, wide - (36 if problem.kind not in TITLES else 96)))
             high = 17.0 * len(lines) + 11
             rows.append(Row(y, high, lines, problem))
             y += high + 2
@@ -236,6 +238,16 @@ class ProblemList(PanelList):
     def chosen(self, row: Row) -> bool:
         """Return whether the problem is the one that is shown."""
         return row.about is self._desk.problem
+
+    def click(self, pixel: tuple[int, int]) -> bool:
+        """Show the problem; a click on its button mends it."""
+        if not super().click(pixel):
+            return False
+        desk, problem = self._desk, self._desk.problem
+        left, _, width, _ = self.box
+        if problem is not None and problem.kind in TITLES and pixel[0] > left + width - 70 * self._scale:
+            desk.attempt(lambda: fix_problem(desk))
+        return True
 
     def take(self, row: Row) -> None:
         """Show the problem, and select what it is about."""
@@ -252,6 +264,12 @@ class ProblemList(PanelList):
         assert isinstance(row.about, Problem)
         canvas = Canvas(screen, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
         draw_badge(canvas, rect.left + 14 * scale, rect.top + 14 * scale, grave=row.about.grave)
+        if row.about.kind in TITLES:
+            button = pygame.Rect(rect.right - round(62 * scale), rect.top + round(3 * scale), 0, 0)
+            button.size = round(54 * scale), round(22 * scale)
+            pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.3), button, 1, round(4 * scale))
+            words = label(TITLES[row.about.kind], round(11.5 * scale), theme.ink)
+            screen.blit(words, words.get_rect(center=button.center))
         for k, line in enumerate(row.lines):
             at = (rect.left + round(30 * scale), rect.top + round((6 + 17 * k) * scale))
             screen.blit(label(line, round(12 * scale), theme.ink), at)
