@@ -13,12 +13,18 @@ from robocov.environment import (
     WallObstacle,
 )
 from robocov.errors import MapError
+from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, simplify, transform, vertices
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
+from robocov_app.editor.model.validation import Problem, examined
 
 HALL = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
+
+
+def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> tuple[Problem, ...]:
+    return examined(sketch, radius)[0]
 
 
 def renumbered(sketch: Sketch) -> Sketch:

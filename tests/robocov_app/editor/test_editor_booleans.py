@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, sound_shapes, sound_sketches
+from drawn_sketches import HALL, problems, sound_shapes, sound_sketches
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +13,6 @@ from robocov_app.editor.edits import boolean, properties
 from robocov_app.editor.model.geometry import outlines
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.editor.model.validation import problems
 
 
 def covered(sketch: Sketch) -> shapely.Geometry:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from density_cases import KINDS
+from drawn_sketches import problems
 from driven_editor import opened_editor, sheet
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,7 +20,6 @@ from robocov_app.editor.model.file import opened, saved
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, sketch_text
-from robocov_app.editor.model.validation import problems
 
 RING = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 ONE = Gaussians((Gaussian((3.0, 3.0), 2.0, sigma=1.0),), 0.5)

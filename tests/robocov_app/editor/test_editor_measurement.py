@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from drawn_sketches import HALL, drafts, sound_sketches
+from drawn_sketches import HALL, drafts, problems, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
@@ -15,7 +15,6 @@ from robocov.mapfile import bundled_maps, load_map
 from robocov.mapfile.check import check_map
 from robocov_app.editor.model.measurement import measure, reach_of
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.model.validation import problems
 
 FAR = ((0.0, 0.0), (12.0, 0.0), (12.0, 8.0), (0.0, 8.0))
 

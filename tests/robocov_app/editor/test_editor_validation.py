@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 import shapely
-from drawn_sketches import HALL, drafts, sound_sketches
+from drawn_sketches import HALL, drafts, problems, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,7 +18,7 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.model.validation import in_words, problems
+from robocov_app.editor.model.validation import in_words
 
 
 def hall(*shapes, starts=(), **others) -> Sketch:

@@ -77,16 +77,12 @@ class _Fault(NamedTuple):
     kind: Kind = "other"
 
 
-def problems(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> tuple[Problem, ...]:
-    """Return all that is wrong, the grave first; `radius` is that of the robots, m, for the warnings.
-
-    There is a grave one exactly when ``sketch.environment()`` raises.
-    """
-    return examined(sketch, radius)[0]
-
-
 def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Return all that is wrong, and the free space as far as there is one."""
+    """Return all that is wrong, the grave first, and the free space as far as there is one.
+
+    The radius is that of the robots, m, for the warnings. There is a grave problem exactly when
+    ``sketch.environment()`` raises.
+    """
     found = [*_map_faults(sketch), *_part_faults(sketch)]
     if found:
         free = _rough_free(sketch)
