@@ -64,7 +64,7 @@ def test_every_command_and_map_that_it_names_exists() -> None:
     assert len(calls) > 8
     for command, word in calls:
         assert command in COMMANDS
-        if command in ("run", "compare", "cost"):
+        if command in ("run", "compare", "cost") and word != "story":  # a session's file
             assert word in bundled_maps()
 
 

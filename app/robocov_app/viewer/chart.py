@@ -79,6 +79,10 @@ def value_axis(low: float, high: float) -> tuple[float, float, float]:
     return begin, float(f"{high + 0.05 * (high - begin):.6g}"), step
 
 
+_GRASP = 6.0
+"""Pixels at scale 1 from a ghost curve within which a click enters its branch."""
+
+
 class Chart:
     """Draws the plot and the time line of a desk; keeps what changes seldom."""
 
@@ -90,6 +94,7 @@ class Chart:
         self._drawn_at = -1.0
         self._wanted = DISTANCE
         self._other: Box | None = None
+        self._ghosts: list[tuple[int, Array]] = []
         self.hover: tuple[int, int] | None = None
         """Where the cursor is in the window."""
 
@@ -116,6 +121,13 @@ class Chart:
     def offers(self, at: tuple[int, int]) -> bool:
         """Return whether the name of the other quantity is at a pixel of the window."""
         return self._other is not None and inside(self._other, at)
+
+    def ghost_at(self, at: tuple[int, int]) -> int | None:
+        """Return the node of the document whose branch has a ghost curve at a pixel of the window."""
+        at = at[0], at[1] - self.layout.chart[1]
+        near = [(float(np.hypot(*(points - at).T).min()), node) for node, points in self._ghosts]
+        best = min(near, default=(np.inf, 0))
+        return best[1] if best[0] < _GRASP * self.layout.scale else None
 
     # where time is
 
@@ -219,8 +231,10 @@ class Chart:
                 mix(theme.panel, theme.ink, 0.3), pygame.Rect(x, round(top), 1, round(bottom - top))
             )
         self._event_words(canvas, list(session.events), left, right, end, top)
+        self._ghosts = []
         for ghost in ghosts:
             points = place(ghost.time, ghost.value)
+            self._ghosts.append((ghost.node, points))
             colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
             for k in range(len(points) - 1):
                 if k % 4 < 3 or len(points) < 12:

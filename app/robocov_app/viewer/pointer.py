@@ -112,6 +112,8 @@ class Pointer:
         if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
             if event.button == 1 and self._chart.offers(event.pos):
                 desk.attempt(self._chart.switch)
+            elif event.button == 1 and (ghost := self._chart.ghost_at(event.pos)) is not None:
+                desk.attempt(lambda: desk.enter(ghost))
             elif event.button == 1:
                 self._interrupt()
                 self._drag = "time"

@@ -451,9 +451,14 @@ class Desk:
         session = self.session
         branches = session.branches
         now = next((k for k, each in enumerate(branches) if each.node is session.head), -1)
-        branch = branches[(now + by) % len(branches)]
-        session.enter(branch.node)
-        self.say(f"branch {branches.index(branch) + 1} of {len(branches)}: {branch.words}")
+        self.enter(branches[(now + by) % len(branches)].node.number)
+
+    def enter(self, node: int) -> None:
+        """Go to the end of the branch that ends with a node of the document."""
+        branches = self.session.branches
+        k = next(k for k, each in enumerate(branches) if each.node.number == node)
+        self.session.enter(branches[k].node)
+        self.say(f"branch {k + 1} of {len(branches)}: {branches[k].words}")
 
     def set_parameter(self, name: str, value: Value) -> None:
         """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""

@@ -91,3 +91,20 @@ def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="format: missing"):
         desk.open_session(tmp_path / "no.robocov")
     assert desk.session is before
+
+
+def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.session.playing = True
+        driver.frames(90)
+        driver.session.fail_robot(2)
+        driver.frames(90)
+        driver.key("ctrl+z")
+        driver.frames(30)
+        ((node, points),) = driver.window.chart._ghosts
+        x, y = points[-1].tolist()
+        driver.click(x, y + driver.window.layout.chart[1])
+        assert (
+            driver.desk.message == "branch 1 of 2: robot 2 failed" or "robot 2 failed" in driver.desk.message
+        )
+        assert driver.session.head.number == node and driver.session.numbers == (1, 3)
