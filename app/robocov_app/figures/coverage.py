@@ -41,18 +41,7 @@ _BAR_LABEL = "distance to the nearest robot"
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A team at one moment, with the distances around it.
-
-    Attributes
-    ----------
-    environment : Environment
-    team : Team
-    field : Field
-    title, facts : str
-        What stands above the map.
-    numbers : tuple of int or None
-        What people call the robots; by default 1, 2, 3, ...
-    """
+    """A team at one moment, with the distances around it and what stands above the map."""
 
     environment: Environment
     team: Team
@@ -103,28 +92,10 @@ def plot_coverage(
 ) -> Figure:
     """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colours.
 
-    Parameters
-    ----------
-    curves : sequence of Curve
-        May be empty: there are only maps then.
-    moments : sequence of Moment
-        At least one.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default what suits the shapes of the maps. One that is too small for both,
-        below 720 x 400, has the curves alone.
-    title : str
-    times : sequence of Curve
-        Mean times, s, where robots are not equally fast; they stand below the curves.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no moments.
+    `curves`: may be empty: there are only maps then. `moments`: at least one. `size`, (width, height) or
+    None: of the page; by default what suits the shapes of the maps. One that is too small for both, below 720
+    x 400, has the curves alone. `times`: mean times, s, where robots are not equally fast; they stand below
+    the curves. Raises ParameterError when there are no moments.
     """
     if not moments:
         raise ParameterError("moments: none were given, but at least one was wanted")
@@ -167,14 +138,8 @@ def plot_coverage(
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
     """Plot the distance to the nearest robot on axes that somebody else laid out.
 
-    They get ticks in metres, and the scale of colours to the right of them.
-
-    Parameters
-    ----------
-    moment : Moment
-        Its title and facts are not written.
-    axes : matplotlib Axes
-    theme : Theme or {"light", "dark"}
+    They get ticks in metres, and the scale of colours to the right of them. `moment`: its title and facts are
+    not written.
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
     largest = moment.field.largest
@@ -320,11 +285,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     place = borders.row, borders.column
     picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(_border_colour(theme)))
     image = axes.imshow(
-        picture,
-        extent=(low_x, high_x, low_y, high_y),
-        aspect="auto",
-        interpolation="antialiased",
-        zorder=0,
+        picture, extent=(low_x, high_x, low_y, high_y), aspect="auto", interpolation="antialiased", zorder=0
     )
     region = Polygon(moment.environment.region.vertices, transform=axes.transData)
     image.set_clip_path(region)

@@ -59,12 +59,8 @@ _FROM_ZERO = 0.4
 class CurveStyle(NamedTuple):
     """How a controller's curves are told from others: never by a colour alone.
 
-    Attributes
-    ----------
-    name : str
-        Of the colour: the controller's own, or ``other-0``, ``other-1``, ... for those of `Theme.others`.
-    dashes : matplotlib line style
-    mark : matplotlib marker
+    `name` is that of the colour: the controller's own, or ``other-0``, ``other-1``, ... for those of
+    `Theme.others`.
     """
 
     name: str
@@ -135,21 +131,8 @@ def draw_curves(
 ) -> None:
     """Draw curves with their labels at their right ends, pushed apart where they would overlap.
 
-    The first is the widest and lowest: curves that lie on each other are still all seen.
-
-    Parameters
-    ----------
-    axes : matplotlib Axes
-    curves : sequence of Curve
-    theme : Theme
-    styles : sequence of CurveStyle or None
-        For each curve; None gives every controller that has none of its own another one.
-    bands : sequence of (low (T,), high (T,)) or None
-        What lies around each curve, as quartiles around a median.
-    label, unit : str
-        What the values are.
-    weight : float
-        Of lines and marks: below 1 for a small picture.
+    The first is the widest and lowest: curves that lie on each other are still all seen. `bands` are what
+    lies around each curve, as quartiles around a median; a `weight` below 1 is for small pictures.
     """
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
     looks = [(style.colour(theme), style.dashes, style.mark) for style in chosen]
@@ -239,12 +222,7 @@ def _frame(
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:
     """Return heights at least `gap` apart, in the same order, as near to the given ones as a sweep gets.
 
-    Parameters
-    ----------
-    heights : (m,)
-    gap : float
-    low, high : float
-        They stay within, as far as there is room.
+    `heights` in (m,). `low`, `high`: they stay within, as far as there is room.
 
     Examples
     --------

@@ -42,15 +42,7 @@ _WIDE = 8.0
 
 
 class Dependence(NamedTuple):
-    """What came of different values of a gain.
-
-    Attributes
-    ----------
-    label, controller : str
-    gains : (m,)
-        nan where the gain is null: no limit. Of a gain that is a word, the word's number.
-    values : (m,)
-    """
+    """Values of one controller's runs against a gain, (m,) each: nan is no limit, and a word its number."""
 
     label: str
     controller: str
@@ -73,37 +65,9 @@ def plot_gains(
 ) -> Figure:
     """Plot values against a gain, one colour and mark a controller, with a line through medians.
 
-    The axis of the gain is logarithmic where it spans much; null has a place of its own at the right.
-    A gain that is a word has even places, and no line, for between words there is nothing.
-
-    Parameters
-    ----------
-    dependences : sequence of Dependence
-    gain : str
-        Name and unit of the gain.
-    axes : matplotlib Axes or None
-        Where to draw. None makes a page.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default 700 x 480.
-    title : str
-        Of the page.
-    scale : float or None
-        Of the page's texts and lines; None for what suits its size.
-    styles : sequence of CurveStyle or None
-    label : str
-        What the values are.
-    words : sequence of str
-        Of a gain that is a word: the words, of which `dependences` hold the numbers.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are none, or one has no finite value.
+    The axis of the gain is logarithmic where it spans much; null has a place of its own at the right. A gain
+    that is one of `words` has even places, and no line. `axes`: where to draw; None makes a page of `size` px
+    with a `title`. Raises ParameterError when there are no values, or one controller has no finite one.
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
     kept = []
@@ -145,25 +109,8 @@ def plot_gain_grid(
 ) -> Figure:
     """Plot values over a grid of two gains as a heat map with the numbers in it; darkest is highest.
 
-    Parameters
-    ----------
-    first, second : sequence of float, str or None
-        Values of the gains: columns and rows, ascending; None for no limit.
-    values : (rows, columns)
-        nan where there is none.
-    gains : (str, str)
-        Names and units of the first and second gain.
-    axes, theme, size, title, scale
-        As for `plot_gains`.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When the values have another shape, or none is finite.
+    `values` (rows, columns) are nan where there is none; `first` and `second` are the gains' values,
+    ascending, None for no limit. Raises ParameterError when the values have another shape, or none is finite.
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
     if values.shape != (len(second), len(first)) or not np.isfinite(values).any():

@@ -38,14 +38,8 @@ _LIMIT = 1e-7
 class AtHeight(NamedTuple):
     """The best place at one height.
 
-    Attributes
-    ----------
-    height : float, m
-        0 and inf stand for the limits.
-    x, y : float, m
-    from_centroid : float, m
-    missed : float
-        What part of the best place's value a sensor over the centroid misses; nan in the limits.
+    `height`, m: 0 and inf stand for the limits. `x`, `y` in m. `from_centroid` in m. `missed`: what part of
+    the best place's value a sensor over the centroid misses; nan in the limits.
     """
 
     height: float
@@ -58,11 +52,7 @@ class AtHeight(NamedTuple):
 def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[float]) -> list[AtHeight]:
     """Return the best places over a convex cell, the limits h → 0 and h → ∞ first and last.
 
-    Parameters
-    ----------
-    vertices : ring of (x, y), m
-    heights : sequence of float, m
-        Ascending.
+    `vertices` in m. `heights`, m: ascending.
     """
     cell = _cell_of(vertices)
     size = float(np.sqrt(cell.mass[0]))
@@ -108,22 +98,8 @@ def plot_heights(
     """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
 
     At the left the whole cell, in the middle what happens in it, enlarged, and at the right how far the
-    optimum is from the centroid.
-
-    Parameters
-    ----------
-    vertices : ring of (x, y), m
-        Of a convex cell.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        By default 1080 x 440.
-    title : str
-    scale : float or None
-        Of texts and lines; None for what suits the size.
-
-    Returns
-    -------
-    matplotlib Figure
+    optimum is from the centroid. `vertices`, m: of a convex cell. `size`, (width, height) or None: by default
+    1080 x 440. `scale`: of texts and lines; None for what suits the size.
     """
     theme = theme_named(theme) if isinstance(theme, str) else theme
     cell = _cell_of(vertices)

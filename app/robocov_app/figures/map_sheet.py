@@ -37,23 +37,9 @@ def plot_maps(
 ) -> Figure:
     """Plot maps side by side at one scale, each under its name.
 
-    Parameters
-    ----------
-    environments : sequence of Environment
-        The first `MOST` are drawn; where there are more, the title says so.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default what suits the shapes of the maps.
-    title : str
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no maps.
+    `environments`: the first `MOST` are drawn; where there are more, the title says so. `size`, (width,
+    height) or None: of the page; by default what suits the shapes of the maps. Raises ParameterError when
+    there are no maps.
     """
     if not environments:
         raise ParameterError("maps: none were given, but at least one was wanted")

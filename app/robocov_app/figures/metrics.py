@@ -21,13 +21,7 @@ if TYPE_CHECKING:
 
 
 class Measured(NamedTuple):
-    """A run and what was measured of it.
-
-    Attributes
-    ----------
-    label, controller : str
-    metrics : RunMetrics
-    """
+    """A run and what was measured of it."""
 
     label: str
     controller: str
@@ -55,17 +49,7 @@ def plot_metrics(
 ) -> Figure:
     """Plot the metrics of runs against time, each curve named with its value at the end.
 
-    Parameters
-    ----------
-    runs : sequence of Measured
-    theme : Theme or {"light", "dark"}
-    size : (width, height), px
-    title : str
-
-    Raises
-    ------
-    ParameterError
-        When there is no run.
+    `size` in (width, height). Raises ParameterError when there is no run.
     """
     if not runs:
         raise ParameterError("runs: none were given, but at least one was wanted")

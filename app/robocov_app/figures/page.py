@@ -48,15 +48,9 @@ def figure_png(figure: Figure) -> bytes:
 def save_figure(figure: Figure, path: Path | str) -> None:
     """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all.
 
-    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts
-    themselves, so that both look the same everywhere. None holds a date: the same plot gives the same bytes.
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
-    ParameterError
-        When the suffix is another.
+    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts themselves, so
+    that both look the same everywhere. None holds a date: the same plot gives the same bytes. Raises
+    OutputError when the file cannot be written; ParameterError when the suffix is another.
     """
     path = Path(path)
     kind = figure_kind(path)
@@ -76,12 +70,8 @@ def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
 def check_figure_path(path: Path) -> None:
     """Make sure, before any work is done, that a figure can be written there.
 
-    Raises
-    ------
-    OutputError
-        When there is no such folder, or something else than a file in its place.
-    ParameterError
-        When the suffix is neither PNG, SVG nor PDF.
+    Raises OutputError when there is no such folder, or something else than a file in its place;
+    ParameterError when the suffix is neither PNG, SVG nor PDF.
     """
     figure_kind(path)
     if not writable(path).parent.is_dir():
@@ -91,10 +81,7 @@ def check_figure_path(path: Path) -> None:
 def figure_kind(path: Path) -> str:
     """Return ``png``, ``svg`` or ``pdf``, by the suffix of a path.
 
-    Raises
-    ------
-    ParameterError
-        When the suffix is another.
+    Raises ParameterError when the suffix is another.
     """
     kind = path.suffix.lower().lstrip(".")
     if kind not in _METADATA:
@@ -141,16 +128,7 @@ def tone(colour: Colour) -> tuple[float, float, float]:
 class Page:
     """A figure with titles and a legend that keep clear of what is plotted.
 
-    Parameters
-    ----------
-    size : (width, height), px
-    theme : Theme
-    scale : float or None
-        Of texts and lines, 1 for 100 dots an inch; None for what suits the size.
-
-    Attributes
-    ----------
-    figure : matplotlib.figure.Figure
+    Texts and lines are `scale` times those of a page of 100 dots an inch; None is what suits the size.
     """
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
@@ -189,17 +167,9 @@ class Page:
     ) -> list[tuple[Box, float]]:
         """Return equal boxes in rows, and how wide the lines above each may be.
 
-        Parameters
-        ----------
-        count, columns : int
-        aspect : float
-            Width by height of each box.
-        words : float, px
-            How wide the lines above would be; slots grow for them as far as there is room.
-        above : float, px
-            Height of those lines.
-        top, below : float, px
-            What stays free of panels at the page's upper and lower edge.
+        `aspect` is width by height of a box; `words` is how wide the lines above would be: slots grow for
+        them as far as there is room; `above` is the height of those lines; `top` and `below` stay free. All
+        in px.
         """
         rows = -(-count // columns)
         gap = 14 * self.scale
@@ -275,15 +245,8 @@ class Page:
     ) -> None:
         """Draw the scale bar and the legend: beside each other where that fits, else below each other.
 
-        Parameters
-        ----------
-        handles : sequence of artists
-            The legend's entries.
-        left, right, bottom : float, px
-            Edges of what is plotted above.
-        zoom : float, px/m
-        begin : float or None, px
-            Nothing is left of this; by default the margin.
+        `left`, `right` and `bottom` are edges of what is plotted above, px; `zoom` is in px/m; nothing is
+        left of `begin`.
         """
         begin = self.margin if begin is None else begin
         columns, width, _ = self._legend_extent(handles, begin)

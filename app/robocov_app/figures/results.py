@@ -52,18 +52,7 @@ _USUAL = 700.0
 
 
 class Band(NamedTuple):
-    """Values of several runs against time.
-
-    Attributes
-    ----------
-    label : str
-        What is said of them: the controller's label, with its variant where there are several.
-    controller : str
-        Its name, for the colour.
-    time : (T,) s
-    values : (m, T)
-        One row for each run; nan where a run has none.
-    """
+    """Runs of one controller over time (T,) s: `values` (m, T) has a row for each, nan where it has none."""
 
     label: str
     controller: str
@@ -80,18 +69,9 @@ class Sample(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """How one controller did against another, pair by pair.
+    """Ratios (m,) of two controllers in pairs of runs, named as "RAPF / RPF", with the typical ratio.
 
-    Attributes
-    ----------
-    label : str
-        As in "RAPF / RPF".
-    controller : str
-        The first one's name, for the colour.
-    ratios : (m,)
-        First by second, one for each pair.
-    interval : Interval
-        The typical ratio.
+    `controller` is the first one's name, for the colour.
     """
 
     label: str
@@ -114,31 +94,9 @@ def plot_cost_bands(
 ) -> Figure:
     """Plot values against time: of several runs their median and quartiles, of one run its line.
 
-    Parameters
-    ----------
-    bands : sequence of Band
-    axes : matplotlib Axes or None
-        Where to draw; the labels stand to the right of them. None makes a page.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default 1000 x 560.
-    title : str
-        Of the page.
-    scale : float or None
-        Of the page's texts and lines; None for what suits its size.
-    styles : sequence of CurveStyle or None
-        For each band; by default `styles_of` its controllers.
-    label, unit : str
-        What the values are.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no bands, or one has no finite value or not one column for each time.
+    `axes`: where to draw; None makes a page of `size` px with a `title`. `styles`: one for each band. `label`
+    and `unit` tell the values. Raises ParameterError when there are no bands, or one has no finite value or
+    not one column for each time.
     """
     if not bands:
         raise ParameterError("bands: none were given, but at least one was wanted")
@@ -195,37 +153,11 @@ def plot_final_costs(
 ) -> Figure:
     """Plot samples as boxes on their side, every value as a point, in groups such as maps.
 
-    A box spans the quartiles, with the median across; whiskers reach the farthest values within 1.5 times
-    its length. A sample of fewer than five values has its points and its median alone.
-
-    Parameters
-    ----------
-    rows : sequence of (name, sequence of Sample)
-        Groups from top to bottom; a single one with an empty name has none written.
-    axes : matplotlib Axes or None
-        Where to draw; None makes a page.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; a height of None is what the rows need. By default 800 px wide.
-    title : str
-        Of the page.
-    scale : float or None
-        Of the page's texts and lines; None for what suits its size.
-    styles : sequence of CurveStyle or None
-        For the samples of each row in turn; by default `styles_of` the row's controllers.
-    label : str
-        What the values are.
-    origin : float
-        The least value there can be: the axis begins there unless all values are far from it.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no samples, or one has no finite value.
+    A box spans the quartiles, with the median across; whiskers reach the farthest values within 1.5 times its
+    length. A sample of fewer than five values has its points and its median alone. `rows` are groups from top
+    to bottom; a single one with an empty name has none written. `axes`: where to draw; None makes a page of
+    `size` px with a `title`. A height of None is what the rows need. The axis begins at `origin` unless all
+    values are far from it. Raises ParameterError when there are no samples, or one has no finite value.
     """
     samples = [sample for _, group in rows for sample in group]
     _check_samples(samples)
@@ -266,25 +198,8 @@ def plot_paired(
 ) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis.
 
-    Parameters
-    ----------
-    pairs : sequence of Pairs
-        From top to bottom.
-    axes, theme, size, title, scale
-        As for `plot_final_costs`.
-    label : str
-        What the values are.
-    styles : sequence of CurveStyle or None
-        For each row; by default those of their controllers.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no pairs, or a ratio is not above 0.
+    Arguments are those of `plot_final_costs`. Raises ParameterError when there are no pairs, or a ratio is
+    not above 0.
     """
     _check_samples([Sample(each.label, each.controller, each.ratios) for each in pairs])
     for each in pairs:

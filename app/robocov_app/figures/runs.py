@@ -38,18 +38,7 @@ def plot_environment(
 ) -> Figure:
     """Plot a map: its free space, its obstacles and the convex region that the robots know.
 
-    Parameters
-    ----------
-    environment : Environment
-    axes : matplotlib Axes or None
-        Where to draw; they get ticks in metres. None makes a page with title, scale bar and legend.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default what suits the shape of the map.
-
-    Returns
-    -------
-    matplotlib Figure
+    `axes`: where to draw; None makes a page of `size` px with a `title`.
     """
     theme = _theme(theme)
     with plain_style():
@@ -76,24 +65,9 @@ def plot_trajectories(
 ) -> Figure:
     """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
 
-    Parameters
-    ----------
-    record : Record
-    axes : matplotlib Axes or None
-        Where to draw; they get ticks in metres. None makes a page with title, scale bar and legend.
-    theme : Theme or {"light", "dark"}
-    colours : {"paper", "robots"}
-        The paper's green starts, red trajectories and blue final positions, or a hue for each robot.
-    size : (width, height) or None, px
-        Of the page; by default what suits the shape of the map.
-    mean_distance : float or None, m
-        Of the final positions, for the title, as
-    mean_time : float or None, s
-        where robots are not equally fast.
-
-    Returns
-    -------
-    matplotlib Figure
+    `axes`: where to draw; None makes a page of `size` px with a `title`. `colours`: those of the paper, or a
+    hue for each robot. `mean_distance`, m, and `mean_time`, s (where robots are not equally fast), are those
+    of the final positions, for the title.
     """
     _check_colours(colours)
     theme = _theme(theme)
@@ -125,27 +99,8 @@ def plot_comparison(
 ) -> Figure:
     """Plot several runs side by side at one scale.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        At least one.
-    theme : Theme or {"light", "dark"}
-    colours : {"paper", "robots"}
-    size : (width, height) or None, px
-        Of the page; by default what suits the shapes of the maps.
-    mean_distances : sequence of float or None, m
-        Of the final positions, for the titles, as
-    mean_times : sequence of float or None, s
-        where robots are not equally fast.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no records, or not one mean distance, and mean time, for each.
+    `mean_distances`, m, and `mean_times`, s (where robots are not equally fast), are those of the final
+    positions, for the titles. Raises ParameterError when there are no records, or not one value for each.
     """
     _check_colours(colours)
     costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
@@ -220,25 +175,9 @@ def plot_cost(
 ) -> Figure:
     """Plot mean distance against time, each curve named with its final value at its end.
 
-    Parameters
-    ----------
-    curves : sequence of (label, controller, (T,) s, (T,) m)
-        RAPF is blue and RPF red, as in the paper; curves differ in their dashes as well.
-    axes : matplotlib Axes or None
-        Where to draw; the labels stand to the right of them. None makes a page.
-    theme : Theme or {"light", "dark"}
-    size : (width, height) or None, px
-        Of the page; by default 1000 x 560.
-    title : str
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ParameterError
-        When there are no curves, or one has no finite value.
+    RAPF is blue and RPF red, as in the paper; curves differ in their dashes as well. `axes`: where to draw;
+    None makes a page of `size` px with a `title`. Raises ParameterError when there are no curves, or one has
+    no finite value.
     """
     if not curves:
         raise ParameterError("curves: none were given, but at least one was wanted")

@@ -68,10 +68,7 @@ def bootstrap(
 ) -> Interval:
     """Return the median or mean of (m,) finite values; values of one of the m `clusters` are drawn together.
 
-    Raises
-    ------
-    ParameterError
-        When there is no value, or one that is not finite, or not one label for each.
+    Raises ParameterError when there is no value, or one that is not finite, or not one label for each.
     """
     sample = _checked("values", values)
     labels = range(len(sample)) if clusters is None else clusters
@@ -88,10 +85,7 @@ def bootstrap_by(
 ) -> Interval:
     """Return any statistic of row numbers, some of them drawn several times, one label of `clusters` a row.
 
-    Raises
-    ------
-    ParameterError
-        When there is no row.
+    Raises ParameterError when there is no row.
     """
     return _interval(lambda drawn: [statistic(rows) for rows in drawn], clusters, resamples)
 
@@ -127,10 +121,7 @@ def _interval(
 def paired(a: ArrayLike, b: ArrayLike, clusters: Sequence[object] | None = None) -> Paired:
     """Compare two samples (m,) pair by pair: row k of both was got under the same circumstances.
 
-    Raises
-    ------
-    ParameterError
-        When they differ in length, are not finite, or `b` is not above 0.
+    Raises ParameterError when they differ in length, are not finite, or `b` is not above 0.
     """
     first, second = _checked("a", a), _checked("b", b)
     if len(first) != len(second):
@@ -149,12 +140,8 @@ def paired(a: ArrayLike, b: ArrayLike, clusters: Sequence[object] | None = None)
 def mean_with_t_interval(values: ArrayLike) -> Interval:
     """Return the mean of (m,) values with Student's t interval, which is honest of few of them, too.
 
-    Equal values say no more than one: they have no interval.
-
-    Raises
-    ------
-    ParameterError
-        When there is no value, or one that is not finite.
+    Equal values say no more than one: they have no interval. Raises ParameterError when there is no value, or
+    one that is not finite.
     """
     sample = _checked("values", values)
     mean = float(sample.mean())
@@ -170,10 +157,7 @@ def mean_with_t_interval(values: ArrayLike) -> Interval:
 def spread(values: ArrayLike) -> float:
     """Return the coefficient of variation: the standard deviation (of a sample) by the mean.
 
-    Raises
-    ------
-    ParameterError
-        When there are fewer than two values, or their mean is not above 0.
+    Raises ParameterError when there are fewer than two values, or their mean is not above 0.
     """
     sample = _checked("values", values)
     if len(sample) < 2:

@@ -80,10 +80,7 @@ class Caption(Layer):
 class Status(Layer):
     """Controller, time and cost in the strip below the arena.
 
-    Parameters
-    ----------
-    brief : bool
-        Leave out what a `Caption` says: the controller and the cost.
+    `brief`: leave out what a `Caption` says: the controller and the cost.
     """
 
     name = "status"

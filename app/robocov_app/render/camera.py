@@ -16,13 +16,8 @@ SMALLEST, LARGEST = 1e-4, 1e7
 class Camera:
     """What part of the world is shown where; immutable, so that a picture can be kept for it.
 
-    Attributes
-    ----------
-    center : (x, y), m
-        The point of the world in the middle of the view.
-    zoom : float, px/m
-    view : (left, top, width, height), px
-        The rectangle of the surface that shows the world.
+    Immutable, so that a picture can be kept for it. `center` is the point of the world, m, in the middle of
+    `view` (left, top, width, height), px; `zoom` is in px/m.
     """
 
     center: tuple[float, float]
@@ -38,12 +33,7 @@ class Camera:
     ) -> Camera:
         """Return the camera that shows `bounds` as large as possible.
 
-        Parameters
-        ----------
-        bounds : (smallest x, smallest y, largest x, largest y), m
-        view : (left, top, width, height), px
-        margin : float, px
-            Left free on each side.
+        `bounds` are smallest x and y, largest x and y, m; `margin` px are left free on each side of the view.
         """
         low_x, low_y, high_x, high_y = bounds
         width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)

@@ -83,17 +83,8 @@ def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
 class Canvas:
     """Where layers draw.
 
-    Attributes
-    ----------
-    surface : pygame.Surface
-    camera : Camera
-    theme : Theme
-    scale : float
-        Widths and text sizes of the theme are multiplied by it: 2 on a screen of twice the density.
-    hues : (n,) int
-        Index of each robot's colour in the theme.
-    shown : names of layers
-        All that are drawn.
+    `scale` multiplies widths and text sizes of the theme (2 on a screen of twice the density), `hues` are the
+    indices of the robots' colours, (n,), and `shown` the names of all layers that are drawn.
     """
 
     surface: pygame.Surface

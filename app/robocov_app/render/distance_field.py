@@ -29,12 +29,7 @@ _RIVALS = 5
 
 
 class FieldLattice:
-    """Which sites are around each place of a map; the same for all results on it.
-
-    Parameters
-    ----------
-    sites : Sites
-    """
+    """Which sites are around each place of a map; the same for all results on it."""
 
     def __init__(self, sites: Sites) -> None:
         side = sites.lattice
@@ -66,16 +61,7 @@ class FieldLattice:
 
 @dataclass(frozen=True, eq=False)
 class Borders:
-    """Places near which the owner changes.
-
-    Attributes
-    ----------
-    row, column : (k,)
-        Of the picture.
-    owner : (k,)
-    gap : (k,) m
-        How far the border is.
-    """
+    """Pixels (row, column) near which the owner changes, (k,) each, and how far the border is, m."""
 
     row: IntArray
     column: IntArray
@@ -91,14 +77,9 @@ class Borders:
 class _Rivals(NamedTuple):
     """Sites whose ways a place may choose from.
 
-    Attributes
-    ----------
-    number : (s, s)
-        The number of each square that has any, else -1.
-    site : (k, r)
-    right : (k, 4, r)
-        Whether the way's straight end, led to each corner of the square, is not shorter than the shortest
-        way to it; if it is, there is a wall in between.
+    `number` (s, s) is that of each square that has any, else -1, `site` (k, r). `right` (k, 4, r): whether
+    the straight end of the way, led to each corner of the square, is not shorter than the shortest way to it;
+    if it is, there is a wall in between.
     """
 
     number: IntArray
@@ -109,11 +90,7 @@ class _Rivals(NamedTuple):
 class Field:
     """The distance to the nearest robot, and who that is, for one set of positions.
 
-    Parameters
-    ----------
-    lattice : FieldLattice
-    result : CoverageResult
-        Of the same `CoverageCost`.
+    `result`: of the same `CoverageCost`.
     """
 
     def __init__(self, lattice: FieldLattice, result: CoverageResult) -> None:
@@ -178,12 +155,8 @@ class Field:
     def borders(self, x: Array, y: Array, within: float) -> Borders:
         """Return the places of a picture near which the owner changes.
 
-        Parameters
-        ----------
-        x, y : (w,) and (h,) m
-            Of the pixels' middles, evenly spaced.
-        within : float, m
-            How far the border may be.
+        `x` (w,) and `y` (h,) are the middles of the pixels, m, evenly spaced; borders are at most `within` m
+        away.
         """
         _, pixels = self._coarse_and_fine(x, y, within)
         return pixels.within(within)
@@ -265,11 +238,7 @@ class Field:
 class Fields:
     """The fields of one map, whatever the positions and the time, and one scale of colours for all of them.
 
-    Parameters
-    ----------
-    cost : CoverageCost
-    limit : float, m
-        Where the scale of colours ends.
+    `limit`, m: where the scale of colours ends.
     """
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
@@ -280,12 +249,8 @@ class Fields:
     def at(self, positions: Array, time: float = 0.0) -> Field | None:
         """Return the field of robots at (n, 2) m, with the obstacles where they are at a time, s.
 
-        Robots below an obstacle that moves are left out; None where all are.
-
-        Raises
-        ------
-        InputError
-            When a robot is in an obstacle that stands, or outside the map.
+        Robots below an obstacle that moves are left out; None where all are. Raises InputError when a robot
+        is in an obstacle that stands, or outside the map.
         """
         result = self._momentary.of_all(time, positions)
         if result is None:
@@ -380,19 +345,8 @@ def palette(theme: Theme) -> NDArray[np.uint8]:
 def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArray[np.uint8]:
     """Return distances as a picture of numbers of colours in the `palette`.
 
-    Parameters
-    ----------
-    field : Field
-    x, y : (w,) and (h,) m
-        Of the pixels' middles.
-    limit : float, m
-        From here on all is of the farthest colour.
-    hatch : int
-        Pixels from one slanted line to the next, where no robot can come.
-
-    Returns
-    -------
-    (h, w)
+    `x` (w,) and `y` (h,) are the middles of the pixels, m; from `limit`, m, on all is of the farthest colour;
+    where no robot can come there are slanted lines, `hatch` pixels apart.
     """
     distance = field.distances(x, y)
     reached = np.isfinite(distance)
@@ -407,13 +361,5 @@ def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArra
 
 
 def strength(borders: Borders, zoom: float, width: float) -> Array:
-    """Return how much of each pixel a smooth line along the borders covers, 0 to 1.
-
-    Parameters
-    ----------
-    borders : Borders
-        At the middles of pixels.
-    zoom : float, px/m
-    width : float, px
-    """
+    """Return how much of each pixel a line of `width` px along borders covers, 0 to 1; `zoom` is in px/m."""
     return np.asarray(np.clip(0.5 * width + 0.5 - borders.gap * zoom, 0.0, 1.0))

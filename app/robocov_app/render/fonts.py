@@ -36,12 +36,7 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
 def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
     """Return `text` as a transparent picture; kept, since rendering costs far more than blitting.
 
-    Parameters
-    ----------
-    text : str
-        One line.
-    size : int, px
-        Height of the letters' box.
+    `text`: one line. `size`, px: height of the letters' box.
     """
     return _living(size, bold).render(text, True, colour)
 

@@ -17,12 +17,7 @@ FORCE_LENGTH = 46.0
 VELOCITY_LENGTH = 34.0
 """Length of the arrow of a robot at its largest speed in pixels at scale 1."""
 
-_HEADS = {
-    "attraction": "full",
-    "repulsion_robots": "open",
-    "repulsion_obstacle": "dot",
-    "viscosity": "bar",
-}
+_HEADS = {"attraction": "full", "repulsion_robots": "open", "repulsion_obstacle": "dot", "viscosity": "bar"}
 _WORDS = {
     "attraction": "attraction",
     "repulsion_robots": "repulsion from robots",

@@ -87,14 +87,8 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
 class _Dots(NamedTuple):
     """Where the density is looked at along one axis, and how the pixels between are made of that.
 
-    Attributes
-    ----------
-    at : (d,) px
-        Middles of the dots; they are the same whichever pixels are wanted.
-    first : (p,)
-        The dot before each pixel's middle.
-    part : (p, 1)
-        How far it is on the way to the next.
+    `at` (d,) px are the middles of the dots, the same whichever pixels are wanted; `first` (p,) is the dot
+    before each pixel's middle, and `part` (p, 1) how far it is on the way to the next.
     """
 
     at: Array

@@ -43,15 +43,9 @@ NARROW = 20.0
 
 @dataclass(frozen=True)
 class LegendEntry:
-    """A line of the legend.
+    """A line of the legend: its text, and how to draw its glyph around a pixel, within 22 x 14 px at scale 1.
 
-    Attributes
-    ----------
-    text : str
-    draw : callable
-        Draws the glyph around a pixel, within 22 x 14 px at scale 1.
-    style : str
-        Differs when the same words stand beside another glyph.
+    `style` differs when the same words stand beside another glyph.
     """
 
     text: str
@@ -66,18 +60,9 @@ class LegendEntry:
 class Layer(ABC):
     """One thing that a picture can show.
 
-    Attributes
-    ----------
-    name : str
-        Identifies the layer.
-    title : str
-        For check boxes and the legend.
-    default : bool
-        Whether it is shown unless asked otherwise.
-    static : bool
-        It depends on map, camera and theme alone: it is drawn once and kept.
-    in_world : bool
-        It stays inside the view of the camera.
+    `title` is for check boxes; `default` is whether it is shown unless asked otherwise; what is `static`
+    depends on map, camera and theme alone and is kept; what is `in_world` stays inside the view of the
+    camera.
     """
 
     name: str

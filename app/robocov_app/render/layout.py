@@ -36,19 +36,9 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
     """Return radii for discs that stay readable where there is room and keep apart where there is none.
 
-    Each disc wants the radius `most`. It shrinks to half of the way to its nearest neighbour, so that
-    no two overlap, but neither below its `true` size nor below `least`.
-
-    Parameters
-    ----------
-    centers : (n, 2)
-    true : (n,)
-        Radii true to scale.
-    least, most : float
-
-    Returns
-    -------
-    (n,)
+    Each disc wants the radius `most`. It shrinks to half of the way to its nearest neighbour, so that no two
+    overlap, but neither below its `true` size nor below `least`. `centers` in (n, 2). `true`, (n,): radii
+    true to scale. Returns: `(n,)`.
 
     Examples
     --------
@@ -80,14 +70,8 @@ def line_crowding(count: int) -> float:
 def columns_for(count: int, aspect: float, size: tuple[float, float], around: float = 0.0) -> int:
     """Return the number of columns that lets `count` panels of one aspect be largest on a page.
 
-    Parameters
-    ----------
-    count : int
-    aspect : float
-        Width by height of each panel.
-    size : (width, height), px
-    around : float, px
-        Height that each row needs above and below its panels.
+    `aspect`: width by height of each panel. `size` in (width, height). `around`, px: height that each row
+    needs above and below its panels.
 
     Examples
     --------

@@ -25,16 +25,7 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
 from robocov_app.render.heatmaps import ColourBar, DensityShading, Distances, GeodesicCells, bar_room
 from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
-from robocov_app.render.layers import (
-    Boundary,
-    Cells,
-    Grid,
-    Layer,
-    LegendEntry,
-    Obstacles,
-    Robots,
-    Starts,
-)
+from robocov_app.render.layers import Boundary, Cells, Grid, Layer, LegendEntry, Obstacles, Robots, Starts
 from robocov_app.render.marks import Centroids, Failed, Goals, Selection
 from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
@@ -50,10 +41,7 @@ if TYPE_CHECKING:
 def standard_layers(trails: str = "robots") -> list[Layer]:
     """Return one of each layer, from the lowest to the topmost.
 
-    Parameters
-    ----------
-    trails : {"robots", "paper"}
-        Colours of the trajectories, see `Trajectories`.
+    `trails`: colours of the trajectories, see `Trajectories`.
     """
     return [
         Distances(),
@@ -93,10 +81,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
 def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
     """Return names of layers, a dash as good as an underscore.
 
-    Raises
-    ------
-    ParameterError
-        When there is no layer of that name; the message names the option.
+    Raises ParameterError when there is no layer of that name; the message names the option.
     """
     known = [layer.name for layer in standard_layers()]
     wanted = [name.replace("-", "_") for name in names]
@@ -132,23 +117,9 @@ def _hues(scene: Scene, previous: IntArray) -> IntArray:
 class Painter:
     """Draws scenes of one environment.
 
-    It keeps what does not change from one frame to the next. It works on any surface: that of a
-    window, a part of one (`pygame.Surface.subsurface`), or one in memory.
-
-    Parameters
-    ----------
-    environment : Environment
-    size : (width, height), px
-    theme : Theme
-    layers : list of Layer or None
-        By default `standard_layers`.
-    scale : float or None
-        Of text and lines; by default what suits the size.
-
-    Attributes
-    ----------
-    visible : set of str
-        Names of the layers that are shown; may be changed at any time.
+    It keeps what does not change from one frame to the next. It works on any surface of its `size`, px: a
+    window, a part of one, or one in memory. `visible` are the names of the layers that are shown; it may be
+    changed.
     """
 
     def __init__(
@@ -173,13 +144,7 @@ class Painter:
         self._room: tuple[object, int, float] = (None, 0, 0.0)
 
     def show(self, names: Iterable[str]) -> None:
-        """Show these layers and no others.
-
-        Raises
-        ------
-        ParameterError
-            When there is no layer of that name.
-        """
+        """Show these layers and no others. Raises ParameterError when there is no layer of that name."""
         known = {layer.name for layer in self.layers}
         wanted = set(names)
         for name in sorted(wanted - known):

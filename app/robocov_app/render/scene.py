@@ -129,74 +129,32 @@ def moving_obstacles(environment: Environment, time: float) -> list[MovingObstac
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn; what is None is left out.
-
-    Attributes
-    ----------
-    environment : Environment
-    team : Team
-    snapshot : Snapshot or None
-        The state, what was seen in it and what was decided on it; None draws the map alone.
-    starts : (n, 2) m or None
-    trail : (k, n, 2) m or None
-        The positions so far, oldest first.
-    trail_time : (k,) s or None
-        Their times, for trajectories that fade.
-    cells : list of (m, 2) m or None
-        The Voronoi cells, one for each robot.
-    centroids : (n, 2) m or None
-        Their centroids.
-    adjacency : (m, 2) or None
-        Pairs of cells that share an edge.
-    label : str
-        The controller as people name it.
-    cost : str
-        For example ``mean distance 1.23 m``.
-    field : Field or None
-        The distances to the nearest robot.
-    field_limit : float, m
-        Where the scale of their colours ends.
-    numbers : (n,) int or None
-        What people call the robots; by default 1, 2, 3, ...
-    failed : dict of number to (x, y) m
-        Robots that do not work any more.
-    selected : int or None
-        Row of the robot that is asked about.
-    scans : list of (position (2,), ends (rays, 2)) m
-        What range sensors measure all around.
-    sensed : Sensed or None
-        The obstacle points that were sensed so far.
-    path : (w, 2) m or None
-        Shortest path from a place to its nearest robot.
-    cell_owners : (c,) or None
-        Whose each of the `cells` is. Where robots are not equally fast, one may have several outlines, and
-        those of fast ones come first: a slow one's are holes in them. None: each robot has one.
-    failed_radii : dict of number to m
-        Of robots that failed; without, that of the first robot.
-    """
+    """What is drawn of one moment; what is None is left out."""
 
     environment: Environment
     team: Team
-    snapshot: Snapshot | None = None
-    starts: Array | None = None
-    trail: Array | None = None
-    trail_time: Array | None = None
-    cells: Sequence[Array] | None = None
-    centroids: Array | None = None
-    adjacency: IntArray | None = None
-    label: str = ""
-    cost: str = ""
-    field: Field | None = None
-    field_limit: float = 1.0
-    numbers: Sequence[int] | None = None
-    failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)
-    selected: int | None = None
-    scans: Sequence[tuple[Array, Array]] = ()
-    sensed: Sensed | None = None
-    path: Array | None = None
+    snapshot: Snapshot | None = None  # None draws the map alone
+    starts: Array | None = None  # (n, 2) m
+    trail: Array | None = None  # (k, n, 2) m, the positions so far, oldest first
+    trail_time: Array | None = None  # (k,) s, for trajectories that fade
+    cells: Sequence[Array] | None = None  # (m, 2) m each, the outlines of Voronoi cells
+    centroids: Array | None = None  # (n, 2) m
+    adjacency: IntArray | None = None  # (m, 2), pairs of cells that share an edge
+    label: str = ""  # the controller as people name it
+    cost: str = ""  # "mean distance 1.23 m"
+    field: Field | None = None  # the distances to the nearest robot
+    field_limit: float = 1.0  # m, where the scale of their colours ends
+    numbers: Sequence[int] | None = None  # what people call the robots; by default 1, 2, 3, ...
+    failed: Mapping[int, tuple[float, float]] = dataclass_field(default_factory=dict)  # m, by number
+    selected: int | None = None  # row of the robot that is asked about
+    scans: Sequence[tuple[Array, Array]] = ()  # position (2,) and ends of rays (r, 2) of range sensors, m
+    sensed: Sensed | None = None  # the obstacle points that were sensed so far
+    path: Array | None = None  # (w, 2) m, the shortest path from a place to its nearest robot
+    # (c,), whose each of the cells is; None: each robot has one. Where robots are not equally fast, one may
+    # have several outlines, and those of fast ones come first: a slow one's are holes in them
     cell_owners: IntArray | None = None
     moving: Sequence[MovingObstacle] = ()
-    failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)
+    failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)  # m, by number
 
     def failed_radius(self, number: int) -> float:
         """Return the radius of a robot that failed, m."""
@@ -268,16 +226,8 @@ class Scene:
 def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
     """Return the scene of the moment number `row` of a record, with the trail up to there.
 
-    Robots that have failed are marked as such, those that have not joined yet are left out.
-
-    Parameters
-    ----------
-    record : Record
-    row : int
-    cost : str
-        What is said of the cost.
-    fields : Fields or None
-        What is known of the distances to the nearest robot, where they are shown.
+    Robots that have failed are marked as such, those that have not joined yet are left out. `cost`: what is
+    said of the cost. `fields`: what is known of the distances to the nearest robot, where they are shown.
     """
     environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team

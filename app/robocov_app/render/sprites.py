@@ -32,12 +32,8 @@ Pixel: TypeAlias = Sequence[float]
 class Sketch:
     """A part of a surface, drawn `STROKE_FINE` times larger and shrunk onto it.
 
-    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do.
-
-    Parameters
-    ----------
-    box : pygame.Rect
-        The part of the surface, in its pixels.
+    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do. `box`:
+    the part of the surface, in its pixels.
     """
 
     def __init__(self, box: pygame.Rect) -> None:
@@ -106,16 +102,9 @@ def disc(
 ) -> pygame.Surface:
     """Return a disc with a ring around it, a hair line around that, and a number in it.
 
-    Parameters
-    ----------
-    radius : float, px
-        Of the disc with its ring.
-    edge : Colour
-        Colour of the hair line, which parts the ring from what is behind.
-    text : str
-        Drawn in the middle when it is not empty.
-    shift : pair of int
-        Quarters of a pixel to the right and down; what is `LARGE` keeps to whole pixels.
+    `radius`, px: of the disc with its ring. `edge`: colour of the hair line, which parts the ring from what
+    is behind. `text`: drawn in the middle when it is not empty. `shift`: quarters of a pixel to the right and
+    down; what is `LARGE` keeps to whole pixels.
     """
     return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
 

@@ -19,12 +19,8 @@ def kept(
 ) -> Callable[[Callable[Arguments, pygame.Surface]], Callable[Arguments, pygame.Surface]]:
     """Let a function draw each picture once, and forget those that were not asked for for longest.
 
-    A count of pictures would not do: at a high magnification a single disc takes megabytes.
-
-    Parameters
-    ----------
-    most_bytes : int
-        All pictures together; a single larger one is handed out but not kept.
+    A count of pictures would not do: at a high magnification a single disc takes megabytes. `most_bytes`: all
+    pictures together; a single larger one is handed out but not kept.
 
     Examples
     --------

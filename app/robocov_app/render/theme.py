@@ -74,30 +74,14 @@ TRAIL_CONTRAST = 2.4
 class Theme:
     """One look. Widths and text sizes are pixels at scale 1.
 
-    Attributes
-    ----------
-    background, ink, faint : Colour
-        The page, its text, and text or marks of lesser weight.
-    grid, boundary, obstacle, obstacle_edge, cell_edge : Colour
-    start, final, trajectory : Colour
-        The paper's green, blue and red.
-    controllers : dict of name to Colour
-        Colours of cost curves: the paper's blue for RAPF and red for RPF.
-    others : colours
-        Curves of controllers that have no colour of their own, in turn.
-    forces : dict of term name to Colour
-    robots : nine colours
-        One for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one.
-    heat : colours
-        From near to far, evenly spaced, ever darker or ever brighter; see `heat_table`.
-    unreached : Colour
-        Where no robot can come.
-    density : Colour
-        Of the shading where the density is highest, and
-    density_strength : float
-        how much of it there is then.
-    tint, paper_tint : float
-        How much of a robot's colour its cell takes on; less in plots in the paper's colours.
+    `background`, `ink`, `faint`: the page, its text, and text or marks of lesser weight. `start`, `final`,
+    `trajectory`: the paper's green, blue and red. `controllers`: colours of cost curves: the paper's blue for
+    RAPF and red for RPF. `others`: curves of controllers that have no colour of their own, in turn. `robots`:
+    one for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one. `heat`: from
+    near to far, evenly spaced, ever darker or ever brighter; see `heat_table`. `unreached`: where no robot
+    can come. `density`: of the shading where the density is highest, and. `density_strength`: how much of it
+    there is then. `tint`, `paper_tint`: how much of a robot's colour its cell takes on; less in plots in the
+    paper's colours.
     """
 
     name: str
@@ -181,11 +165,7 @@ LIGHT = Theme(
     final=rgb("1F5FE0"),
     trajectory=rgb("D62222"),
     velocity=rgb("1F5FE0"),
-    controllers={
-        "rapf": rgb("1F5FE0"),
-        "rpf": rgb("D62222"),
-        "lloyd": rgb("118038"),
-    },
+    controllers={"rapf": rgb("1F5FE0"), "rpf": rgb("D62222"), "lloyd": rgb("118038")},
     others=tuple(rgb(code) for code in ("8A3FA8", "7A5C00", "28303C", "007A8A", "D4127E")),
     forces={
         "attraction": rgb("0B7A6F"),
@@ -219,11 +199,7 @@ DARK = Theme(
     final=rgb("5B9BFF"),
     trajectory=rgb("FF6B63"),
     velocity=rgb("5B9BFF"),
-    controllers={
-        "rapf": rgb("5B9BFF"),
-        "rpf": rgb("FF6B63"),
-        "lloyd": rgb("46C46A"),
-    },
+    controllers={"rapf": rgb("5B9BFF"), "rpf": rgb("FF6B63"), "lloyd": rgb("46C46A")},
     others=tuple(rgb(code) for code in ("CF8BE8", "F0A94A", "E8ECF2", "2DD4BF", "FF5CA4")),
     forces={
         "attraction": rgb("2DD4BF"),
@@ -248,13 +224,7 @@ THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 
 
 def theme_named(name: str) -> Theme:
-    """Return the theme called `name`.
-
-    Raises
-    ------
-    ParameterError
-        When there is none of that name.
-    """
+    """Return the theme called `name`. Raises ParameterError when there is none of that name."""
     if name not in THEMES:
         raise ParameterError(unknown_name("theme", name, THEMES))
     return THEMES[name]
@@ -263,20 +233,10 @@ def theme_named(name: str) -> Theme:
 def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | None = None) -> IntArray:
     """Return for each robot the index of its colour in `Theme.robots`.
 
-    Up to `ONE_HUE_EACH` robots have one each. In larger teams hue identifies nobody; then cells that
-    share an edge differ, and the robots carry numbers.
-
-    Parameters
-    ----------
-    n : int
-    adjacency : (m, 2) int or None
-        Pairs of robots whose cells share an edge; None when not known: hues then repeat in turn.
-    previous : (n,) int or None
-        The colours of the frame before. They stay, but for cells that now conflict.
-
-    Returns
-    -------
-    (n,) int
+    Up to `ONE_HUE_EACH` robots have one each. In larger teams hue identifies nobody; then cells that share an
+    edge differ, and the robots carry numbers. `adjacency`, (m, 2) int or None: pairs of robots whose cells
+    share an edge; None when not known: hues then repeat in turn. `previous`, (n,) int or None: the colours of
+    the frame before. They stay, but for cells that now conflict. Returns: `(n,) int`.
     """
     if n <= ONE_HUE_EACH:
         return np.arange(n, dtype=np.intp)

@@ -37,12 +37,8 @@ _FADE_FINE = 2
 class Trajectories(Layer):
     """Where the robots went; nothing where a row has nan.
 
-    Parameters
-    ----------
-    colours : {"robots", "paper"}
-        Each in its robot's colour (large teams: all in a quiet red), or all red.
-    fade : float or None, s
-        Show the last so many seconds only, fading into the past; needs `Scene.trail_time`.
+    `colours`: each in its robot's colour (large teams: all in a quiet red), or all red. `fade`, s: show the
+    last so many seconds only, fading into the past; needs `Scene.trail_time`.
     """
 
     name = "trajectories"

@@ -275,9 +275,7 @@ def _scale(scales: Mapping[tuple[object, ...], float] | None) -> Callable[[Entry
 
 
 def _dependence(
-    group: Group,
-    value_of: Callable[[Entry], float | None],
-    scale_of: Callable[[Entry], float],
+    group: Group, value_of: Callable[[Entry], float | None], scale_of: Callable[[Entry], float]
 ) -> Dependence:
     places, values = [], []
     for entry in group.entries:

@@ -39,24 +39,11 @@ def replay_html(
     """Return runs as HTML in which they can be watched side by side.
 
     It asks for no network, defines no global name and has no ids: several may stand on one page. Where
-    scripts do not run (and on paper) it shows pictures of the last moments.
-
-    Parameters
-    ----------
-    runs : sequence of ReplayRun
-        At least one.
-    standalone : bool
-        Whether it is a whole page, for a file; else it is a fragment with its own style and script, as in
-        the output of a notebook's cell.
-    panes : sequence of int or None
-        The runs to be shown at first; None shows the first `MOST_PANES`.
-    budget : int
-        Bytes that the runs may take; beyond, they hold fewer moments a second.
-
-    Raises
-    ------
-    ParameterError
-        When there are no runs.
+    scripts do not run (and on paper) it shows pictures of the last moments. `runs`: at least one.
+    `standalone`: whether it is a whole page, for a file; else it is a fragment with its own style and script,
+    as in the output of a notebook's cell. `panes`: the runs to be shown at first; None shows the first
+    `MOST_PANES`. `budget`: bytes that the runs may take; beyond, they hold fewer moments a second. Raises
+    ParameterError when there are no runs.
     """
     content = replay_part(runs, panes, budget)
     style = theme_rules(".robocov-replay") + replay_css()
@@ -72,17 +59,10 @@ def replay_html(
     )
 
 
-def replay_part(
-    runs: Sequence[ReplayRun],
-    panes: Sequence[int] | None = None,
-    budget: int = BUDGET,
-) -> str:
+def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, budget: int = BUDGET) -> str:
     """Return a replay without style and script, for a page that has `replay_css` and `replay_js` once.
 
-    Raises
-    ------
-    ParameterError
-        When there are no runs.
+    Raises ParameterError when there are no runs.
     """
     if not runs:
         raise ParameterError("replay: no runs were given, but at least one was wanted")

@@ -200,13 +200,7 @@ class Result:
         return entry.final / reference.mean_distance - 1.0
 
     def record(self, entry: Entry) -> Record:
-        """Return the record of a run.
-
-        Raises
-        ------
-        InputError
-            When it cannot be read.
-        """
+        """Return the record of a run. Raises InputError when it cannot be read."""
         if entry.folder in self.loaded:
             return self.loaded[entry.folder].record
         record = Record.load(entry.folder)
@@ -217,10 +211,7 @@ class Result:
     def history(self, entry: Entry) -> CostHistory | None:
         """Return the cost along a run, None where there is no file of it.
 
-        Raises
-        ------
-        InputError
-            When it cannot be read.
+        Raises InputError when it cannot be read.
         """
         if entry.folder in self.loaded:
             return self.loaded[entry.folder].history
@@ -231,10 +222,8 @@ class Result:
 def gathered(folder: Path) -> Result:
     """Return what is in the folder of a run, a comparison or a sweep.
 
-    Raises
-    ------
-    InputError
-        When it is none, or something of it cannot be read, or no run is there; the message names the file.
+    Raises InputError when it is none, or something of it cannot be read, or no run is there; the message
+    names the file.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder; that of a run, comparison or sweep was wanted")

@@ -80,10 +80,7 @@ def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
 
 
 def _gains_table(
-    caption: str,
-    groups: Sequence[Group],
-    result: Result,
-    styles: dict[str, CurveStyle],
+    caption: str, groups: Sequence[Group], result: Result, styles: dict[str, CurveStyle]
 ) -> Table:
     rows = []
     for group in groups:

@@ -61,18 +61,8 @@ def variables(theme: Theme) -> str:
 def theme_rules(scope: str, theme: str = "auto") -> str:
     """Return CSS that gives the elements of `scope` their colours.
 
-    Parameters
-    ----------
-    scope : str
-        A selector.
-    theme : {"auto", "light", "dark"}
-        "auto" follows the reader: what a notebook says of itself, else what the browser prefers. Paper
-        is always white.
-
-    Raises
-    ------
-    ParameterError
-        When there is no such theme.
+    `scope`: a selector. `theme`: "auto" follows the reader: what a notebook says of itself, else what the
+    browser prefers. Paper is always white. Raises ParameterError when there is no such theme.
     """
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":

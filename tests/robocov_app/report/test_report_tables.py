@@ -7,16 +7,7 @@ import pytest
 from reported_results import entry, result_of
 
 from robocov.errors import counted
-from robocov_app.report.facts import (
-    facts,
-    gaps,
-    lede,
-    meanings,
-    run_facts,
-    run_title,
-    title_of,
-    troubles,
-)
+from robocov_app.report.facts import facts, gaps, lede, meanings, run_facts, run_title, title_of, troubles
 from robocov_app.report.groups import comparisons, contenders, styles
 from robocov_app.report.results import Damaged, Reference
 from robocov_app.report.tables import (
