@@ -21,8 +21,7 @@ from robocov_app.editor.model.parser import sketch_of
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, draft_document
 
-FORMAT = "robocov-clipboard"
-"""What the copied text says that it is."""
+FORMAT = "robocov-clipboard"  # what the copied text says that it is
 
 
 def copied(sketch: Sketch, selection: Selection) -> str:

@@ -27,9 +27,7 @@ from robocov_app.editor.model.geometry import distinct, point_near, ring_near, t
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
-SHORTEST = 0.02
-"""Metres below which what is drawn is taken for a slip of the hand."""
-
+SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
 _LONGEST_NAME = 100
 
 

@@ -24,8 +24,7 @@ from robocov_app.editor.model.sketch import Sketch
 
 Feature: TypeAlias = Gaussian | WeightedArea
 
-LIGHTEST = 1e-6
-"""Smallest weight of a hot spot, and of every place where there is none."""
+LIGHTEST = 1e-6  # smallest weight of a hot spot, and of every place where there is none
 
 
 def features_of(sketch: Sketch) -> tuple[Feature, ...]:

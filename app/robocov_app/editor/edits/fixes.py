@@ -41,14 +41,9 @@ TITLES: Final[dict[Kind, str]] = {
 }
 """What a button says that mends a problem of a kind; of others there is none."""
 
-_MARGIN = 0.5
-"""Metres between a boundary that is drawn round everything and what it is drawn round."""
-
-_OVER = 0.002
-"""Metres by which what fills a place reaches into what is round it."""
-
-_SPARE = 1e-3
-"""Metres by which a widened gap is wider than a robot."""
+_MARGIN = 0.5  # metres between a boundary that is drawn round everything and what it is drawn round
+_OVER = 0.002  # metres by which what fills a place reaches into what is round it
+_SPARE = 1e-3  # metres by which a widened gap is wider than a robot
 
 
 def fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:

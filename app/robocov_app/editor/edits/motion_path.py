@@ -14,8 +14,7 @@ from robocov_app.editor.model.geometry import nearest_on, point_near
 from robocov_app.editor.model.selection import Change, Selection, display_name
 from robocov_app.editor.model.sketch import Item, Sketch
 
-FIRST_SPEED = 0.5
-"""Metres a second of a new path, until another speed is typed."""
+FIRST_SPEED = 0.5  # metres a second of a new path, until another speed is typed
 
 
 def path_of(sketch: Sketch, key: int) -> ObstaclePath | None:

@@ -16,8 +16,7 @@ from robocov_app.editor.model.geometry import ring_near
 from robocov_app.editor.model.selection import Change, Selection, ring_points, rings_of, with_rings
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-_STEPS = 12
-"""Tolerances that are tried, each half of the one before, until nothing crosses."""
+_STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
 
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:

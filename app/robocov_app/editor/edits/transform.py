@@ -32,9 +32,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
-Box: TypeAlias = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y, m."""
-
+Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
 SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
 """Left, centre and right move along x; top, middle and bottom along y."""
 
@@ -42,8 +40,7 @@ _ALONG_X = SIDES[:3]
 _MOST_COPIES = 10_000
 _MANY = 100
 
-_ALIKE = 1e-12
-"""Relative difference of what is the same but for rounding."""
+_ALIKE = 1e-12  # relative difference of what is the same but for rounding
 
 
 @dataclass(frozen=True)

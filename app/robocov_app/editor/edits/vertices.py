@@ -37,13 +37,10 @@ from robocov_app.editor.model.selection import (
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
-_STRAIGHT = math.radians(0.1)
-"""A corner that turns by less has nothing to be cut off."""
-
+_STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
 
-_SAME = 1e-4
-"""Ends of walls that are closer, in metres, are one point."""
+_SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:

@@ -15,9 +15,7 @@ from robocov_app.editor.model.background import Background
 MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 """What is kept of an obstacle besides its shape, and its kind; the falsy is not written."""
 
-_HOME = "editor"
-"""The editor's free key, unless that holds something of somebody else."""
-
+_HOME = "editor"  # the editor's free key, unless that holds something of somebody else
 _LISTS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OURS = {*_LISTS, "background"}
 _LOST = "notes of obstacles that are gone"

@@ -13,8 +13,7 @@ from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.model.geometry import cos_sin
 
-MOST_PIXELS = 64_000_000
-"""Pixels of the largest picture that is taken."""
+MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,10 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.toolkit.autosave import Autosaver
 
-FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""The boundary of a new map, m."""
-
+FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
 SUFFIX = ".json"
 
-_LOOKED_AGAIN = 1.0
-"""Seconds between two looks at the file."""
+_LOOKED_AGAIN = 1.0  # seconds between two looks at the file
 
 
 class Document:

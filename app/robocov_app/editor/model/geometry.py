@@ -15,8 +15,7 @@ from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import FARTHEST, SMALLEST
 
-DECIMALS = 4
-"""Digits after the decimal point of what the editor writes: a tenth of a millimetre."""
+DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
 
 
 def rounded(point: Iterable[float]) -> Point:

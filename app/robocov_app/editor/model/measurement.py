@@ -19,14 +19,9 @@ from robocov_app.editor.model.selection import rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
 
-_TOUCHING = 1e-5
-"""Metres within which an edge lies on a wall."""
-
-_EXACTLY = 1e-6
-"""Metres by which a gap may be narrower than a robot that passes: it fits where it just fits."""
-
-_MOST_GAPS = 20
-"""Gaps that are told of one by one."""
+_TOUCHING = 1e-5  # metres within which an edge lies on a wall
+_EXACTLY = 1e-6  # metres by which a gap may be narrower than a robot that passes: it fits where it just fits
+_MOST_GAPS = 20  # gaps that are told of one by one
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,7 @@ from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.annotations import MARKS, annotated, taken_apart
 from robocov_app.editor.model.background import Background
 
-BOUNDARY: Final = -1
-"""Stands for the boundary where obstacles have their keys."""
-
+BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
 Owner: TypeAlias = int | str
 """What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
 

@@ -45,9 +45,7 @@ Kind: TypeAlias = Literal[
 ]  # fmt: skip
 """What a problem is of, for those that mend it: see `robocov_app.editor.edits.fixes`."""
 
-_FLAT = 1e-9
-"""An outline whose area is below this part of its width or height squared is a line."""
-
+_FLAT = 1e-9  # an outline whose area is below this part of its width or height squared is a line
 _LONGEST_NAME = 100
 _LONGEST_TEXT = 10_000
 _MOST_PLACES = 20

@@ -25,9 +25,7 @@ from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
 
-FIRST_WEIGHT = 4.0
-"""Weight of a new feature, until another weight is typed."""
-
+FIRST_WEIGHT = 4.0  # weight of a new feature, until another weight is typed
 _CORNERS = 64
 
 
@@ -42,13 +40,11 @@ class DensityTool(Tool):
         super().__init__()
         self.weight = FIRST_WEIGHT
         self.chosen: int | None = None
-        self.change: Change | None = None
-        """What letting go of the mouse would make."""
+        self.change: Change | None = None  # what letting go of the mouse would make
         self._from: Point | None = None
         self._at: Point = (0.0, 0.0)
         self._taken: int | None = None
-        self._corner: int | None = None
-        """Of an area; 0 of a hot spot whose rim was taken."""
+        self._corner: int | None = None  # of an area; 0 of a hot spot whose rim was taken
 
     @property
     def busy(self) -> bool:

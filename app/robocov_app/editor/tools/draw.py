@@ -32,8 +32,7 @@ from robocov_app.editor.tools.tool import (
     ring_area,
 )
 
-SAME = 1e-6
-"""Metres below which two points are one."""
+SAME = 1e-6  # metres below which two points are one
 
 
 class DrawTool(Tool, ABC):
@@ -352,8 +351,7 @@ class DoorTool(Tool):
         self.width = 0.9
         self._from: Point | None = None
         self._at: Point = (0.0, 0.0)
-        self._wall: int | None = None
-        """Over which the cursor is, or that was pressed."""
+        self._wall: int | None = None  # over which the cursor is, or that was pressed
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         self._from = self._at = event.point

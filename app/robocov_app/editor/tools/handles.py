@@ -13,20 +13,13 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
 
-BESIDE = 11.0
-"""Pixels at scale 1 between what is selected and the box around it."""
-
-KNOB = 24.0
-"""Pixels at scale 1 that the knob is above the box."""
-
-ROOMY = 34.0
-"""Pixels at scale 1 that a side of the box has at least when there is a handle in its middle."""
-
+BESIDE = 11.0  # pixels at scale 1 between what is selected and the box around it
+KNOB = 24.0  # pixels at scale 1 that the knob is above the box
+ROOMY = 34.0  # pixels at scale 1 that a side of the box has at least when there is a handle in its middle
 SMALL = 26.0
 """Pixels at scale 1 of a thing below which its vertices are no handles: it could not be dragged itself."""
 
-MOST_VERTICES = 4000
-"""Vertices that are shown at most: more could not be told apart."""
+MOST_VERTICES = 4000  # vertices that are shown at most: more could not be told apart
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from robocov_app.editor.tools.tool import (
     constrained_point,
 )
 
-NEAR = 0.75
-"""Part of a finger's width within which a way point is taken hold of."""
+NEAR = 0.75  # part of a finger's width within which a way point is taken hold of
 
 
 class MotionPathTool(Tool):
@@ -43,8 +42,7 @@ class MotionPathTool(Tool):
         super().__init__()
         self.speed = FIRST_SPEED
         self.chosen: int | None = None
-        self.change: Change | None = None
-        """What letting go of the mouse would make."""
+        self.change: Change | None = None  # what letting go of the mouse would make
         self._held: int | None = None
         self._at: Point = (0.0, 0.0)
         self._last: Point | None = None

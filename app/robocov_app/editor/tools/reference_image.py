@@ -23,8 +23,7 @@ class ReferenceImageTool(Tool):
 
     def __init__(self) -> None:
         super().__init__()
-        self.moved: Background | None = None
-        """The picture where it is being dragged to."""
+        self.moved: Background | None = None  # the picture where it is being dragged to
         self._points: list[Point] = []
         self._at: Point = (0.0, 0.0)
         self._from: Point | None = None

@@ -27,20 +27,11 @@ from robocov_app.editor.tools.tool import (
     place_words,
 )
 
-MANY_POINTS = 1000
-"""Points of what is moved from which on it is moved as a picture."""
-
-SAME = 1e-9
-"""Metres below which nothing has moved."""
-
-FEW_POINTS = 60
-"""Points of what is moved that may snap; of more, a choice of them."""
-
-NEAR = 0.6
-"""Part of a finger's width within which something is taken hold of."""
-
-ON_EDGE = 1e-5
-"""Metres within which a point lies on an edge."""
+MANY_POINTS = 1000  # points of what is moved from which on it is moved as a picture
+SAME = 1e-9  # metres below which nothing has moved
+FEW_POINTS = 60  # points of what is moved that may snap; of more, a choice of them
+NEAR = 0.6  # part of a finger's width within which something is taken hold of
+ON_EDGE = 1e-5  # metres within which a point lies on an edge
 
 _CURSORS = {
     **dict.fromkeys(((-1, 0), (1, 0)), "sideways"),

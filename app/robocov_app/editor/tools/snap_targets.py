@@ -19,11 +19,8 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
 
-MANY = 1500
-"""Vertices of a map from which on the window does not wait for its targets."""
-
-_MOST_EDGES = 8
-"""Edges near a point that are looked at: more can only be where nothing can be told apart."""
+MANY = 1500  # vertices of a map from which on the window does not wait for its targets
+_MOST_EDGES = 8  # edges near a point that are looked at: more can only be where nothing can be told apart
 
 
 class Targets:

@@ -9,29 +9,20 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import shapely
 
+from robocov.environment import Point
 from robocov_app.editor.model.geometry import cos_sin
 from robocov_app.editor.tools.snap_targets import Targets
 
-if TYPE_CHECKING:
-    from robocov.environment import Point
-
 Kind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
 
-KINDS: frozenset[Kind] = frozenset(
-    {"vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"}
-)
-
-_HORIZON = 60.0
-"""So many reaches away something still counts as in line: about what a window shows."""
-
-_MOST_POINTS = 16
-"""Points of what is moved that are looked at."""
-
+KINDS: frozenset[Kind] = frozenset(get_args(Kind))
+_HORIZON = 60.0  # so many reaches away something still counts as in line: about what a window shows
+_MOST_POINTS = 16  # points of what is moved that are looked at
 _PARALLEL = 1e-9
 
 

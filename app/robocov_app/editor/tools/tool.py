@@ -17,8 +17,7 @@ from robocov_app.editor.tools.handles import Handle
 from robocov_app.editor.tools.snap_targets import Snapper
 from robocov_app.editor.tools.snapping import Guide, Snap, Snapping
 
-ANGLE = 15.0
-"""Degrees: with Shift, lines are drawn at multiples of this."""
+ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
 
 
 @dataclass(frozen=True)
