@@ -27,17 +27,9 @@ _INDICES = ("owner", "corner", "last_corner")
 class Known:
     """The newest that is known of a pane's cost.
 
-    Attributes
-    ----------
-    time : float, s
-        For which moment.
-    result : CoverageResult
-    path : (w, 2) m or None
-        From the cursor to its nearest robot: way-points, both ends included; empty where none can come.
-    lattice : callable
-        Returns the sites as a field wants them.
-    travel_time : float, s, or None
-        Mean time until the first robot is at a place; None where it was not asked for.
+    `time`, s: for which moment. `path`, (w, 2) m or None: from the cursor to its nearest robot: way-points,
+    both ends included; empty where none can come. `lattice`: returns the sites as a field wants them.
+    `travel_time`, s: mean time until the first robot is at a place; None where it was not asked for.
     """
 
     time: float
@@ -55,18 +47,8 @@ class Known:
 class Costs:
     """Costs for a window, computed in another process, or in this one where pictures must not depend on it.
 
-    Parameters
-    ----------
-    lattice : int
-    direct : bool
-        Whether in this process.
-
-    Attributes
-    ----------
-    known : dict of int to Known
-        By pane; of the map as it is.
-    state : str
-        What is to be said about a map that is not ready yet, or why there is no cost; else empty.
+    `direct`: whether in this process. `known`: by pane; of the map as it is. `state`: what is to be said
+    about a map that is not ready yet, or why there is no cost; else empty.
     """
 
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
@@ -163,12 +145,7 @@ class Costs:
 class CostQuestion:
     """What is the cost of positions on a map? Without positions: prepare the map.
 
-    Attributes
-    ----------
-    number : int
-        Of the map.
-    environment : Environment or None
-        None where the process knows it.
+    `number`: of the map. `environment`: none where the process knows it.
     """
 
     number: int
