@@ -14,14 +14,12 @@ from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.snapping import KINDS
 from robocov_app.editor.tools.toolbox import toolbox
-from robocov_app.editor.ui import actions
-from robocov_app.editor.ui.actions import GROUPS, REPEATING, all_actions, told_actions
+from robocov_app.editor.ui import commands
+from robocov_app.editor.ui.commands import GROUPS, TYPED, all_commands, offered, run_typed, told_commands
 from robocov_app.editor.ui.desk import GRIDS
 from robocov_app.editor.ui.dialogs import Commands
 from robocov_app.editor.ui.fields import FIELDS, coordinate
-from robocov_app.editor.ui.menus import offered
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, EditorSettings, kinds_of
-from robocov_app.editor.ui.typed import COMMANDS
 from robocov_app.render.picture import standard_layers
 from robocov_app.viewer.actions import all_actions as demo_actions
 
@@ -41,18 +39,17 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 
 def test_no_key_does_two_things_and_every_action_has_a_group() -> None:
-    keys = [key for action in all_actions() for key in action.keys]
+    keys = [key for action in all_commands() for key in action.keys]
     assert len(keys) == len(set(keys))
-    names = [action.name for action in all_actions()]
+    names = [action.name for action in all_commands()]
     assert len(names) == len(set(names))
-    assert {action.group for action in told_actions()} == set(GROUPS)
-    assert set(names) >= REPEATING
+    assert {action.group for action in told_commands()} == set(GROUPS)
 
 
 def test_the_same_things_have_the_same_keys_as_in_the_demo() -> None:
     layers = {layer.name: layer.title for layer in standard_layers()}
     theirs = {action.name: action.keys for action in demo_actions(layers)}
-    ours = {action.name: action.keys for action in all_actions()}
+    ours = {action.name: action.keys for action in all_commands()}
     same = {
         *(
             "undo",
@@ -75,14 +72,14 @@ def test_the_same_things_have_the_same_keys_as_in_the_demo() -> None:
 
 
 def test_every_action_is_done_by_something(hands: Hands) -> None:
-    for action in all_actions():
+    for action in all_commands():
         kind = action.name.partition(":")[0]
         assert kind in ("tool", "show", "snap") or action.name in hands.window._own, action.name
-    assert set(actions._TOOL_KEYS) == set(toolbox())
+    assert set(commands._TOOL_KEYS) == set(toolbox())
 
 
 def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
-    known = {action.name for action in all_actions()}
+    known = {action.name for action in all_commands()}
     vertex = frozenset({Vertex(0, 0, 1)})
     for selection in (
         Selection(),
@@ -263,18 +260,18 @@ def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
     assert (desk.seed, desk.wall_width) == (4, 0.2)
 
 
-@pytest.mark.parametrize("word", sorted(COMMANDS))
+@pytest.mark.parametrize("word", sorted(TYPED))
 def test_typed_commands_refuse_what_means_nothing_in_a_sentence(hands: Hands, word: str) -> None:
     before = hands.sketch
     for value in ("", "zzz", "-1e999", "1 2 3 4 5"):
         hands.desk.message = ""
-        hands.desk.attempt(lambda value=value: hands.desk.command(f"{word} {value}"))
+        hands.desk.attempt(lambda value=value: run_typed(hands.desk, f"{word} {value}"))
         if word not in ("name", "note", "title", "seed"):
             assert hands.desk.trouble and hands.said and "\n" not in hands.said, (word, value)
     if word not in ("title",):
         assert hands.sketch is before
     with pytest.raises(MapError, match="did you mean"):
-        hands.desk.command("rotat 30")
+        run_typed(hands.desk, "rotat 30")
 
 
 # fields
@@ -397,7 +394,7 @@ def test_a_problem_is_mended_by_a_key(hands: Hands) -> None:
     assert not any(problem.grave for problem in hands.desk.problems)
 
 
-@pytest.mark.parametrize("word", sorted(COMMANDS))
+@pytest.mark.parametrize("word", sorted(TYPED))
 def test_commands_that_take_a_value_are_found_by_typing(word: str) -> None:
     palette = Commands()
     palette.show()
@@ -426,3 +423,9 @@ def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
     hands.wait()
     hands.click(left + width - 30, top + 14)
     assert hands.said == "circle “lamp” deleted"
+
+
+def test_what_was_typed_and_cannot_be_done_stays_to_be_corrected(tmp_path: Path) -> None:
+    with opened_editor(tmp_path) as hands:
+        hands.command("grid 99999")
+        assert hands.desk.trouble and hands.window.palette.open and hands.window.palette.text == "grid 99999"

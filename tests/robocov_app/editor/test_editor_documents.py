@@ -20,6 +20,7 @@ from robocov_app.editor.edits import create
 from robocov_app.editor.model.autosave import recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
+from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.opening import EditorOpening, offer
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
@@ -250,7 +251,7 @@ def opening(folder: Path, path: Path | None = None, **more: object) -> EditorOpe
 def test_settings_are_remembered(places: Path) -> None:
     with opening(places).window() as window:
         window.desk.theme = "dark"
-        window.desk.attempt(lambda: window.desk.command("grid 0.25"))
+        window.desk.attempt(lambda: run_typed(window.desk, "grid 0.25"))
         window.desk.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")

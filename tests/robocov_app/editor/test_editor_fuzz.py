@@ -14,9 +14,8 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.sketch import sketch_text
-from robocov_app.editor.ui.actions import all_actions
+from robocov_app.editor.ui.commands import TYPED, all_commands
 from robocov_app.editor.ui.panel import TABS
-from robocov_app.editor.ui.typed import COMMANDS
 
 EVENTS, BATCH, DRAWN = 2_500, 6, 5
 """Events of one seed, events between two frames, and frames of which one is drawn."""
@@ -33,9 +32,9 @@ MOST = {
 }
 """What is done so often at most, since it writes files or takes long."""
 
-KEYS_OF = [(action.name, key) for action in all_actions() for key in action.keys]
+KEYS_OF = [(action.name, key) for action in all_commands() for key in action.keys]
 WORDS = (
-    *(f"{word} {value}" for word in COMMANDS for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
+    *(f"{word} {value}" for word in TYPED for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
     *("3 x 2", "@1<45", "120cm", "+0.5 -0.5", "90", "𝔸 é ñ 中 🤖", "%s {x} <b> &", "..", "1e309", "-", "٣"),
 )
 SIZES = ((640, 480), (900, 600), (1000, 1400), (2000, 640), (777, 601))

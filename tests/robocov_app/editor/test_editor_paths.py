@@ -15,6 +15,7 @@ from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, sketch_text
+from robocov_app.editor.ui.commands import run_typed
 
 CART = CircleObstacle((2.0, 2.0), 0.5)
 ROUND = ObstaclePath(((2.0, 2.0), (8.0, 2.0), (8.0, 6.0)), 0.5)
@@ -222,7 +223,7 @@ def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
 def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING)) as hands:
         hands.desk.select(Selection.of(0))
-        hands.desk.command("speed 0.75")
+        run_typed(hands.desk, "speed 0.75")
         assert led(hands.sketch).speed == 0.75
         hands.push("tab:object")
         hands.push("path:repeat")

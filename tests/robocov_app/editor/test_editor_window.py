@@ -13,7 +13,7 @@ from robocov_app.editor.canvas import arena
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.actions import told_actions
+from robocov_app.editor.ui.commands import told_commands
 from robocov_app.editor.ui.panel import TABS
 from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
 from robocov_app.editor.ui.status import facts
@@ -284,7 +284,7 @@ def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatc
     with opened_editor(tmp_path, size=size, scale=scale) as hands:
         monkeypatch.setattr(overlays, "label", label)
         hands.key("f1")
-    for action in told_actions():
+    for action in told_commands():
         if action.keys:
             title = action.title.partition(":")[0] if action.group == "Tools" else action.title
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title

@@ -300,12 +300,6 @@ class Desk:
             self.measurement = answer
             self.version += 1
 
-    def command(self, text: str) -> None:
-        """Do what was typed, see `typed.command`: ``rotate 30``, ``grid 0.25``, ..."""
-        from robocov_app.editor.ui.typed import command
-
-        command(self, text)
-
     # typing while something is drawn
 
     @property

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov_app.editor.ui.actions import told_actions
 from robocov_app.editor.ui.asking import ROWS, FileQuestion, ListQuestion, Question
+from robocov_app.editor.ui.commands import GHOST, TYPED, told_commands
 from robocov_app.editor.ui.import_view import ImportView
 from robocov_app.editor.ui.importing import ImportQuestion
-from robocov_app.editor.ui.typed import COMMANDS, GHOST, VALUES
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, mix
 from robocov_app.viewer.actions import Action, key_words
@@ -277,8 +276,8 @@ class Commands(CommandList):
     """The editor's commands by name; or a command such as ``rotate 30``."""
 
     def __init__(self) -> None:
-        valued = [Action(f"type:{word}", f"{word} {value}", "", ()) for word, value in VALUES.items()]
-        super().__init__([*told_actions(), *valued], GHOST)
+        valued = [Action(f"type:{word}", f"{word} {typed.example}", "", ()) for word, typed in TYPED.items()]
+        super().__init__([*told_commands(), *valued], GHOST)
 
     def show(self, text: str = "") -> None:
         """Open it, with the beginning of a command."""
@@ -288,7 +287,7 @@ class Commands(CommandList):
     def is_command(self) -> bool:
         """Whether what is typed is a command with a value, not the name of an action."""
         word, value = parted(self.text)
-        return bool(value) and word in COMMANDS
+        return bool(value) and word in TYPED
 
 
 @dataclass

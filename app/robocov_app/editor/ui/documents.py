@@ -58,8 +58,8 @@ class Documents:
         if isinstance(self.desk.asked, ImportQuestion):
             self.desk.asked.close()
 
-    def deeds(self) -> dict[str, Callable[[], object]]:
-        """Return what the actions do, by their names."""
+    def commands(self) -> dict[str, Callable[[], object]]:
+        """Return what the commands do, by their names."""
         return {
             "new": lambda: self.leave(self.new),
             "open": self.ask_file,

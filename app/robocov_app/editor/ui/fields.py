@@ -12,8 +12,7 @@ from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import place_of
-from robocov_app.editor.ui.deeds import whole
-from robocov_app.editor.ui.typed import command
+from robocov_app.editor.ui.commands import run_typed, whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -226,22 +225,22 @@ FIELDS: dict[str, Field] = {
     ),
     "radius": Field(
         lambda desk: number(desk.radius),
-        lambda desk, text: command(desk, f"radius {text}"),
+        lambda desk, text: run_typed(desk, f"radius {text}"),
         "Radius of a robot: what is too narrow for it is hatched",
     ),
     "robots": Field(
         lambda desk: str(desk.robots),
-        lambda desk, text: command(desk, f"robots {text}"),
+        lambda desk, text: run_typed(desk, f"robots {text}"),
         "Robots of the team that is shown at a start, and tried with F5",
     ),
     "grid": Field(
         lambda desk: number(desk.grid),
-        lambda desk, text: command(desk, f"grid {text}"),
+        lambda desk, text: run_typed(desk, f"grid {text}"),
         "Distance of the grid's lines; arrows move by it",
     ),
     "angle": Field(
         lambda desk: number(desk.snap_angle),
-        lambda desk, text: command(desk, f"angle {text}"),
+        lambda desk, text: run_typed(desk, f"angle {text}"),
         "Lines snap to multiples of this",
     ),
     "name": Field(_or_empty(_shown_name), _rename, "What people call it"),

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov_app.editor.ui.actions import REPEATING, all_actions
+from robocov.errors import RobocovError
+from robocov_app.editor.ui.commands import all_commands, run_typed
 from robocov_app.viewer.keyboard import Keyboard as DemoKeyboard
 from robocov_app.viewer.keyboard import key_of
 
@@ -31,8 +32,23 @@ class Keyboard(DemoKeyboard):
     def __init__(
         self, desk: Desk, panel: Panel, palette: CommandList, dialogs: Dialogs, do: Callable[[str], None]
     ) -> None:
-        super().__init__(desk, panel, palette, all_actions(), do, REPEATING)
+        commands = all_commands()
+        repeating = frozenset(command.name for command in commands if command.repeats)
+        super().__init__(self, panel, palette, commands, do, repeating)
         self._editor, self._dialogs = desk, dialogs
+
+    def attempt(self, action: Callable[[], object]) -> None:
+        """Do something; what cannot be done is told, in a sentence."""
+        self._editor.attempt(action)
+
+    def command(self, text: str) -> None:
+        """Do what was typed; what cannot be done stays to be corrected."""
+        try:
+            run_typed(self._editor, text)
+        except RobocovError:
+            self._palette.show()
+            self._palette.type(text)
+            raise
 
     def hold(self, key: int) -> None:
         """Note a key as one that is held down."""

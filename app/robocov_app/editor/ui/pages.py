@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits.density import density_words
 from robocov_app.editor.model.sketch import BOUNDARY
-from robocov_app.editor.ui.actions import all_actions
-from robocov_app.editor.ui.deeds import whole
+from robocov_app.editor.ui.commands import all_commands, whole
 from robocov_app.editor.ui.fields import FIELDS
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
 from robocov_app.viewer.actions import key_words
@@ -231,7 +230,7 @@ def _buttons(widgets: Widgets, kind: str, y: float, wide: float) -> None:
 
 def snap_page(widgets: Widgets, desk: Desk, top: float) -> None:
     """What is snapped to, what is shown, and the picture under the map."""
-    keys = {action.name: action for action in all_actions()}
+    keys = {action.name: action for action in all_commands()}
 
     def box(kind: str, name: str, title: str, x: float, y: float) -> None:
         def switch(on: bool) -> None:

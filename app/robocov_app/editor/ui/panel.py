@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robocov_app.editor.ui.actions import all_actions
+from robocov_app.editor.ui.commands import all_commands
 from robocov_app.editor.ui.fields import FIELDS
 from robocov_app.editor.ui.lists import HistoryList, PanelList, ProblemList, ThingList, VertexList
 from robocov_app.editor.ui.pages import (
@@ -51,7 +51,7 @@ class Panel(Paged):
     tab_widths = (44, 56, 46, 72, 54)
 
     def __init__(self, desk: Desk, do: Callable[[str], None]) -> None:
-        super().__init__(desk, all_actions(), do)
+        super().__init__(desk, all_commands(), do)
         self.desk = desk
         self.vertices, self.things, self.problems = VertexList(desk), ThingList(desk), ProblemList(desk)
         self.history = HistoryList(desk)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -12,13 +13,11 @@ from robocov.files.atomic import written
 from robocov_app.editor.canvas.arena import Arena
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.ui.actions import GROUPS, all_actions, told_actions
-from robocov_app.editor.ui.deeds import deeds
+from robocov_app.editor.ui.commands import GROUPS, all_commands, offered, told_commands
 from robocov_app.editor.ui.dialogs import Commands, Dialogs, Menu
 from robocov_app.editor.ui.documents import Documents
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.keyboard import Keyboard
-from robocov_app.editor.ui.menus import offered
 from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.pointer import Pointer
 from robocov_app.editor.ui.status import HINT, facts
@@ -88,7 +87,12 @@ class EditorWindow:
         self.keyboard = Keyboard(desk, self.panel, self.palette, self.dialogs, self.do)
         self.team = TeamThread()
         self._patient = desk.snapper.patient = patient
-        self._own = {**deeds(desk), **self.documents.deeds(), **self._what_to_do()}
+        of_desk = {each.name: partial(each.run, desk) for each in all_commands() if each.run is not None}
+        self._own: dict[str, Callable[[], object]] = {
+            **of_desk,
+            **self.documents.commands(),
+            **self._what_to_do(),
+        }
         self._arranged: tuple[object, ...] | None = None
         self._tried: Environment | None = None
         self._caption = ""
@@ -230,7 +234,7 @@ class EditorWindow:
         if self.menu is not None:
             self.menu.draw(self.screen, theme, layout.scale)
         if self.help:
-            draw_keys(self.screen, layout, theme, told_actions(), GROUPS, _HINT)
+            draw_keys(self.screen, layout, theme, told_commands(), GROUPS, _HINT)
         elif self.palette.open:
             self.palette.draw(self.screen, layout, theme)
         self.dialogs.draw(self.screen, layout, theme)
@@ -325,9 +329,8 @@ class EditorWindow:
             near = desk.selection.vertices or any(each in desk.selection.owners for each in found)
             if not near:
                 desk.select(Selection.of(*found[:1]))
-        known = {action.name: action for action in all_actions()}
-        actions = [known.get(name) for name in offered(desk)]
-        self.menu = Menu(actions, pixel)
+        known = {command.name: command for command in all_commands()}
+        self.menu = Menu([known.get(name) for name in offered(desk)], pixel)
 
     # trying
 

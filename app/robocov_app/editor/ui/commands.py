@@ -1,0 +1,791 @@
+"""Everything that the editor does, by key, menu, button, palette or typed value. Knows no pygame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from robocov.environment import Point, PolygonObstacle, WallObstacle
+from robocov.errors import MapError, unknown_name
+from robocov_app.editor.edits import (
+    boolean,
+    create,
+    fixes,
+    motion_path,
+    properties,
+    simplify,
+    transform,
+    vertices,
+)
+from robocov_app.editor.edits import density as density_edits
+from robocov_app.editor.edits.clipboard import copied, pasted
+from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
+from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner
+from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.toolbox import toolbox
+from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.ui.settings import SHOWN, SNAPS
+from robocov_app.viewer.actions import Action
+from robocov_app.viewer.typed import parted
+
+FAR = 10
+"""How many times farther arrows nudge with Shift."""
+
+FINGER = 12.0
+"""Pixels at scale 1 that a finger is wide."""
+
+WIDER = 1.25
+
+TOLERANCE = 0.02
+"""Metres that simplified outlines may be off."""
+
+GHOST = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 · robots 8"
+
+_SEPARATE = ""
+
+
+@dataclass(frozen=True)
+class Command(Action):
+    """An action with what it does to a desk; `run` is None where the window does it."""
+
+    run: Callable[[Desk], object] | None = None
+    repeats: bool = False  # while its key is held down
+
+
+class Row(NamedTuple):
+    """A command in the list of its group; keys are separated by commas."""
+
+    name: str
+    title: str
+    keys: str = ""
+    run: Callable[[Desk], object] | None = None
+    repeats: bool = False
+
+
+class Typed(NamedTuple):
+    """A command with a value after it: an example of one with what it is, and what it does."""
+
+    example: str
+    run: Callable[[Desk, str], object]
+
+
+# what commands do
+
+
+def edited(edit: Callable[..., Change], *rest: object, single: bool = False) -> Callable[[Desk], None]:
+    """Return what makes an edit of the selected things; with `single`, of single vertices if some are."""
+    return lambda desk: _do(desk, edit, *rest, single=single)
+
+
+def _do(desk: Desk, edit: Callable[..., Change], *rest: object, single: bool = False) -> None:
+    """Make an edit of whole things; with `single`, of single vertices where some are selected."""
+    selection = desk.selection
+    if not (single and selection.vertices):
+        selection = whole(selection)
+    if not selection:
+        raise MapError("nothing is selected: click something first, or press Ctrl A")
+    desk.change(edit(desk.sketch, selection, *rest))
+
+
+def whole(selection: Selection) -> Selection:
+    """Return the selected things; of selected vertices, what they belong to."""
+    return selection.without_vertices().plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
+
+
+def play(desk: Desk) -> str:
+    """Show where obstacles that move get to, or show them no more."""
+    if desk.moves_since is not None:
+        desk.moves_since = None
+        return "obstacles stand as they are at time zero"
+    if not motion_path.moving(desk.sketch):
+        raise MapError("no obstacle moves: the tool Path gives one a path")
+    desk.moves_since = desk.now
+    return "obstacles move as they will; L ends it"
+
+
+def back(desk: Desk) -> None:
+    """Take the last point back, else delete what is selected."""
+    if not desk.tool.back(desk) and not desk.tool.busy and desk.selection:
+        delete(desk)
+
+
+def delete(desk: Desk) -> None:
+    """Delete the selected vertices, or else the selected things."""
+    selection = desk.selection
+    if not selection:
+        raise MapError("nothing is selected: click something first")
+    act = vertices.deleted if selection.vertices else properties.deleted
+    single = Selection(vertices=selection.vertices)
+    desk.change(act(desk.sketch, single if selection.vertices else selection))
+
+
+def copy(desk: Desk) -> str:
+    """Copy what is selected to the clipboard."""
+    selection = whole(desk.selection)
+    desk.pasteboard.put(copied(desk.sketch, selection))
+    return f"copied: {selection.words(desk.sketch)}"
+
+
+def cut(desk: Desk) -> None:
+    """Copy what is selected, and delete it."""
+    copy(desk)
+    desk.change(properties.deleted(desk.sketch, whole(desk.selection)))
+
+
+def paste(desk: Desk, at: Point | None) -> None:
+    """Paste what is in the clipboard, its middle at a place."""
+    text = desk.pasteboard.get()
+    if not text.strip():
+        raise MapError("the clipboard is empty")
+    grid = desk.grid if "grid" in desk.snaps else None
+    desk.change(pasted(desk.sketch, text, at, grid))
+
+
+def nudge(x: int, y: int) -> Callable[[Desk], None]:
+    """Return what moves the selection by so many spacings of the grid."""
+
+    def run(desk: Desk) -> None:
+        selection = desk.selection
+        if not selection:
+            raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
+        act = vertices.moved if selection.vertices else transform.moved
+        single = Selection(vertices=selection.vertices) if selection.vertices else selection
+        desk.change(act(desk.sketch, single, x * desk.grid, y * desk.grid), drag=("nudge", selection))
+
+    return run
+
+
+def cancel(desk: Desk) -> None:
+    """Give up what is half done, else put the tool away, else select nothing."""
+    if desk.typed:
+        desk.typed = ""
+    elif not desk.tool.cancel(desk) and desk.tool is not desk.selector:
+        desk.choose("select", tell=False)
+
+
+def select_next(desk: Desk, by: int) -> None:
+    """Select the next obstacle, start or boundary, in the order of the map."""
+    order: list[Owner] = [
+        *(item.key for item in desk.sketch.obstacles if not item.hidden),
+        *(name for name, _ in desk.sketch.starts),
+    ]
+    if desk.sketch.boundary is not None:
+        order.append(BOUNDARY)
+    if not order:
+        return
+    now = [order.index(each) for each in whole(desk.selection).owners if each in order]
+    place = (max(now) + by if by > 0 else min(now) + by) if now else (0 if by > 0 else -1)
+    desk.select(Selection.of(order[place % len(order)]))
+
+
+def one_vertex(desk: Desk) -> Vertex:
+    """Return the one vertex that is selected."""
+    if len(desk.selection.vertices) != 1:
+        raise MapError("select one vertex first: click an obstacle, then one of its corners")
+    (vertex,) = desk.selection.vertices
+    return vertex
+
+
+def corners(desk: Desk) -> Selection:
+    """Return the selected corners."""
+    if not desk.selection.vertices:
+        raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
+    return Selection(vertices=desk.selection.vertices)
+
+
+def bevel(desk: Desk, length: float) -> None:
+    """Cut the selected corners off."""
+    desk.change(vertices.bevelled(desk.sketch, corners(desk), length))
+
+
+def round_corners(desk: Desk, radius: float) -> None:
+    """Round the selected corners."""
+    desk.change(vertices.rounded_off(desk.sketch, corners(desk), radius))
+
+
+def simplify_outlines(desk: Desk, tolerance: float) -> None:
+    """Leave vertices out of what is selected."""
+    _do(desk, simplify.simplified, tolerance)
+
+
+def extend(desk: Desk) -> None:
+    """Go on with a wall from the vertex that is selected, to where the cursor is."""
+    if desk.cursor is None:
+        raise MapError("move the mouse to where the wall is to go on to")
+    vertex = one_vertex(desk)
+    to = desk.snapped(desk.cursor, FINGER * desk.pixel, place_of(desk.sketch, vertex)).point
+    desk.change(vertices.extended(desk.sketch, vertex, to))
+
+
+def fill(desk: Desk) -> None:
+    """Fill the hole whose vertex is selected."""
+    vertex = one_vertex(desk)
+    if not isinstance(vertex.of, int) or vertex.ring == 0:
+        raise MapError("select a vertex of the hole first")
+    desk.change(vertices.hole_filled(desk.sketch, vertex.of, vertex.ring))
+
+
+def widen(desk: Desk, factor: float) -> None:
+    """Make the selected walls wider or narrower, and those that are drawn."""
+    walls = {key: desk.sketch.item(key).shape for key in whole(desk.selection).items}
+    widths = [shape.width for shape in walls.values() if isinstance(shape, WallObstacle)]
+    width = round(max((widths[0] if widths else desk.wall_width) * factor, 0.01), 3)
+    if widths and not desk.tool.busy:
+        desk.change(
+            properties.widened(desk.sketch, whole(desk.selection), width), drag=("width", desk.selection)
+        )
+    desk.set_wall_width(width)
+    desk.say(f"walls are {width:g} m wide")
+
+
+def next_start(desk: Desk) -> None:
+    """Show the team at the next start."""
+    names = desk.start_names
+    if not names:
+        raise MapError("the map has no start yet: S draws one")
+    now = desk.start_name
+    name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
+    desk.start = name
+    desk.select(Selection.of(name))
+    desk.say(f"start “{name}”")
+
+
+def make_default(desk: Desk) -> None:
+    """Make the selected start the map's default."""
+    if len(desk.selection.starts) != 1:
+        raise MapError("select one start first")
+    (name,) = desk.selection.starts
+    desk.change(properties.start_first(desk.sketch, name))
+
+
+def density_weight(desk: Desk) -> float:
+    """Return the weight of what is drawn next with the tool Density."""
+    tool = desk.tools["density"]
+    return tool.weight if isinstance(tool, DensityTool) else 1.0
+
+
+def fix_problem(desk: Desk) -> None:
+    """Mend the problem that is shown, or the first that can be."""
+    found = [desk.problem] if desk.problem is not None else list(desk.problems)
+    for problem in found:
+        change = fixes.fixed(desk.sketch, problem, desk.radius)
+        if change is not None:
+            desk.change(change)
+            return
+    raise MapError("there is nothing that can be mended by itself")
+
+
+def next_problem(desk: Desk) -> None:
+    """Show the next problem with its words."""
+    found = desk.problems
+    if not found:
+        desk.problem = None
+        desk.say("nothing is wrong with the map" if desk.measurement is not None else "not looked at yet")
+        return
+    place = found.index(desk.problem) + 1 if desk.problem in found else 0
+    desk.problem = found[place % len(found)]
+    desk.say(desk.problem.words, trouble=desk.problem.grave)
+
+
+# values that are typed
+
+
+def _selected(desk: Desk) -> Selection:
+    selection = whole(desk.selection)
+    if not selection:
+        raise MapError("nothing is selected: click something first, or press Ctrl A")
+    return selection
+
+
+def _whole_number(word: str, text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise MapError(f"{word}: {text!r}, but a whole number was wanted") from None
+
+
+def _set_angle(desk: Desk, text: str) -> None:
+    angle = angle_of(text)
+    if not 0.1 <= angle <= 90.0:
+        raise MapError(f"angle: {angle:g}°, but 0.1° to 90° was wanted")
+    desk.snap_angle = angle
+    desk.say(f"angles snap to multiples of {angle:g}°")
+
+
+def _set_seed(desk: Desk, text: str) -> None:
+    desk.seed = max(_whole_number("seed", text), 0)
+
+
+def _edit_to(edit: Callable[..., Change], read: Callable[[str], object]) -> Callable[[Desk, str], None]:
+    """Return what makes an edit of the selected things to a typed value."""
+    return lambda desk, text: desk.change(edit(desk.sketch, _selected(desk), read(text)))
+
+
+def _move(desk: Desk, text: str) -> None:
+    text = text.strip()
+    dx, dy = point_of(text if text[0] in "+@" else f"@{text}", last=(0.0, 0.0))
+    selection = desk.selection
+    if not selection:
+        _selected(desk)
+    act = vertices.moved if selection.vertices else transform.moved
+    desk.change(act(desk.sketch, selection, dx, dy))
+
+
+def _place(desk: Desk, text: str) -> None:
+    selection = _selected(desk)
+    bounds = bounds_of(desk.sketch, selection)
+    x, y = point_of(text, last=bounds[:2] if bounds else None)
+    desk.change(transform.placed(desk.sketch, selection, x, y))
+
+
+def _scale(desk: Desk, text: str) -> None:
+    selection = _selected(desk)
+    bounds = bounds_of(desk.sketch, selection)
+    if bounds is None:
+        raise MapError("there is nothing to scale")
+    factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
+    desk.change(transform.scaled(desk.sketch, selection, factor))
+
+
+def _size(desk: Desk, text: str) -> None:
+    width, height = size_of(text)
+    desk.change(transform.resized(desk.sketch, _selected(desk), width, height))
+
+
+def _name(desk: Desk, text: str) -> None:
+    owners = sorted(whole(desk.selection).owners, key=str)
+    if len(owners) != 1:
+        raise MapError("select one obstacle or start first")
+    desk.change(properties.renamed(desk.sketch, owners[0], text))
+
+
+def _offset(desk: Desk, text: str) -> None:
+    sign = -1.0 if text.strip().startswith("-") else 1.0
+    desk.change(boolean.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
+
+
+def _set_density(desk: Desk, text: str) -> None:
+    if text.strip() != "none":
+        raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
+    desk.change(density_edits.density_removed(desk.sketch))
+
+
+def _number(word: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise MapError(f"{word}: {text!r}, but a number was wanted") from None
+
+
+def _array(desk: Desk, text: str) -> None:
+    parts = text.replace("x", " ").split()
+    if len(parts) != 4:
+        raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
+    columns, rows = (_whole_number("array", each) for each in parts[:2])
+    dx, dy = (length_of(each.lstrip("-")) * (-1.0 if each.startswith("-") else 1.0) for each in parts[2:])
+    desk.change(transform.arrayed(desk.sketch, _selected(desk), columns, rows, dx, dy))
+
+
+# the lists
+
+GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
+"""Headings of the help, in their order."""
+
+_TOOL_KEYS = {
+    "select": "v",
+    "polygon": "p",
+    "rectangle": "r",
+    "circle": "c",
+    "wall": "w",
+    "door": "k",
+    "boundary": "b",
+    "disc": "s",
+    "places": "shift+s",
+    "measure": "m",
+    "density": "d",
+    "path": "o",
+    "picture": "i",
+    "pan": "g",
+}
+
+_SHOWN_KEYS = {
+    "grid": "alt+3",
+    "names": "alt+2",
+    "impassable": "alt+1",
+    "problems": "alt+5",
+    "robots": "a",
+    "picture": "alt+6",
+    "legend": "alt+7",
+    "handles": "alt+4",
+}
+
+
+_ROWS: dict[str, tuple[Row, ...]] = {
+    "File": (
+        Row("new", "New map", "ctrl+n"),
+        Row("open", "Open a map", "ctrl+o"),
+        Row("recent", "Open a recent or bundled map", "ctrl+shift+o"),
+        Row("save", "Save", "ctrl+s"),
+        Row("save:as", "Save as", "ctrl+shift+s"),
+        Row("export", "Export to another format", "ctrl+e"),
+        Row("background", "Picture under the map", "ctrl+b"),
+        Row(
+            "background:none",
+            "Take the picture under the map away",
+            "",
+            lambda desk: desk.change(properties.underlaid(desk.sketch, None)),
+        ),
+        Row("reload", "Read the file again", "ctrl+r"),
+        Row("try", "Try it in the demo, and back", "f5"),
+        Row("screenshot", "Screenshot", "f12"),
+        Row("quit", "Quit", "ctrl+q"),
+    ),
+    "Edit": (
+        Row("undo", "Undo", "ctrl+z", Desk.undo, repeats=True),
+        Row("redo", "Redo", "ctrl+y, ctrl+shift+z", Desk.redo, repeats=True),
+        Row("cut", "Cut", "ctrl+x", cut),
+        Row("copy", "Copy", "ctrl+c", copy),
+        Row("paste", "Paste at the cursor", "ctrl+v", lambda desk: paste(desk, desk.cursor), repeats=True),
+        Row("paste:there", "Paste in the same place", "ctrl+shift+v", lambda desk: paste(desk, None)),
+        Row(
+            "duplicate",
+            "Duplicate",
+            "ctrl+d",
+            lambda desk: _do(desk, transform.duplicated, desk.grid * FAR / 2, -desk.grid * FAR / 2),
+            repeats=True,
+        ),
+        Row("delete", "Delete", "delete, x", delete),
+        Row("select:all", "Select all", "ctrl+a", lambda desk: desk.select(Selection.all(desk.sketch))),
+        Row(
+            "select:next", "Select the next obstacle", "tab", lambda desk: select_next(desk, 1), repeats=True
+        ),
+        Row(
+            "select:previous",
+            "Select the previous obstacle",
+            "shift+tab",
+            lambda desk: select_next(desk, -1),
+            repeats=True,
+        ),
+        Row("name", "Name what is selected", "f2"),
+        Row("left", "Nudge by the grid (all arrows)", "left", nudge(-1, 0), repeats=True),
+        Row("right", "", "right", nudge(1, 0), repeats=True),
+        Row("up", "", "up", nudge(0, 1), repeats=True),
+        Row("down", "", "down", nudge(0, -1), repeats=True),
+        Row("left:far", "Nudge ten times as far (all arrows)", "shift+left", nudge(-10, 0), repeats=True),
+        Row("right:far", "", "shift+right", nudge(10, 0), repeats=True),
+        Row("up:far", "", "shift+up", nudge(0, 10), repeats=True),
+        Row("down:far", "", "shift+down", nudge(0, -10), repeats=True),
+        Row("finish", "Finish what is being drawn", "return, enter", lambda desk: desk.tool.finish(desk)),
+        Row("back", "Take the last point back, or delete", "backspace", back, repeats=True),
+        Row("cancel", "Give up; select nothing; close", "escape", cancel),
+        Row("menu", "What can be done here (right click)", "menu, shift+f10"),
+    ),
+    "Arrange": (
+        Row("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0), repeats=True),
+        Row("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0), repeats=True),
+        Row("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
+        Row("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
+        Row("align:left", "Align left sides", "alt+left", edited(transform.aligned, "left", single=True)),
+        Row("align:right", "Align right sides", "alt+right", edited(transform.aligned, "right", single=True)),
+        Row("align:top", "Align tops", "alt+up", edited(transform.aligned, "top", single=True)),
+        Row("align:bottom", "Align bottoms", "alt+down", edited(transform.aligned, "bottom", single=True)),
+        Row(
+            "align:centre", "Align middles across", "alt+c", edited(transform.aligned, "centre", single=True)
+        ),
+        Row(
+            "align:middle",
+            "Align middles in height",
+            "alt+m",
+            edited(transform.aligned, "middle", single=True),
+        ),
+        Row("distribute:x", "Equal gaps across", "alt+x", edited(transform.distributed, "x")),
+        Row("distribute:y", "Equal gaps in height", "alt+y", edited(transform.distributed, "y")),
+        Row("raise", "To the top", "page up", edited(properties.raised, "top")),
+        Row("lower", "To the bottom", "page down", edited(properties.raised, "bottom")),
+        Row("group", "Group: a click selects all of it", "ctrl+g", edited(properties.grouped)),
+        Row("ungroup", "Take out of its group", "ctrl+shift+g", edited(properties.ungrouped)),
+        Row("lock", "Lock: the mouse takes it no more", "ctrl+l", edited(properties.locked)),
+        Row("hide", "Hide in the editor", "ctrl+h", edited(properties.hidden)),
+        Row(
+            "release",
+            "Unlock and show all",
+            "ctrl+shift+l",
+            lambda desk: desk.change(properties.released(desk.sketch)),
+        ),
+    ),
+    "Combine": (
+        Row("unite", "Unite", "alt+u", edited(boolean.united)),
+        Row("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
+        Row("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
+        Row("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
+        Row(
+            "clip",
+            "Cut off outside the boundary",
+            "alt+b",
+            lambda desk: desk.change(boolean.clipped(desk.sketch, desk.selection.without_vertices())),
+        ),
+        Row("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
+        Row("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
+        Row("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
+        Row("repair", "Repair crossing outlines", "alt+r", edited(boolean.repaired)),
+        Row(
+            "density:area",
+            "Make it an area that counts more",
+            "",
+            lambda desk: _do(desk, density_edits.areas_made, density_weight(desk)),
+        ),
+        Row(
+            "fill:unreachable",
+            "Fill all that robots cannot reach",
+            "",
+            lambda desk: desk.change(fixes.unreachable_filled(desk.sketch, desk.radius)),
+        ),
+    ),
+    "Vertices": (
+        Row("bevel", "Cut corners off", "shift+b", lambda desk: bevel(desk, 2 * desk.grid)),
+        Row("round", "Round corners", "shift+r", lambda desk: round_corners(desk, 2 * desk.grid)),
+        Row(
+            "split",
+            "Cut a wall in two here",
+            "shift+c",
+            lambda desk: desk.change(vertices.split(desk.sketch, one_vertex(desk))),
+        ),
+        Row("extend", "Go on with the wall from here", "shift+w", extend),
+        Row("fill", "Fill the hole", "shift+f", fill),
+        Row(
+            "simplify",
+            "Leave needless vertices out",
+            "shift+p",
+            lambda desk: simplify_outlines(desk, TOLERANCE),
+        ),
+        Row("straighten", "Make edges straight that nearly are", "shift+l", edited(simplify.straightened)),
+        Row(
+            "path:repeat",
+            "Obstacle goes in a loop, or back and forth",
+            "shift+o",
+            edited(motion_path.path_turned),
+        ),
+        Row("path:none", "Take an obstacle's path away", "alt+o", edited(motion_path.path_removed)),
+        Row("wider", "Wider walls", "]", lambda desk: widen(desk, WIDER), repeats=True),
+        Row("narrower", "Narrower walls", "[", lambda desk: widen(desk, 1.0 / WIDER), repeats=True),
+    ),
+    "Snap": (
+        Row("grid:finer", "Finer grid", "-", lambda desk: desk.change_grid(-1), repeats=True),
+        Row("grid:coarser", "Coarser grid", "=, +", lambda desk: desk.change_grid(1), repeats=True),
+        Row("snap:all", "Snap to everything, or to nothing", "0"),
+    ),
+    "View": (
+        Row("fit", "Show the whole map", "f"),
+        Row("fit:selection", "Show what is selected", "z"),
+        Row("zoom:in", "Zoom in", "ctrl+=, ctrl++", repeats=True),
+        Row("zoom:out", "Zoom out", "ctrl+-", repeats=True),
+        Row("pan:left", "Pan (all arrows)", "ctrl+left", repeats=True),
+        Row("pan:right", "", "ctrl+right", repeats=True),
+        Row("pan:up", "", "ctrl+up", repeats=True),
+        Row("pan:down", "", "ctrl+down", repeats=True),
+        Row("pan:hold", "Pan while it is held down", "space"),
+        Row("theme", "Light or dark", "t"),
+        Row("panel", "Hide or show the panel", "h"),
+        Row("tab", "Next page of the panel", "ctrl+tab"),
+        Row("fullscreen", "Full screen", "f11"),
+        Row("path:play", "Let obstacles move, or stand again", "l", play),
+        Row("problem:next", "Go to the next problem", "f8, n", next_problem, repeats=True),
+        Row("problem:fix", "Mend the problem that is shown", "shift+f8", fix_problem),
+    ),
+    "Robots": (
+        Row(
+            "start:uniform",
+            "A start anywhere in the free space",
+            "shift+u",
+            lambda desk: desk.change(create.uniform_start_added(desk.sketch)),
+        ),
+        Row("start:next", "Next start of the map", "shift+n", next_start),
+        Row("start:default", "Make it the default start", "shift+d", make_default),
+        Row(
+            "more",
+            "One robot more",
+            "shift+=, shift++",
+            lambda desk: desk.set_robots(min(desk.robots + 1, 1000)),
+            repeats=True,
+        ),
+        Row(
+            "fewer",
+            "One robot fewer",
+            "shift+-",
+            lambda desk: desk.set_robots(max(desk.robots - 1, 1)),
+            repeats=True,
+        ),
+    ),
+    "Help": (
+        Row("help", "Keys", "f1, shift+/"),
+        Row("palette", "Commands by name", "ctrl+k, /"),
+    ),
+}
+
+
+def all_commands() -> list[Command]:
+    """Return every command, those of the tools and of what is snapped to or shown among them."""
+    return [
+        *(
+            Command(
+                row.name,
+                row.title,
+                group,
+                tuple(row.keys.split(", ")) if row.keys else (),
+                row.run,
+                row.repeats,
+            )
+            for group, rows in _ROWS.items()
+            for row in rows
+        ),
+        *(
+            Command(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", "Tools", (_TOOL_KEYS[tool.name],))
+            for tool in toolbox().values()
+        ),
+        *(
+            Command(f"snap:{name}", f"Snap to {title.lower()}", "Snap", (str(k),))
+            for k, (name, (title, _)) in enumerate(SNAPS.items(), 1)
+        ),
+        *(Command(f"show:{name}", title, "View", (_SHOWN_KEYS[name],)) for name, title in SHOWN.items()),
+    ]
+
+
+def told_commands() -> list[Command]:
+    """Return those that are listed by name."""
+    return [command for command in all_commands() if command.title]
+
+
+TYPED: dict[str, Typed] = {
+    "grid": Typed(
+        "0.25: distance of the grid's lines", lambda desk, text: desk.set_grid(length_of(text, now=desk.grid))
+    ),
+    "angle": Typed("15: lines snap to multiples of it", _set_angle),
+    "radius": Typed("0.2: of a robot", lambda desk, text: desk.set_radius(length_of(text, now=desk.radius))),
+    "robots": Typed("8: of the team", lambda desk, text: desk.set_robots(_whole_number("robots", text))),
+    "seed": Typed("3: of the team's places", _set_seed),
+    "wall": Typed(
+        "0.1: width of walls that are drawn",
+        lambda desk, text: desk.set_wall_width(length_of(text, now=desk.wall_width)),
+    ),
+    "move": Typed("1 0.5: what is selected", _move),
+    "place": Typed("2 3: lower left corner", _place),
+    "rotate": Typed("30: by degrees", _edit_to(transform.rotated, angle_of)),
+    "scale": Typed("150%: what is selected", _scale),
+    "size": Typed("3 x 2: width and height", _size),
+    "width": Typed("0.2: of walls", _edit_to(properties.widened, length_of)),
+    "circle": Typed("0.5: radius of circles", _edit_to(properties.sized, length_of)),
+    "bevel": Typed("0.3: cut corners off", lambda desk, text: bevel(desk, length_of(text))),
+    "round": Typed("0.3: round corners", lambda desk, text: round_corners(desk, length_of(text))),
+    "simplify": Typed(
+        "0.05: leave vertices out, to a tolerance",
+        lambda desk, text: simplify_outlines(desk, length_of(text)),
+    ),
+    "floor": Typed(
+        "0.1: density away from hot spots",
+        lambda desk, text: desk.change(density_edits.floor_set(desk.sketch, _number("floor", text))),
+    ),
+    "weight": Typed("2: of a hot spot", lambda desk, text: desk.tools["density"].enter(desk, text)),
+    "density": Typed("none: takes it away", _set_density),
+    "speed": Typed("0.5: along a path, m/s", _edit_to(motion_path.path_paced, motion_path.speed_of)),
+    "offset": Typed("0.2: grow, or shrink with -", _offset),
+    "array": Typed("3 x 2 1.5 1.5: columns, rows, distances", _array),
+    "name": Typed("pillar: of what is selected", _name),
+    "note": Typed("words: on what is selected", _edit_to(properties.noted, str)),
+    "title": Typed(
+        "Hall: of the map", lambda desk, text: desk.change(properties.titled(desk.sketch, name=text))
+    ),
+}
+"""What can be typed, each with a value after it."""
+
+
+def run_typed(desk: Desk, text: str) -> None:
+    """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
+    word, rest = parted(text)
+    if word not in TYPED:
+        raise MapError(unknown_name("command", word, TYPED))
+    if not rest:
+        raise MapError(f"{word}: a value was wanted after it")
+    TYPED[word].run(desk, rest)
+
+
+# the menu at the cursor
+
+
+def offered(desk: Desk) -> list[str]:
+    """Return the names of the actions that apply to what is selected, with an empty one between groups."""
+    selection = desk.selection
+    if not selection:
+        return [
+            *("paste", "select:all", _SEPARATE),
+            *(
+                "tool:polygon",
+                "tool:rectangle",
+                "tool:circle",
+                "tool:wall",
+                "tool:boundary",
+                "tool:disc",
+                _SEPARATE,
+            ),
+            *("fit", "background", "try"),
+        ]
+    if selection.vertices:
+        return _of_vertices(desk)
+    shapes = [desk.sketch.item(key).shape for key in selection.items if key in desk.sketch.places]
+    names = ["cut", "copy", "duplicate", "delete", _SEPARATE]
+    if len(selection.owners) == 1 and not selection.boundary:
+        names += ["name", "fit:selection", _SEPARATE]
+    names += ["rotate:left", "rotate:right", "mirror:x", "mirror:y", _SEPARATE]
+    if len(shapes) > 1:
+        names += ["unite", "subtract", "intersect", "divide", _SEPARATE]
+        names += ["align:left", "align:bottom"]
+        names += ["distribute:x", "distribute:y"] if len(shapes) > 2 else []
+        names.append(_SEPARATE)
+    if shapes:
+        names += ["group"] if len(shapes) > 1 else []
+        names += ["lock", "hide", _SEPARATE]
+    walls = [shape for shape in shapes if isinstance(shape, WallObstacle)]
+    if len(walls) > 1 and len(walls) == len(shapes):
+        names.append("join")
+    if any(not isinstance(shape, PolygonObstacle) for shape in shapes):
+        names.append("polygons")
+    if any(isinstance(shape, PolygonObstacle) for shape in shapes) or selection.boundary:
+        names += ["simplify", "straighten"]
+    if len(shapes) == 1 and isinstance(shapes[0], PolygonObstacle) and len(selection.owners) == 1:
+        names.append("boundary:of")
+    if any(problem.of in selection.owners and problem.grave for problem in desk.problems):
+        names.append("repair")
+    if selection.boundary and not shapes:
+        names = ["fit", "simplify", "straighten", "repair", _SEPARATE, "tool:boundary"]
+    if selection.starts and not shapes:
+        names = ["copy", "duplicate", "delete", _SEPARATE, "name", "show:robots", "fit:selection"]
+    return _tidy(names)
+
+
+def _of_vertices(desk: Desk) -> list[str]:
+    selection = desk.selection
+    names = ["delete", "bevel", "round"]
+    if len(selection.vertices) == 1:
+        (vertex,) = selection.vertices
+        shape = desk.sketch.item(vertex.of).shape if isinstance(vertex.of, int) and vertex.of >= 0 else None
+        if isinstance(shape, WallObstacle):
+            names.append("extend" if vertex.index in (0, len(shape.points) - 1) else "split")
+        if vertex.ring:
+            names.append("fill")
+    else:
+        names += [_SEPARATE, "align:left", "align:bottom"]
+    names += [_SEPARATE, "straighten", "simplify"]
+    if BOUNDARY not in whole(selection).owners:
+        names += [_SEPARATE, "copy", "duplicate"]
+    return _tidy(names)
+
+
+def _tidy(names: list[str]) -> list[str]:
+    """Return the names without separators at the ends, or two in a row."""
+    tidy: list[str] = []
+    for name in names:
+        if name or (tidy and tidy[-1]):
+            tidy.append(name)
+    return tidy[:-1] if tidy and not tidy[-1] else tidy
