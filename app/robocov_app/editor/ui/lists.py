@@ -13,7 +13,7 @@ from robocov_app.editor.edits.fixes import TITLES
 from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.model.validation import Problem
-from robocov_app.editor.ui.deeds import fix_problem
+from robocov_app.editor.ui.commands import fix_problem
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened
 from robocov_app.render.theme import mix
