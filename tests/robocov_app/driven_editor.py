@@ -86,21 +86,6 @@ class Hands(Driver):
         for _ in range(4 if self.window.trial is not None else 0):
             self.window.frame(0.0)
 
-    # its panel is still made of pygame_gui's widgets
-
-    def widget(self, kind: str, name: str) -> Any:
-        widgets = self.window.panel.widgets
-        assert widgets is not None, "the panel is hidden"
-        found = widgets.find(kind, name)
-        assert found is not None, f"no {kind} {name}"
-        return found
-
-    def slide(self, name: str, part: float) -> None:
-        slider = self.widget("slider", name)
-        knob = slider.sliding_button.rect
-        x = slider.rect.left + 1 + knob.width / 2 + part * slider.scrollable_width
-        self.drag(knob.center, ((knob.centerx + x) / 2, knob.centery), (x, knob.centery))
-
     @property
     def sketch(self) -> Sketch:
         return self.desk.sketch
