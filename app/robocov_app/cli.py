@@ -42,7 +42,6 @@ COMMANDS = {
     "report": ("report", "one HTML page of runs, comparisons and sweeps, with a replay; no network"),
     "metrics": ("metrics", "covered and visible area, energy, ways, connectivity, clearance of saved runs"),
     "paper": ("paper", "the paper's figures again, and its claims tested over many maps"),
-    "lesson": ("lesson", "check a lesson: a session with chapters that wait, ask and hand over"),
     "edit": ("edit", "the map editor: draw, check, try; nothing is lost"),
     "check": ("check", "validate maps; area, free area, components, narrowest gap"),
     "maps": ("maps", "list the bundled maps"),
@@ -53,7 +52,7 @@ COMMANDS = {
     "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
     "import": ("import_map", "turn a foreign map file into a map JSON"),
     "export": ("export_map", "write a map in a foreign format: SVG, GeoJSON, WKT, ROS, MovingAI, PNG"),
-    "schema": ("schema", "print the JSON Schema of map, session or lesson files"),
+    "schema": ("schema", "print the JSON Schema of map files"),
 }
 
 _EXAMPLES = (

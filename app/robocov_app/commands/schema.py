@@ -11,12 +11,12 @@ import tyro
 
 @dataclass
 class Arguments:
-    """Print the JSON Schema of map, session or lesson files, for completion and checks in editors.
+    """Print the JSON Schema of map files, or of session files, for completion and checks in editors.
 
     Example: robocov schema > robocov-map.schema.json
     """
 
-    of: tyro.conf.Positional[Literal["map", "session", "lesson"]] = "map"
+    of: tyro.conf.Positional[Literal["map", "session"]] = "map"
     """What kind of files."""
 
     json: bool = False
@@ -27,8 +27,6 @@ def command(options: Arguments) -> None:
     """Print the schema."""
     if options.of == "map":
         from robocov.mapfile import map_schema as schema
-    elif options.of == "session":
-        from robocov_app.viewer.session.file import session_schema as schema
     else:
-        from robocov_app.viewer.lessons import lesson_schema as schema
+        from robocov_app.viewer.session.file import session_schema as schema
     print(json.dumps(schema(), indent=1))
