@@ -52,7 +52,14 @@ class TestEveryKind:
             assert dict(matplotlib.rcParams) == before
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
-    @pytest.mark.parametrize("name", ["cost $x^2$ and $y$", "$\\frac$ [/] {", "倉庫 🤖", "a)b(c\\"])
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "$\\frac$ [/] {",
+            "倉庫 🤖",
+            *(pytest.param(name, marks=pytest.mark.slow) for name in ("cost $x^2$ and $y$", "a)b(c\\")),
+        ],
+    )
     def test_names_are_words_whatever_is_in_them(self, tmp_path, kind, name):
         record = replace(run_of(HALL, 3), environment=replace(HALL, name=name))
         save_figure(plot_trajectories(record), tmp_path / f"a.{kind}")
@@ -74,6 +81,7 @@ class TestEveryKind:
         assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_the_bytes_do_not_depend_on_the_hashes_of_a_process(tmp_path):
     script = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"

@@ -36,6 +36,7 @@ def test_a_size_is_kept_and_the_dark_is_dark(empty: Environment) -> None:
         assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= 900 and box.y1 <= 700
 
 
+@pytest.mark.slow
 def test_of_very_many_the_first_are_drawn_and_the_title_says_so(empty: Environment) -> None:
     figure = plot_maps([empty] * (MOST + 5))
     assert len(figure.axes) == MOST

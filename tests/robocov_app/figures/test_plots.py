@@ -47,8 +47,10 @@ def test_nothing_covers_or_cuts_anything(environment, size):
     all_clear(plot_environment(environment, size=size))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5])
-@pytest.mark.parametrize("size", [None, (900, 600), (2560, 1440)])
+@pytest.mark.parametrize(
+    "count", [1, pytest.param(2, marks=pytest.mark.slow), 3, pytest.param(5, marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize("size", [None, (900, 600), pytest.param((2560, 1440), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
 def test_comparisons_are_clear_and_at_one_scale(environment, count, size):
     records = [run_of(environment, 4, seed=k) for k in range(count)]
@@ -351,6 +353,7 @@ assert "matplotlib.pyplot" not in sys.modules and "pygame" not in sys.modules
 """
 
 
+@pytest.mark.slow
 def test_matplotlib_comes_late_and_pyplot_and_pygame_never():
     done = subprocess.run(
         [sys.executable, "-c", _LAZY, str(Path(__file__).parents[1])],

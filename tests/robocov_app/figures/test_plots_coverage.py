@@ -38,9 +38,19 @@ def written(figure):
     return extents
 
 
-@pytest.mark.parametrize(("count", "with_curves"), [(1, True), (2, False), (3, True), (5, True)])
-@pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
-@pytest.mark.parametrize("environment", [ROOMS, HALL, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
+@pytest.mark.parametrize(
+    ("count", "with_curves"),
+    [(1, True), (2, False), pytest.param(3, True, marks=pytest.mark.slow), (5, True)],
+)
+@pytest.mark.parametrize(
+    "size",
+    [None, (720, 400), *(pytest.param(size, marks=pytest.mark.slow) for size in ((900, 600), (2560, 1440)))],
+)
+@pytest.mark.parametrize(
+    "environment",
+    [ROOMS, *(pytest.param(each, marks=pytest.mark.slow) for each in (HALL, CORRIDOR)), SHAFT],
+    ids=lambda map_: map_.name,
+)
 def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
     moments = [moment_of(environment, seed=k) for k in range(count)]
     figure = plot_coverage(curves(count if with_curves else 0), moments, size=size)
@@ -119,6 +129,7 @@ def test_the_words_say_what_is_seen():
     assert [text.get_text() for text in legend.get_texts()] == ["robot", "geodesic cell border"]
 
 
+@pytest.mark.slow
 def test_the_same_plot_gives_the_same_bytes(tmp_path):
     for name in ("a.svg", "b.svg", "a.png", "b.png"):
         save_figure(plot_coverage(curves(1), [moment_of(HALL)]), tmp_path / name)

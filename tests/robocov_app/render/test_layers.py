@@ -86,7 +86,7 @@ def test_edges_of_cells_are_drawn_between_robots():
         assert nearest(frame, painter.camera.to_pixels(np.array(point)), LIGHT.cell_edge) < 70
 
 
-@pytest.mark.parametrize("n", [100, 1000])
+@pytest.mark.parametrize("n", [100, pytest.param(1000, marks=pytest.mark.slow)])
 def test_narrow_cells_have_plain_edges(n):
     frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
     colours = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}

@@ -227,6 +227,7 @@ assert "matplotlib" not in sys.modules
 """
 
 
+@pytest.mark.slow
 def test_frames_need_no_display_and_no_matplotlib():
     done = subprocess.run(
         [sys.executable, "-c", _HEADLESS, str(Path(__file__).parents[1])],

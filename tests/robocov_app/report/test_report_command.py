@@ -113,6 +113,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert not set(loaded.split()) & {"matplotlib", "jinja2", "pyarrow", "pygame", "scipy"}
 
 
+@pytest.mark.slow
 def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
     from hatchling.builders.wheel import WheelBuilder
 
@@ -123,6 +124,7 @@ def test_a_wheel_has_all_that_pages_are_made_of(tmp_path) -> None:
     assert {f"robocov_app/report/assets/{name}" for name in parts} <= packed
 
 
+@pytest.mark.slow
 def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
     saved_comparison(tmp_path / "both")
     content = json.loads((tmp_path / "both/comparison.json").read_text())
@@ -156,6 +158,7 @@ def test_where_no_run_is_left_nothing_is_written(run, capsys) -> None:
     assert "no run is left to report" in said and not (run / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setenv("ROBOCOV_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("robocov_app.report.results.RESTARTS", 2)

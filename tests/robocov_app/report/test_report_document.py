@@ -119,6 +119,7 @@ def test_the_same_results_give_the_same_bytes(html) -> None:
     assert again == html
 
 
+@pytest.mark.slow
 def test_fifty_runs_take_less_than_three_megabytes() -> None:
     entries = [
         entry(name, seed, 2.0 + 0.1 * seed, robots=6, map_name=("rooms", "flat")[seed % 2])
@@ -132,6 +133,7 @@ def test_fifty_runs_take_less_than_three_megabytes() -> None:
     assert len(data["runs"]) == 50 and data["rate"] >= 2.0
 
 
+@pytest.mark.slow
 def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
     entries = [entry("rapf", seed, 2.0, robots=30) for seed in range(50)]
     result = watched(entries[:1], seconds=300.0, hz=5.0)
