@@ -174,6 +174,17 @@ def test_the_first_point_can_be_typed(hands: Hands) -> None:
     assert hands.shapes[2] == CircleObstacle((5, 5), 1.0)
 
 
+def test_a_corner_that_is_typed_while_the_mouse_drags_ends_the_drag(hands: Hands) -> None:
+    hands.key("b")
+    hands.press(*hands.pixel((1, 1)))
+    hands.move(*hands.pixel((4, 4)), held=1)
+    hands.type("9 2")
+    hands.key("return")
+    hands.frames(1)
+    hands.release()
+    assert hands.desk.tool.points == [(1, 1), (9, 2)]
+
+
 def test_a_wall_is_one_drag_or_several_clicks(hands: Hands) -> None:
     hands.key("w")
     hands.drag_at((1, 1), (2, 1), (4, 1))

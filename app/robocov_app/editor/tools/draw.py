@@ -142,7 +142,7 @@ class DrawTool(Tool, ABC):
             self.finish(context)
         else:
             self.points.append(next_point_of(text, self.origin, self.at if self.points else None))
-            self.at = self.points[-1]
+            self.at, self._dragging = self.points[-1], False
 
     def preview(self, context: ToolContext) -> Preview | None:
         return self.shown(context, (*self.points, self.at)) if self.points else None
