@@ -52,11 +52,12 @@ COMMANDS = {
     "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
     "import": ("import_map", "turn a foreign map file into a map JSON"),
     "export": ("export_map", "write a map in a foreign format: SVG, GeoJSON, WKT, ROS, MovingAI, PNG"),
+    "lesson": ("lesson", "check a lesson for the window: its form, and that every chapter ends"),
     "schema": ("schema", "print the JSON Schema of map files"),
 }
 
 _EXAMPLES = (
-    ("robocov demo", "the interactive window; robocov demo --tour tells the story in 3.5 minutes"),
+    ("robocov demo", "the interactive window; robocov demo --tour plays a lesson of eleven chapters"),
     ("robocov run rooms --video --out first-run", "six robots cover six rooms; pictures and a film"),
     ("robocov compare office --controllers rapf rpf lloyd --out office", "three controllers, same starts"),
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),

@@ -51,7 +51,9 @@ class Arguments:
     paused: bool = False
     """Begin paused."""
     tour: bool = False
-    """Play the guided tour of three and a half minutes."""
+    """Play the lesson that comes with robocov, in eleven short chapters."""
+    lesson: Path | None = None
+    """Play a lesson of your own, see `robocov lesson`."""
     theme: Literal["light", "dark"] | None = None
     """Colours; by default those of the last time."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
@@ -139,7 +141,9 @@ def command(options: Arguments) -> int:
     if options.headless:
         return rendered(opening, options)
     with opening.window() as window:
-        if options.tour:
+        if options.lesson is not None:
+            window.start_lesson(options.lesson)
+        elif options.tour:
             window.do("tour")
         window.run()
     return 0
@@ -191,7 +195,9 @@ def rendered(opening: Opening, options: Arguments) -> int:
         if options.out is not None:
             out = stack.enter_context(results(options.out, overwrite=False)).new
         window, stop = stack.enter_context(opening.window()), stack.enter_context(Interruption())
-        if options.tour:
+        if options.lesson is not None:
+            window.start_lesson(options.lesson)
+        elif options.tour:
             window.do("tour")
         count = options.frames
         if count is None:
@@ -201,7 +207,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
 
             def frames() -> Iterator[Frame]:
                 for done in range(count):
-                    if stop.requested:
+                    if stop.requested or (options.frames is None and window.tour is None):
                         return
                     window.frame(1.0 / HEADLESS_FPS)
                     yield pixels(window.screen)

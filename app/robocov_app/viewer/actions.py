@@ -134,7 +134,7 @@ _OTHERS = (
     Action("save:map", "Save the map", "Keep", ("ctrl+shift+s",)),
     Action("help", "Keys", "Help", ("f1", "shift+/")),
     Action("palette", "Commands by name", "Help", ("ctrl+k", "/")),
-    Action("tour", "The guided tour", "Help", ("f2",)),
+    Action("tour", "The lesson, or just play", "Help", ("f2",)),
     Action("quit", "Quit", "Help", ("ctrl+q",)),
 )
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
     from robocov_app.viewer.actions import Action
     from robocov_app.viewer.layout import Layout
+    from robocov_app.viewer.lessons import LessonPlayer
     from robocov_app.viewer.presenter import Desk
-    from robocov_app.viewer.tour import Tour
 
 FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
 """For strokes and words that are placed in pixels alone."""
@@ -300,14 +300,14 @@ def draw_caption(
     screen.fill(theme.final, bar)
 
 
-def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Tour) -> None:
-    """Show the tour in place of the panel: the chapter's two sentences, and which chapters there are."""
+def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
+    """Show a lesson in place of the panel: what its chapter says and asks, and which chapters there are."""
     scale = layout.scale
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))
     canvas = Canvas(screen, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
     x, y, wide = left + 20 * scale, top + 18 * scale, width - 40 * scale
-    screen.blit(label("GUIDED TOUR", round(11 * scale), theme.faint, True), (round(x), round(y)))
+    screen.blit(label("LESSON", round(11 * scale), theme.faint, True), (round(x), round(y)))
     y += 30 * scale
     bold, size = round(18 * scale), round(14 * scale)
     for line in wrapped(tour.chapter.title, bold, wide, True):
@@ -317,6 +317,11 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Tour) 
     for line in wrapped(tour.text, size, wide):
         screen.blit(label(line, size, theme.ink), (round(x), round(y)))
         y += 21 * scale
+    y += 8 * scale
+    for asked in tour.asks:
+        for line in wrapped(asked, size, wide):
+            screen.blit(label(line, size, theme.final), (round(x), round(y)))
+            y += 21 * scale
     row = 23 * scale
     y = max(y + 24 * scale, top + height - 62 * scale - row * len(tour.chapters))
     small = round(12 * scale)
@@ -332,5 +337,5 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Tour) 
     pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
     bar.width = max(round(bar.width * min(max(tour.progress, 0.0), 1.0)), bar.height)
     pygame.draw.rect(screen, theme.final, bar, border_radius=bar.height)
-    hint = label("← → chapters · Esc ends the tour", round(11 * scale), theme.faint)
+    hint = label("← → chapters · Space · F2 just play · Esc ends", round(11 * scale), theme.faint)
     screen.blit(hint, (round(x), round(top + height - 32 * scale)))

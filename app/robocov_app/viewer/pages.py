@@ -191,7 +191,7 @@ def keep_page(widgets: Widgets, top: float) -> None:
         (("Save run", "save:run"), ("Save map", "save:map")),
         (("Undo", "undo"), ("Redo", "redo")),
         (("Keys", "help"), ("Commands…", "palette")),
-        (("Guided tour", "tour"), ("Full screen", "fullscreen")),
+        (("Lesson", "tour"), ("Full screen", "fullscreen")),
     )
 
     def build(bar: float) -> None:

@@ -435,14 +435,18 @@ class Desk:
 
     def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
         self.workspace.close()
-        self.workspace, before = workspace, self.session
-        self.session = workspace.session
-        self.session.clock.budget = before.clock.budget
-        self.session.serial = before.serial + 1
+        self.workspace = workspace
+        self.show_session(workspace.session)
         self.map_name = str(view.get("map") or self.session.environment.name)
         if isinstance(shown := view.get("shown"), list):
             self.shown = set(map(str, shown))
         self.hand.selected = None
+
+    def show_session(self, session: Session) -> None:
+        """Go on with another session."""
+        session.clock.budget = self.session.clock.budget
+        session.serial = max(session.serial, self.session.serial) + 1
+        self.session = session
         self.version += 1
         self.look_at_map()
 

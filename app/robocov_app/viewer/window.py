@@ -23,6 +23,7 @@ from robocov_app.viewer.film import Film, pixels
 from robocov_app.viewer.inspector import report_on
 from robocov_app.viewer.keyboard import Keyboard
 from robocov_app.viewer.layout import laid_out
+from robocov_app.viewer.lessons import LessonPlayer, load_lesson
 from robocov_app.viewer.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
@@ -32,7 +33,6 @@ from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, draw_status, facts
-from robocov_app.viewer.tour import Tour
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,8 +48,13 @@ _ASKED_AGAIN = 0.2
 _PAN = 60
 """Pixels that a key pans."""
 
-_GOES_ON_WITH = frozenset({"help", "theme", "screenshot", "film", "panel", "fullscreen", "quit"})
-"""What may be done without ending the tour."""
+_GOES_ON_WITH = frozenset(
+    {
+        *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
+        *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot"),
+    }
+)
+"""What may be done without leaving the lesson."""
 
 OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
 """Types of events that the mouse makes."""
@@ -85,7 +90,7 @@ class Window:
         self.scale = scale
         self.closed = False
         self.help = False
-        self.tour: Tour | None = None
+        self.tour: LessonPlayer | None = None
         self.film: Film | None = None
         self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
@@ -96,7 +101,7 @@ class Window:
         self.chart = Chart(desk)
         self.panel = Panel(desk, self.titles, self.do)
         self.palette = Palette(desk, self.titles)
-        self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._end_tour)
+        self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._leave_lesson)
         actions = all_actions(self.titles)
         self.keyboard = Keyboard(desk, self.panel, self.palette, actions, lambda name: self.do(name))
         self._patient = patient
@@ -153,7 +158,7 @@ class Window:
         self._ask_costs()
         self._arrange()
         self._inspect()
-        self.panel.covered = self.tour is not None
+        self.panel.covered = self._lesson_shown
         self.panel.update(seconds)
         self.pointer.show()
 
@@ -243,12 +248,13 @@ class Window:
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         said = facts(desk, self._rate, self._steps_rate, filmed)
         draw_status(self.screen, layout, theme, said, self.hint)
-        if layout.panel[2] and self.tour is not None:
+        if layout.panel[2] and self.tour is not None and self._lesson_shown:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
             self.panel.draw(self.screen)
-        if self.tour is not None and not layout.panel[2]:
-            draw_caption(self.screen, layout, theme, self.tour.title, self.tour.text, self.tour.progress)
+        if self.tour is not None and self._lesson_shown and not layout.panel[2]:
+            words = " ".join([self.tour.text, *self.tour.asks])
+            draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
         draw_message(self.screen, desk, layout, theme)
         if self.help:
             draw_help(self.screen, layout, theme, self.titles)
@@ -269,11 +275,13 @@ class Window:
 
     def do(self, name: str) -> None:
         """Do the action of this name."""
-        if self.tour is not None and name in ("back", "forward"):
+        if self.tour is not None and self.tour.state != "left" and name in ("back", "forward"):
             self.tour.skip(1 if name == "forward" else -1)
             return
-        if name not in _GOES_ON_WITH and self._end_tour() and name in ("cancel", "tour"):
+        if name == "cancel" and self._end_tour():
             return
+        if name not in _GOES_ON_WITH and name != "tour":
+            self._leave_lesson()
         if name == "cancel" and (self.help or self.palette.open):
             self.help = self.palette.open = False
             return
@@ -311,7 +319,7 @@ class Window:
             return False
         self.tour.end()
         self.tour = None
-        self.desk.say("the tour has ended")
+        self.desk.say("the lesson has ended; what was before it is there again")
         return True
 
     def _middle(self) -> tuple[float, float]:
@@ -335,7 +343,29 @@ class Window:
         self.closed = True
 
     def _start_tour(self) -> None:
-        self.tour = Tour(self.desk, self.arena.fit)
+        if self.tour is None:
+            self.tour = LessonPlayer(self.desk, self.arena.fit, alone=self._patient)
+        elif self.tour.state == "left":
+            self.tour.come_back()
+        else:
+            self.tour.leave()
+
+    def start_lesson(self, path: Path) -> None:
+        """Play a lesson of a file; MapError as `load_lesson`."""
+        self.tour = LessonPlayer(self.desk, self.arena.fit, load_lesson(path), alone=self._patient)
+
+    @property
+    def _lesson_shown(self) -> bool:
+        """Whether a lesson has the place of the panel."""
+        return self.tour is not None and self.tour.state != "left"
+
+    def _asked(self) -> bool:
+        return self.tour is not None and self.tour.state == "asks"
+
+    def _leave_lesson(self) -> None:
+        """Let whoever touches something play; the lesson waits."""
+        if self.tour is not None:
+            self.tour.leave()
 
     def _save_run(self) -> str:
         return self.keeper.save(self.desk.session, self.desk.folder, self.desk.map_name)
@@ -375,6 +405,9 @@ class Window:
                     self.desk.open_session(path) if path.suffix == SUFFIX else self.desk.open_map(str(path))
                 )
             )
+        elif event.type == pygame.KEYDOWN and self._asked() and event.unicode in "1234" and event.unicode:
+            assert self.tour is not None
+            self.tour.reply(int(event.unicode))
         elif event.type == pygame.KEYDOWN:
             self.keyboard.press(event)
         elif event.type == pygame.TEXTINPUT and self.palette.open:

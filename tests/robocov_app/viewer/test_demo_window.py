@@ -260,25 +260,28 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
 # tour
 
 
-def test_the_tour_is_played_and_ends_on_a_key(driver: Driver) -> None:
+def test_the_lesson_is_played_and_ends_on_a_key(driver: Driver) -> None:
     shown = set(driver.desk.shown)
     driver.key("f2")
-    assert driver.window.tour is not None and driver.session.playing
+    assert driver.window.tour is not None and driver.desk.session.playing
     driver.frames(5)
     driver.key("f12")
     driver.key("t")
     assert driver.window.tour is not None
     driver.key("escape")
     assert driver.window.tour is None and driver.desk.shown == shown
-    assert driver.desk.message == "the tour has ended"
+    assert driver.desk.session is driver.session
+    assert driver.desk.message == "the lesson has ended; what was before it is there again"
 
 
-def test_the_tour_ends_when_the_arena_is_touched(driver: Driver) -> None:
+def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
     driver.key("f2")
     driver.frames(3)
     driver.click(*driver.window.layout.arena[2:])
     driver.click(200, 200)
-    assert driver.window.tour is None
+    assert driver.window.tour is not None and driver.window.tour.state == "left"
+    driver.key("f2")
+    assert driver.window.tour.state == "plays"
 
 
 # settings

@@ -237,6 +237,55 @@ class BundledMapModel(_Model):
     digest: _Text
 
 
+class ConditionModel(_Model):
+    """What is waited for: one of these."""
+
+    step: _Step | None = Field(None, description="A step of the simulation")
+    settled: Literal[True] | None = Field(None, description="No robot gets anywhere any more")
+    robot: _Robot | None = Field(None, description="The robot that is to be in `inside`, or out of `outside`")
+    inside: Annotated[list[_Coordinate], Field(min_length=4, max_length=4)] | None = None
+    outside: Annotated[list[_Coordinate], Field(min_length=4, max_length=4)] | None = None
+    mean_distance_below: Annotated[float, Field(gt=0)] | None = None
+
+
+class QuestionModel(_Model):
+    """A prediction that is asked for before a chapter goes on."""
+
+    text: _Text
+    answers: Annotated[list[_Text], Field(min_length=2, max_length=4)]
+    right: Annotated[int, Field(ge=1, le=4, description="Number of the right answer")]
+    why: _Text = ""
+
+
+class TaskModel(_Model):
+    """Something that is handed over to whoever watches."""
+
+    text: _Text
+    until: ConditionModel
+    done: _Text = "Done."
+
+
+class ChapterModel(_Model):
+    """A scene: what was done on the way to a touch is done again as time goes by."""
+
+    title: Annotated[str, Field(min_length=1, max_length=60)]
+    text: _Text
+    touch: Annotated[int, Field(ge=0, description="The touch at which its branch ends")]
+    until: ConditionModel
+    speed: Annotated[float, Field(ge=0.1, le=16)] = 1.0
+    show: list[str] = Field([], description="Layers beside the usual ones")
+    robot: _Robot | None = Field(None, description="The robot that is asked about")
+    question: QuestionModel | None = None
+    task: TaskModel | None = None
+
+
+class LessonModel(_Model):
+    """Chapters of a lesson."""
+
+    title: Annotated[str, Field(min_length=1, max_length=100)]
+    chapters: Annotated[list[ChapterModel], Field(min_length=1, max_length=100)]
+
+
 class SessionModel(_Model, title="robocov session"):
     """A session of the window: a tree of touches from which every moment can be made again."""
 
@@ -249,6 +298,7 @@ class SessionModel(_Model, title="robocov session"):
     head: Annotated[int, Field(ge=0, description="Touch in whose time the present is")]
     step: _Step
     view: dict[str, Any] = Field({}, description="What is shown, and how")
+    lesson: LessonModel | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,6 +319,7 @@ class SavedSession:
     head: Node
     step: int
     view: Mapping[str, Any] = field(default_factory=dict)
+    lesson: LessonModel | None = None
 
 
 def session_schema() -> dict[str, Any]:
@@ -495,7 +546,15 @@ class _Reader:
         head = nodes[self._model.head]
         if not head.begin <= self._model.step <= head.end:
             self._refuse(("step",), self._model.step, f"a step of the head, {head.begin} to {head.end},")
-        return SavedSession(Document.of(nodes), head, self._model.step, self._model.view)
+        lesson = self._model.lesson
+        for k, chapter in enumerate(lesson.chapters if lesson else ()):
+            place, asked = ("lesson", "chapters", k), chapter.question
+            if chapter.touch >= len(nodes):
+                wanted = f"the number of a touch, 0 to {len(nodes) - 1},"
+                self._refuse((*place, "touch"), chapter.touch, wanted)
+            if asked is not None and asked.right > len(asked.answers):
+                self._refuse((*place, "question", "right"), asked.right, "the number of an answer")
+        return SavedSession(Document.of(nodes), head, self._model.step, self._model.view, lesson)
 
     def _refuse(self, path: tuple[str | int, ...], value: object, wanted: str) -> None:
         words = f"{shown_json(value)}, but {wanted.rstrip(',')} was wanted"

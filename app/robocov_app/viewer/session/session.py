@@ -108,6 +108,7 @@ class Session:
         self.document = Document(scenario)
         self.head = self.document.nodes[0]
         self._remaking: Iterator[float] | None = None
+        self._script: list[Node] = []
         self.progress = 0.0
         """How much of the branch that is being made again is there, 0 to 1."""
         self._begin_time_line()
@@ -341,6 +342,8 @@ class Session:
         self.head.happenings.update(self._run.advance())
         self.head.end = max(self.head.end, self._run.step)
         self.history.add(self._run.moment(self.head.number))
+        if self._script:
+            self._follow()
         if self._run.step % 12 == 0:
             self.settled = self._has_settled()
 
@@ -359,6 +362,28 @@ class Session:
         return True
 
     # branches
+
+    def follow(self, node: Node) -> None:
+        """Let what was done on the way to a node be done again as time goes by; any other touch ends that."""
+        self._script = self.document.path(node)
+
+    def _follow(self) -> None:
+        """Carry out what the script says of this step."""
+        step = self._run.step
+        if self.head not in self._script:
+            self._script = []
+            return
+        todo = [change for when, change in self.head.changes if when == step and when > self.head.begin]
+        for node in self._script[self._script.index(self.head) + 1 :]:
+            if node.at != step:
+                break
+            self.head = node
+            todo += [change for when, change in node.changes if when == step]
+        for change in todo:
+            self._run.apply(change)
+        if todo:
+            self.settled = False
+            self.history.amend(self._run.moment(self.head.number))
 
     def branch(self) -> bool:
         """Go on from the moment looked at; what came after it stays, as a branch that can be gone back to.
@@ -550,6 +575,7 @@ class Session:
         Changes of the same `gesture`, not None, without anything else between, are one touch.
         """
         self.finish_remaking()
+        self._script = []
         if self._cursor is None:
             self._run.apply(change)
         else:

@@ -1,0 +1,48 @@
+"""`robocov lesson`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+
+@dataclass
+class Arguments:
+    """Check a lesson: a session file with chapters, which `robocov demo --lesson FILE` plays.
+
+    Play what a chapter is to show in the window, save the session (Ctrl S), and write "lesson" into the file:
+    a title and chapters, each with title, text, the touch at which it ends, and until when (robocov schema
+    session tells the rest); with a question or a task where that teaches. All chapters are simulated.
+
+    Example: robocov lesson check mine.robocov
+    """
+
+    action: tyro.conf.Positional[Literal["check"]]
+    """What to do."""
+    file: tyro.conf.Positional[Path]
+    """The lesson."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def command(options: Arguments) -> int:
+    """Play all chapters without a window, and say how each ends."""
+    from robocov.compiled import compile_kernels
+    from robocov_app.viewer.lessons import checked, load_lesson
+
+    saved = load_lesson(options.file)
+    assert saved.lesson is not None
+    compile_kernels()
+    chapters = checked(saved)
+    if options.json:
+        rows = [{"title": title, "seconds": seconds, "ends": ends} for title, seconds, ends in chapters]
+        print(json.dumps({"title": saved.lesson.title, "chapters": rows}))
+    else:
+        print(saved.lesson.title)
+        for k, (title, seconds, ends) in enumerate(chapters, 1):
+            print(f"  {k:2}  {title:44}  {f'ends after {seconds:.1f} s' if ends else 'never ends'}")
+    return 0 if all(ends for *_, ends in chapters) else 2

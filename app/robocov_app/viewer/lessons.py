@@ -1,0 +1,264 @@
+"""Lessons: session files with chapters that wait for the simulation, ask, hand over, and go on.
+
+A chapter does again what was done on the way to a touch of the session. It may ask for a prediction before,
+and hand a task over afterwards. It ends by conditions of the simulation, however slow the machine is.
+"""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from robocov.errors import MapError, Mistake
+from robocov_app.viewer.session.file import (
+    ChapterModel,
+    ConditionModel,
+    LessonModel,
+    SavedSession,
+    load_session,
+    session_of,
+)
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.workspace import Workspace
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from robocov_app.viewer.presenter import Desk
+
+FIRST = "lesson-1.robocov"
+"""The lesson that comes with robocov."""
+
+READING = 4.0
+"""Seconds on the wall after a chapter's end until the next, and for an answer where nobody answers."""
+
+LONGEST_TASK = 600.0
+"""Seconds of simulation after which `check` gives a task up."""
+
+PLAIN = frozenset(
+    {
+        *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
+        *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
+    }
+)
+"""Layers that every chapter shows."""
+
+
+def first_lesson() -> SavedSession:
+    """Return the lesson that comes with robocov."""
+    text = files("robocov_app.viewer").joinpath("assets", FIRST).read_text(encoding="utf-8")
+    return session_of(json.loads(text), FIRST)
+
+
+def load_lesson(path: Path) -> SavedSession:
+    """Return the lesson in a session file; MapError as `load_session`, or where there is none in it."""
+    saved = load_session(path)
+    if saved.lesson is None:
+        raise MapError.of(str(path), [Mistake.at(("lesson",), "missing")])
+    return saved
+
+
+def holds(condition: ConditionModel, session: Session) -> bool:
+    """Return whether what is waited for is so."""
+    lane = session.lanes[0]
+    if condition.step is not None and session.step_now >= condition.step:
+        return True
+    if condition.settled and session.settled:
+        return True
+    if condition.mean_distance_below is not None and len(lane.curve):
+        return bool(lane.curve.value[-1] < condition.mean_distance_below)
+    row = None if condition.robot is None else lane.row(condition.robot)
+    if row is None:
+        return False
+    x, y = (float(each) for each in lane.simulation.positions[row])
+
+    def within(box: list[float]) -> bool:
+        return box[0] <= x <= box[2] and box[1] <= y <= box[3]
+
+    return (condition.inside is not None and within(condition.inside)) or (
+        condition.outside is not None and not within(condition.outside)
+    )
+
+
+class LessonPlayer:
+    """Plays the chapters of a lesson on a desk, and gives it its own session back.
+
+    Attributes
+    ----------
+    number : int
+        Which chapter is played, from 0.
+    state : str
+        ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
+    answer : int or None
+        What was answered, from 1.
+    alone : bool
+        Nobody is there to answer or to do tasks, as in a film.
+    """
+
+    def __init__(
+        self, desk: Desk, fit: Callable[[], None], saved: SavedSession | None = None, *, alone: bool = False
+    ) -> None:
+        saved = saved or first_lesson()
+        assert saved.lesson is not None
+        self.lesson: LessonModel = saved.lesson
+        self._desk, self._fit, self.alone = desk, fit, alone
+        self._before = desk.workspace, desk.map_name, desk.shown, desk.tool, desk.active
+        self.session = Session(saved.document.path(saved.document.nodes[0])[0].scenario)  # type: ignore[arg-type]
+        self.session.document, self.session.head = saved.document, saved.document.nodes[0]
+        self.session.clock.budget = desk.session.clock.budget
+        self._workspace = Workspace(self.session, None)
+        self.number, self.state, self.done = 0, "plays", False
+        self.answer: int | None = None
+        self._waited = 0.0
+        self._begin(0)
+
+    @property
+    def chapter(self) -> ChapterModel:
+        """The chapter that is played."""
+        return self.lesson.chapters[self.number]
+
+    @property
+    def title(self) -> str:
+        """Its title with its number."""
+        return f"{self.number + 1}  {self.chapter.title}"
+
+    @property
+    def text(self) -> str:
+        """What it says."""
+        return self.chapter.text
+
+    @property
+    def asks(self) -> list[str]:
+        """What is asked or handed over now, line by line."""
+        chapter = self.chapter
+        if self.state == "left":
+            return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
+        question, lines = chapter.question, []
+        if question is not None and self.state == "asks":
+            lines = [question.text, *(f"{k}  {each}" for k, each in enumerate(question.answers, 1))]
+        elif question is not None and self.state == "ended" and self.answer is not None:
+            right = question.answers[question.right - 1]
+            lines = [f"{'Right' if self.answer == question.right else 'Not quite'}: {right}", question.why]
+        if chapter.task is not None and self.state in ("task", "ended"):
+            lines += ["Now you: " + chapter.task.text if self.state == "task" else chapter.task.done]
+        return [line for line in lines if line]
+
+    @property
+    def chapters(self) -> tuple[str, ...]:
+        """The titles of all chapters."""
+        return tuple(chapter.title for chapter in self.lesson.chapters)
+
+    @property
+    def seconds(self) -> float:
+        """How long the whole lesson takes at most where nobody answers, s on the wall."""
+        return sum(
+            (each.until.step or 0) / 60 / each.speed + READING * (2 if each.question else 1) + 0.5
+            for each in self.lesson.chapters
+        )
+
+    @property
+    def progress(self) -> float:
+        """How much of the lesson is over, 0 to 1, by chapters."""
+        end = self.chapter.until.step
+        part = min(self.session.step_now / end, 1.0) if end else 0.5
+        return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)
+
+    def advance(self, seconds: float) -> None:
+        """Take note that so many seconds have passed on the wall."""
+        if self.done or self.state == "left":
+            return
+        session, chapter = self.session, self.chapter
+        self._waited += seconds
+        if self.state == "asks" and self.alone and self._waited >= READING:
+            assert chapter.question is not None
+            self.reply(chapter.question.right)
+        elif self.state == "plays" and holds(chapter.until, session):
+            if chapter.task is not None and not self.alone:
+                self._turn("task")
+            else:
+                self._turn("ended")
+                session.playing = False
+        elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
+            self._turn("ended")
+        elif self.state == "ended" and self._waited >= READING:
+            self.skip(1)
+
+    def reply(self, answer: int) -> None:
+        """Answer the question; the chapter goes on."""
+        question = self.chapter.question
+        if self.state == "asks" and question is not None and 1 <= answer <= len(question.answers):
+            self.answer = answer
+            self._turn("plays")
+            self.session.playing = True
+
+    def skip(self, by: int) -> None:
+        """Go to the next chapter, or back to one before; after the last the lesson ends."""
+        if self.number + by >= len(self.lesson.chapters):
+            self.end()
+        else:
+            self._begin(max(self.number + by, 0))
+
+    def leave(self) -> None:
+        """Let whoever watches play with what is there."""
+        if self.state != "task":
+            self._turn("left")
+
+    def come_back(self) -> None:
+        """Begin the chapter that was left again."""
+        self._begin(self.number)
+
+    def end(self) -> None:
+        """End; the session from before is there again."""
+        desk = self._desk
+        self._workspace.close()
+        desk.workspace, desk.map_name, desk.shown, desk.tool, desk.active = self._before
+        desk.show_session(desk.workspace.session)
+        self._fit()
+        self.done = True
+
+    def _turn(self, state: str) -> None:
+        self.state, self._waited = state, 0.0
+        self._desk.version += 1
+
+    def _begin(self, number: int) -> None:
+        self.number, self.answer = number, None
+        chapter, desk, session = self.chapter, self._desk, self.session
+        target = session.document.nodes[chapter.touch]
+        session.enter(session.document.path(target)[0], 0)
+        session.finish_remaking()
+        session.follow(target)
+        session.playing, session.stop_when_settled = chapter.question is None, False
+        session.clock.speed = chapter.speed
+        desk.workspace = self._workspace
+        desk.show_session(session)
+        desk.map_name = session.environment.name
+        desk.tool, desk.active = desk.hand, 0
+        desk.hand.selected = chapter.robot
+        desk.shown = set(PLAIN | frozenset(chapter.show))
+        desk.message = ""
+        self._fit()
+        self._turn("asks" if chapter.question is not None else "plays")
+
+
+def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
+    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter.
+
+    Raises what touches that cannot be raise.
+    """
+    assert saved.lesson is not None
+    session = Session(saved.document.path(saved.document.nodes[0])[0].scenario)  # type: ignore[arg-type]
+    session.document, session.head = saved.document, saved.document.nodes[0]
+    session.clock.budget = np.inf
+    found = []
+    for chapter in saved.lesson.chapters:
+        target = session.document.nodes[chapter.touch]
+        session.enter(session.document.path(target)[0], 0)
+        session.follow(target)
+        while not (ended := holds(chapter.until, session)) and session.end < LONGEST_TASK:
+            session.step()
+        found.append((chapter.title, session.end, ended))
+    return found

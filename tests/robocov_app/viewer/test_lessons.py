@@ -1,0 +1,155 @@
+"""Lessons: what they name exists; chapters wait for the simulation, ask, hand over, and give all back."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_window import opened
+from touched_run import begun, stepped
+
+from robocov.errors import MapError
+from robocov_app.cli import main
+from robocov_app.render.picture import pane_layers, standard_layers
+from robocov_app.viewer import lessons
+from robocov_app.viewer.lessons import PLAIN, checked, first_lesson, load_lesson
+from robocov_app.viewer.session.file import dumped, session_json
+from robocov_app.viewer.session.session import Session
+
+LAYERS = {layer.name for layer in (*standard_layers(), *pane_layers())}
+LESSON = first_lesson().lesson
+assert LESSON is not None
+
+
+def short(tmp_path: Path, **changes: object) -> Path:
+    """A lesson of two chapters: a robot fails; what comes then is asked, and a robot is to be dragged."""
+    session = stepped(begun(), 20)
+    session.fail_robot(2)
+    stepped(session, 20)
+    session.restart(start="far")
+    stepped(session, 10)
+    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    first = {"title": "Failure", "text": "One fails.", "touch": 1, "until": {"step": 30}}
+    question = {"text": "What now?", "answers": ["Nothing", "Much"], "right": 2, "why": "So it is."}
+    task = {"text": "drag robot 1.", "until": {"robot": 1, "inside": [0, 0, 2, 2]}, "done": "Well done."}
+    second = {"title": "Far", "text": "From far.", "touch": 2, "until": {"step": 5}, **changes}
+    chapters = [first, {"question": question, "task": task, **second}]
+    content["lesson"] = {"title": "Two", "chapters": chapters}
+    path = tmp_path / "two.robocov"
+    path.write_text(json.dumps(content))
+    return path
+
+
+@pytest.mark.parametrize("chapter", LESSON.chapters, ids=lambda chapter: chapter.title)
+def test_what_a_chapter_says_is_short_and_what_it_names_exists(chapter) -> None:
+    assert set(chapter.show) <= LAYERS and LAYERS >= PLAIN
+    assert len(re.findall(r"[.!?](?= |$)", chapter.text)) in (2, 3)
+    assert len(chapter.title) <= 44 and "  " not in chapter.text
+    # so fast do people read, and they are to watch too
+    assert chapter.until.step is not None
+    seconds = chapter.until.step / 60 / chapter.speed
+    assert len(chapter.text.split()) / seconds < 5.0
+
+
+@pytest.mark.slow
+def test_every_chapter_of_the_lesson_ends() -> None:
+    assert all(ended for *_, ended in checked(first_lesson()))
+
+
+def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:
+    with opened(tmp_path) as driver:
+        stepped(driver.session, 10).fail_robot(3)
+        before = driver.desk.session
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path))
+        lesson, desk = driver.window.tour, driver.desk
+        assert lesson is not None and lesson.title == "1  Failure" and desk.session is not before
+        driver.frames(6)
+        assert desk.session.numbers == (1, 2, 3)
+        driver.frames(30)
+        assert desk.session.numbers == (1, 3), "at its step, however long frames take"
+        assert lesson.state == "ended" and not desk.session.playing
+        lesson.skip(1)
+        assert lesson.state == "asks" and lesson.asks == ["What now?", "1  Nothing", "2  Much"]
+        driver.frames(10)
+        assert desk.session.time == 0.0, "it waits for an answer"
+        driver.key("1")
+        assert lesson.state == "plays" and lesson.answer == 1
+        driver.frames(30)
+        assert lesson.state == "task" and lesson.asks == ["Now you: drag robot 1."]
+        desk.session.place(1, (1.0, 1.0))
+        driver.frames(2)
+        assert lesson.state == "ended"
+        assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
+        driver.key("escape")
+        assert driver.window.tour is None and desk.session is before and before.numbers == (1, 2)
+
+
+def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path))
+        lesson = driver.window.tour
+        driver.key("space")
+        assert lesson.state == "plays" and not driver.desk.session.playing
+        driver.frames(60)
+        assert lesson.number == 0 and driver.desk.session.time < 0.1
+        driver.key("n")
+        assert lesson.state == "left" and driver.window.tour is lesson
+        driver.key("f2")
+        assert lesson.state == "plays" and driver.desk.session.time == 0.0
+        driver.key("right")
+        assert lesson.number == 1
+        driver.key("left")
+        assert lesson.number == 0
+
+
+def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lessons, "READING", 0.1)
+    with opened(tmp_path) as driver:
+        driver.window._patient = True
+        driver.window.start_lesson(short(tmp_path))
+        for _ in range(120):
+            driver.frames(1)
+            if driver.window.tour is None:
+                break
+        assert driver.window.tour is None
+
+
+def test_the_command_checks_a_lesson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["lesson", "check", str(short(tmp_path))]) == 0
+    assert "1  Failure" in capsys.readouterr().out
+    never = short(tmp_path, until={"robot": 1, "inside": [50, 50, 51, 51]})
+    path = tmp_path / "plain.robocov"
+    content = json.loads(never.read_text())
+    del content["lesson"]
+    path.write_text(json.dumps(content))
+    with pytest.raises(MapError, match="lesson: missing"):
+        load_lesson(path)
+    content = json.loads(never.read_text())
+    content["lesson"]["chapters"][0]["touch"] = 9
+    path.write_text(json.dumps(content))
+    with pytest.raises(MapError, match=r"lesson\.chapters\[0\]\.touch: 9, but the number of a touch, 0 to 2"):
+        load_lesson(path)
+
+
+def test_a_script_goes_the_same_way_bit_for_bit() -> None:
+    session = stepped(begun(), 10)
+    session.playing = True
+    for k in range(10):
+        session.grab(2, (3.0 + 0.05 * k, 3.0))
+        session.advance(1 / 60)
+    session.release()
+    stepped(session, 10)
+    end, went = session.step_now, session.lanes[0].simulation.positions.copy()
+    twin = Session(session.document.nodes[0].scenario)
+    twin.document, twin.head = session.document, session.document.nodes[0]
+    twin.enter(twin.head, 0)
+    twin.finish_remaking()
+    twin.follow(session.head)
+    while twin.step_now < end:
+        twin.step()
+    np.testing.assert_array_equal(twin.lanes[0].simulation.positions, went)
