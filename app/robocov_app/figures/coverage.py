@@ -101,7 +101,7 @@ def plot_coverage(
         raise ParameterError("moments: none were given, but at least one was wanted")
     if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     bounds = np.array([moment.environment.region.bounds for moment in moments])
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
@@ -141,7 +141,7 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     They get ticks in metres, and the scale of colours to the right of them. `moment`: its title and facts are
     not written.
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     largest = moment.field.largest
     limit = round_limit(largest if np.isfinite(largest) else 1.0)
     with plain_style():

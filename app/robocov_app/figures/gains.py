@@ -53,7 +53,6 @@ class Dependence(NamedTuple):
 def plot_gains(
     dependences: Sequence[Dependence],
     gain: str,
-    axes: Axes | None = None,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "",
@@ -66,10 +65,10 @@ def plot_gains(
     """Plot values against a gain, one colour and mark a controller, with a line through medians.
 
     The axis of the gain is logarithmic where it spans much; null has a place of its own at the right. A gain
-    that is one of `words` has even places, and no line. `axes`: where to draw; None makes a page of `size` px
-    with a `title`. Raises ParameterError when there are no values, or one controller has no finite one.
+    that is one of `words` has even places, and no line. The page has `size` px. Raises ParameterError when
+    there are no values, or one controller has no finite one.
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     kept = []
     gain = cut_to(gain, len, MOST_LETTERS)
     for each in dependences:
@@ -83,8 +82,7 @@ def plot_gains(
     known = curve_styles(each.controller for each in kept)
     looks = [known[each.controller] for each in kept] if styles is None else list(styles)
     with plain_style():
-        if axes is None:
-            axes = _page_axes(theme, size or (700, 480), title, scale)
+        axes = _page_axes(theme, size or (700, 480), title, scale)
         gains = np.concatenate([each.gains for each in kept])
         null = _gain_axis(axes, gains, words)
         for each, look in zip(kept, looks, strict=True):
@@ -112,7 +110,7 @@ def plot_gain_grid(
     `values` (rows, columns) are nan where there is none; `first` and `second` are the gains' values,
     ascending, None for no limit. Raises ParameterError when the values have another shape, or none is finite.
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     if values.shape != (len(second), len(first)) or not np.isfinite(values).any():
         raise ParameterError(
             f"values: shape {values.shape}, {int(np.isfinite(values).sum())} of them finite, "

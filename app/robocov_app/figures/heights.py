@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
 """A cell without any symmetry, m."""
 
-HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
-"""Heights of the table, m."""
-
 _APART = 0.13
 """Heights are written beside the path, rounded, where their places are so far apart, as a part of it."""
 
@@ -71,22 +68,6 @@ def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[f
     return rows
 
 
-def height_table(rows: Sequence[AtHeight]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of the table as texts."""
-    head = ("h (m)", "x (m)", "y (m)", "from the centroid (mm)", "missed over the centroid (%)")
-    names = {0.0: "→ 0", np.inf: "→ ∞"}
-    return head, [
-        (
-            names.get(row.height, f"{row.height:g}"),
-            f"{row.x:.4f}",
-            f"{row.y:.4f}",
-            f"{1e3 * row.from_centroid:.2f}",
-            "" if np.isnan(row.missed) else f"{100.0 * row.missed:.4f}",
-        )
-        for row in rows
-    ]
-
-
 def plot_heights(
     vertices: Sequence[tuple[float, float]] = PENTAGON,
     theme: Theme | str = LIGHT,
@@ -101,7 +82,7 @@ def plot_heights(
     optimum is from the centroid. `vertices`, m: of a convex cell. `size`, (width, height) or None: by default
     1080 x 440. `scale`: of texts and lines; None for what suits the size.
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     cell = _cell_of(vertices)
     unit = 10.0 ** round(float(np.log10(cell.mass[0] / 12.0)) / 2.0)
     path = best_at_heights(vertices, np.geomspace(_LOW * unit, _HIGH * unit, 240).tolist())

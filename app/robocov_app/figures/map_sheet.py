@@ -43,7 +43,7 @@ def plot_maps(
     """
     if not environments:
         raise ParameterError("maps: none were given, but at least one was wanted")
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     shown = list(environments)[:MOST]
     if len(shown) < len(environments):
         title = f"{title}  ·  {len(shown)} of {len(environments)}".removeprefix("  ·  ")

@@ -53,7 +53,7 @@ def plot_metrics(
     """
     if not runs:
         raise ParameterError("runs: none were given, but at least one was wanted")
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     with plain_style():
         page = Page(size, theme)
         s = page.scale

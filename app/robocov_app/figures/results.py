@@ -1,7 +1,6 @@
 """Plots of many runs together: cost bands, final costs, and pairs of controllers.
 
-They take plain numbers. Each draws into axes that are given, or makes a page. What a result depends on
-(gains, team sizes) is in `robocov_app.figures.gains`.
+They take plain numbers. What a result depends on (gains, team sizes) is in `robocov_app.figures.gains`.
 """
 
 from __future__ import annotations
@@ -38,7 +37,6 @@ from robocov_app.figures.rows import (
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from robocov_app.figures.statistics import Interval
@@ -82,7 +80,6 @@ class Pairs(NamedTuple):
 
 def plot_cost_bands(
     bands: Sequence[Band],
-    axes: Axes | None = None,
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
     title: str = "Coverage cost over time",
@@ -94,7 +91,7 @@ def plot_cost_bands(
 ) -> Figure:
     """Plot values against time: of several runs their median and quartiles, of one run its line.
 
-    `axes`: where to draw; None makes a page of `size` px with a `title`. `styles`: one for each band. `label`
+    The page has `size` px. `styles`: one for each band. `label`
     and `unit` tell the values. Raises ParameterError when there are no bands, or one has no finite value or
     not one column for each time.
     """
@@ -110,7 +107,7 @@ def plot_cost_bands(
             raise ParameterError(
                 f"band {shown(band.label)}: no finite value, but at least one in each was wanted"
             )
-    theme = _theme(theme)
+    theme = theme_named(theme)
     looks = styles_of([band.controller for band in bands]) if styles is None else styles
     quarters = [quartiles(band.values) for band in bands]
     curves = [
@@ -122,17 +119,16 @@ def plot_cost_bands(
         for band, (low, _, high) in zip(bands, quarters, strict=True)
     ]
     with plain_style():
-        if axes is None:
-            page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
-            s = page.scale
-            most = 0.5 * page.size[0] - 30 * s
-            curves = [_fitting(curve, page, unit, most) for curve in curves]
-            right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-            left, top = 44 * s, (72 if title else 44) * s
-            if title:
-                room = page.size[0] - 2 * page.margin
-                page.text(title, page.margin, 22 * s, points=TITLE, bold=True, room=room)
-            axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
+        page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
+        s = page.scale
+        most = 0.5 * page.size[0] - 30 * s
+        curves = [_fitting(curve, page, unit, most) for curve in curves]
+        right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+        left, top = 44 * s, (72 if title else 44) * s
+        if title:
+            room = page.size[0] - 2 * page.margin
+            page.text(title, page.margin, 22 * s, points=TITLE, bold=True, room=room)
+        axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
         # lines as in a picture of the usual size would fill a small one
         weight = 1.0 if size is None or size[0] >= _USUAL * (scale or 1.0) else 0.7
         draw_curves(axes, curves, theme, styles=looks, bands=around, label=label, unit=unit, weight=weight)
@@ -141,7 +137,6 @@ def plot_cost_bands(
 
 def plot_final_costs(
     rows: Sequence[tuple[str, Sequence[Sample]]],
-    axes: Axes | None = None,
     theme: Theme | str = LIGHT,
     size: tuple[int, int | None] | None = None,
     title: str = "",
@@ -155,18 +150,17 @@ def plot_final_costs(
 
     A box spans the quartiles, with the median across; whiskers reach the farthest values within 1.5 times its
     length. A sample of fewer than five values has its points and its median alone. `rows` are groups from top
-    to bottom; a single one with an empty name has none written. `axes`: where to draw; None makes a page of
-    `size` px with a `title`. A height of None is what the rows need. The axis begins at `origin` unless all
-    values are far from it. Raises ParameterError when there are no samples, or one has no finite value.
+    to bottom; a single one with an empty name has none written. The page has `size` px; a height of None is
+    what the rows need. The axis begins at `origin` unless all values are far from it. Raises ParameterError
+    when there are no samples, or one has no finite value.
     """
     samples = [sample for _, group in rows for sample in group]
     _check_samples(samples)
-    theme = _theme(theme)
+    theme = theme_named(theme)
     places, heads, total = laid_rows([(name, len(group)) for name, group in rows])
     names = [sample.label for sample in samples]
     with plain_style():
-        if axes is None:
-            axes, names = rows_page(total, names, theme, size, title, scale)
+        axes, names = rows_page(total, names, theme, size, title, scale)
         looks = [
             look
             for _, group in rows
@@ -187,7 +181,6 @@ def plot_final_costs(
 
 def plot_paired(
     pairs: Sequence[Pairs],
-    axes: Axes | None = None,
     theme: Theme | str = LIGHT,
     size: tuple[int, int | None] | None = None,
     title: str = "",
@@ -198,19 +191,18 @@ def plot_paired(
 ) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis.
 
-    Arguments are those of `plot_final_costs`. Raises ParameterError when there are no pairs, or a ratio is
+    Raises ParameterError when there are no pairs, or a ratio is
     not above 0.
     """
     _check_samples([Sample(each.label, each.controller, each.ratios) for each in pairs])
     for each in pairs:
         if not (each.ratios > 0).all():
             raise ParameterError(f"pairs {shown(each.label)}: ratios above 0 were wanted")
-    theme = _theme(theme)
+    theme = theme_named(theme)
     places, _, total = laid_rows([("", len(pairs))])
     names = [each.label for each in pairs]
     with plain_style():
-        if axes is None:
-            axes, names = rows_page(total, names, theme, size, title, scale)
+        axes, names = rows_page(total, names, theme, size, title, scale)
         known = curve_styles(each.controller for each in pairs)
         looks = [known[each.controller] for each in pairs] if styles is None else styles
         for each, look, place in zip(pairs, looks, places, strict=True):
@@ -256,10 +248,6 @@ def _fitting(curve: Curve, page: Page, unit: str, room: float) -> Curve:
         return page.text_width(end_label((label, *curve[1:]), unit), bold=True)
 
     return cut_to(curve[0], width_of, room), *curve[1:]
-
-
-def _theme(theme: Theme | str) -> Theme:
-    return theme_named(theme) if isinstance(theme, str) else theme
 
 
 def _check_samples(samples: Sequence[Sample]) -> None:

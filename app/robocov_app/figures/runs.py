@@ -210,7 +210,7 @@ def _figure_of(axes: Axes) -> Figure:
 
 
 def _theme(theme: Theme | str) -> Theme:
-    return theme_named(theme) if isinstance(theme, str) else theme
+    return theme_named(theme)
 
 
 def _check_colours(colours: str) -> None:

@@ -102,7 +102,7 @@ def plot_import(
     -------
     matplotlib Figure
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     compared = compare(foreign, environment, report)
     captions = (
         ("as read", f"{_number(report.vertices_read)} vertices, {_number(compared.before.area)} m² free"),

@@ -223,8 +223,10 @@ DARK = Theme(
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 
 
-def theme_named(name: str) -> Theme:
-    """Return the theme called `name`. Raises ParameterError when there is none of that name."""
+def theme_named(name: str | Theme) -> Theme:
+    """Return the theme called `name`, or that is given; raises ParameterError where there is none."""
+    if isinstance(name, Theme):
+        return name
     if name not in THEMES:
         raise ParameterError(unknown_name("theme", name, THEMES))
     return THEMES[name]

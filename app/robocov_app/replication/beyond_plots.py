@@ -55,7 +55,7 @@ _CONDITIONS_SIZE = (1180, 720)
 
 def beyond_figures(material: BeyondMaterial, theme: Theme | str) -> Mapping[str, Callable[[], Figure]]:
     """Return how every figure is drawn, by its name; those without a run are left out."""
-    look = theme_named(theme) if isinstance(theme, str) else theme
+    look = theme_named(theme)
     drawn: dict[str, Callable[[], Figure]] = {}
     samples = gap_samples(material)
     if samples:

@@ -100,7 +100,7 @@ def gains_figure(gains: Mapping[str, GainOutcomes], theme: Theme | str) -> Figur
     from robocov_app.figures.page import TITLE, Page, plain_style
     from robocov_app.render.theme import theme_named
 
-    look = theme_named(theme) if isinstance(theme, str) else theme
+    look = theme_named(theme)
     rpf, rapf = gains["rpf"].complete, gains["rapf"].complete
     levels = sorted({float(each["k_att"] or 0.0) for each in rapf.gains})
     panels = [("RPF", rpf)]

@@ -63,7 +63,7 @@ def plot_degradations(
     """
     if not any(np.isfinite(each.ratio.estimate) for each in found):
         raise ParameterError("degradations: none with a ratio, but at least one was wanted")
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     axes_of: dict[str, list[Degradation]] = {}
     for each in found:
         axes_of.setdefault(each.axis, []).append(each)

@@ -146,7 +146,7 @@ def draw_figure(number: int, runs: Mapping[str, Shown], partition: Record, theme
     ParameterError
         When there is no figure of that number.
     """
-    theme = theme_named(theme) if isinstance(theme, str) else theme
+    theme = theme_named(theme)
     if number == 1:
         return partition_figure(partition.environment, partition.positions[0], partition.team.radius, theme)
     pairs = {2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from robocov.observation.region import Region
-from robocov_app.figures.heights import HEIGHTS, PENTAGON, best_at_heights, height_table, plot_heights
+from robocov_app.figures.heights import PENTAGON, best_at_heights, plot_heights
 from robocov_app.render.theme import DARK, LIGHT, contrast
+
+HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
 
 
 def test_rows_go_from_one_limit_to_the_other() -> None:
@@ -20,11 +22,10 @@ def test_rows_go_from_one_limit_to_the_other() -> None:
     assert np.isnan([rows[0].missed, rows[-1].missed]).all()
 
 
-def test_the_table_says_so_in_words() -> None:
-    head, rows = height_table(best_at_heights(PENTAGON, (1.0,)))
-    assert rows[1] == ("1", "2.0849", "1.6650", "56.09", "0.0284")
-    assert [row[0] for row in rows] == ["→ 0", "1", "→ ∞"]
-    assert {len(row) for row in rows} == {len(head)}
+def test_the_best_place_at_a_height() -> None:
+    row = best_at_heights(PENTAGON, (1.0,))[1]
+    assert (row.x, row.y, row.from_centroid) == pytest.approx((2.0849, 1.6650, 0.05609), abs=6e-5)
+    assert row.missed == pytest.approx(0.000284, abs=1e-6)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

@@ -162,23 +162,6 @@ def test_a_single_pair_has_no_interval() -> None:
     assert all(np.isfinite(np.asarray(line.get_xdata(), dtype=float)).all() for line in axes.lines)
 
 
-def test_they_draw_into_axes_that_are_given() -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure()
-    for axes, plot in zip(
-        figure.subplots(1, 3),
-        (
-            lambda axes: plot_cost_bands(BANDS, axes),
-            lambda axes: plot_final_costs([("", SAMPLES)], axes),
-            lambda axes: plot_paired(PAIRS, axes, "dark"),
-        ),
-        strict=True,
-    ):
-        assert plot(axes) is figure
-        assert axes.lines
-
-
 @pytest.mark.parametrize(
     ("plot", "message"),
     [
