@@ -379,6 +379,13 @@ def test_bounds(sketch):
     assert transform.bounds_of(sketch, Selection.of(BOUNDARY)) == (0.0, 0.0, 12.0, 8.0)
 
 
+def test_what_is_gone_is_not_moved_and_the_rest_is(sketch):
+    change = transform.moved(sketch, Selection(frozenset({0, 99}), starts=frozenset({"none"})), 1.0, 0.0)
+    assert change.selection == Selection.of(0) and change.sketch.item(0).shape.vertices[0] == (2.0, 1.0)
+    with pytest.raises(MapError, match="select something"):
+        transform.rotated(sketch, Selection.of(99), 90.0, (0.0, 0.0))
+
+
 def test_the_bounds_of_many_things_are_those_of_each():
     shapes = [
         CircleObstacle((k, 1.0), 0.3) if k % 3 else WallObstacle(((k, 2.0), (k, 3.0)), 0.2)

@@ -218,7 +218,7 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
     """Copy the selected obstacles and starts, the copies moved by (dx, dy) m; they are selected then."""
-    whole = Selection(items=selection.items, starts=selection.starts)
+    whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
     if not whole:
         raise MapError("select obstacles or starts to copy")
     after, copies = _copied(sketch, whole, Affine.shift(dx, dy))
@@ -358,6 +358,7 @@ def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
 
 
 def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) -> Change:
+    selection = selection.within(sketch)  # an undo in the middle of a drag may have taken things away
     if not selection:
         raise MapError("select something first")
     return Change(_placed(sketch, selection, affine), selection, f"{selection.words(sketch)} {words}")
