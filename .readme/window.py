@@ -90,6 +90,8 @@ def film(name: str) -> None:
         window.do("tour")
         assert window.tour is not None
         for frame in range(round(window.tour.seconds * HEADLESS_FPS)):
+            if window.tour is None:
+                break
             window.frame(1.0 / HEADLESS_FPS)
             if frame % 2 == 0:
                 encoder.stdin.write(pixels(window.screen).tobytes())
