@@ -11,13 +11,7 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov_app.editor.canvas.findings import (
-    Hatching,
-    badge_places,
-    draw_gap,
-    draw_problems,
-    tag_gap,
-)
+from robocov_app.editor.canvas.findings import Hatching, badge_places, draw_gap, draw_problems, tag_gap
 from robocov_app.editor.canvas.handles import (
     accent,
     draw_box,

@@ -31,12 +31,7 @@ if TYPE_CHECKING:
 
 
 class Strips:
-    """Draws the strips, and says what they leave to the sheet.
-
-    Parameters
-    ----------
-    desk : Desk
-    """
+    """Draws the strips, and says what they leave to the sheet."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk

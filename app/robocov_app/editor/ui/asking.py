@@ -35,14 +35,7 @@ class Answer:
 
 
 class Question:
-    """A question, with answers side by side; Escape gives the last one.
-
-    Parameters
-    ----------
-    title, words : str
-    answers : sequence of Answer
-        The first is the one that Enter gives; the last changes nothing.
-    """
+    """A question, with answers side by side: Enter gives the first, Escape the last, which changes nothing."""
 
     def __init__(self, title: str, words: str, answers: Sequence[Answer]) -> None:
         self.title, self.words, self.answers = title, words, tuple(answers)
@@ -62,16 +55,7 @@ class Question:
 
 
 class ListQuestion:
-    """Something to be chosen from a list, or typed.
-
-    Parameters
-    ----------
-    title : str
-    call : callable
-        Takes what was chosen or typed.
-    hint : str
-        At the foot.
-    """
+    """Something to be chosen from a list, or typed."""
 
     def __init__(self, title: str, call: Callable[[str], object], hint: str) -> None:
         self.title, self.call, self.hint = title, call, hint
@@ -135,22 +119,7 @@ class Picker(ListQuestion):
 
 
 class FileQuestion(ListQuestion):
-    """A file, by its path: typed, completed with Tab, or chosen from the list.
-
-    Parameters
-    ----------
-    title : str
-    folder : Path
-        What a path that is not absolute counts from.
-    call : callable
-        Takes the path.
-    suffixes : names
-        Of the files that are listed; none for all.
-    text : str
-        What stands there at first.
-    saves : bool
-        The file need not be there.
-    """
+    """A file, by its path: typed, completed with Tab, or chosen from the list."""
 
     def __init__(
         self,

@@ -619,10 +619,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             repeats=True,
         ),
     ),
-    "Help": (
-        Row("help", "Keys", "f1, shift+/"),
-        Row("palette", "Commands by name", "ctrl+k, /"),
-    ),
+    "Help": (Row("help", "Keys", "f1, shift+/"), Row("palette", "Commands by name", "ctrl+k, /")),
 }
 
 

@@ -60,15 +60,6 @@ class Pasteboard(Protocol):
 class Desk:
     """What the user does, and what of it is shown.
 
-    Parameters
-    ----------
-    document : Document
-    readings : Worker of Measurement
-        Asked by (sketch, radius).
-    pasteboard : Pasteboard
-    folder : Path
-        Where things are saved.
-
     Attributes
     ----------
     tool : Tool
@@ -328,13 +319,7 @@ class Desk:
         self.version += 1
 
     def set_grid(self, spacing: float) -> None:
-        """Give the grid another spacing, m.
-
-        Raises
-        ------
-        MapError
-            When it is out of range.
-        """
+        """Give the grid another spacing, m."""
         _require_length("grid", spacing, 100.0)
         self.grid = spacing
         self.version += 1
@@ -348,39 +333,21 @@ class Desk:
             self.set_grid(next((each for each in reversed(GRIDS) if each < self.grid * 0.999), GRIDS[0]))
 
     def set_radius(self, radius: float) -> None:
-        """Take robots of another radius, m.
-
-        Raises
-        ------
-        MapError
-            When it is out of range.
-        """
+        """Take robots of another radius, m."""
         _require_length("radius", radius, 10.0)
         self.radius = radius
         self.version += 1
         self.ask_readings()
 
     def set_robots(self, count: int) -> None:
-        """Show a team of another size.
-
-        Raises
-        ------
-        MapError
-            When it is out of range.
-        """
+        """Show a team of another size."""
         if not 1 <= count <= 1000:
             raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
         self.version += 1
 
     def set_wall_width(self, width: float) -> None:
-        """Draw walls of another width, m.
-
-        Raises
-        ------
-        MapError
-            When it is out of range.
-        """
+        """Draw walls of another width, m."""
         _require_length("wall width", width, 100.0)
         self.wall_width = width
         self.version += 1

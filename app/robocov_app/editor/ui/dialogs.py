@@ -29,12 +29,7 @@ _MOST_LINES = 14
 
 
 class Dialogs:
-    """Shows what a desk asks, and takes the answers.
-
-    Parameters
-    ----------
-    desk : Desk
-    """
+    """Shows what a desk asks, and takes the answers."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk

@@ -34,18 +34,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
 
 class Documents:
-    """What can be done with whole documents.
-
-    Parameters
-    ----------
-    desk : Desk
-    drafts : Path or None
-        Where drafts are kept.
-    fit : callable
-        Shows the whole map.
-    patient : bool
-        Imports are waited for.
-    """
+    """What can be done with whole documents."""
 
     def __init__(
         self, desk: Desk, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
@@ -141,13 +130,7 @@ class Documents:
         self.desk.asked = Picker("Open a recent or bundled map", names, chosen)
 
     def open(self, path: Path) -> None:
-        """Open a file: a map, or one of a foreign format as a new map.
-
-        Raises
-        ------
-        RobocovError
-            When it cannot be read; what is open stays.
-        """
+        """Open a file: a map, or one of a foreign format as a new map."""
         own = self.desk.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
@@ -176,13 +159,7 @@ class Documents:
         return LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=_PATIENCE)
 
     def recover(self, draft: Autosave) -> None:
-        """Go on with work that was left behind.
-
-        Raises
-        ------
-        RobocovError
-            When it cannot be read, or another editor goes on with it.
-        """
+        """Go on with work that was left behind."""
         self._put(Document.recovered(draft, self.drafts))
         self.desk.say(f"recovered: {draft.words()}")
 
@@ -248,13 +225,7 @@ class Documents:
     # exporting
 
     def ask_export(self) -> None:
-        """Ask where to write the map in a foreign format, which goes by the suffix.
-
-        Raises
-        ------
-        MapError
-            When the map is only a draft.
-        """
+        """Ask where to write the map in a foreign format, which goes by the suffix."""
         from robocov_app.exporters import EXPORTERS
 
         self.desk.sketch.environment()
@@ -303,10 +274,7 @@ class Documents:
         if state == "gone":
             desk.say(f"{desk.document.title} is no longer there; Ctrl S writes it again", trouble=True)
         elif state == "changed":
-            answers = (
-                Answer("Reload", "r", self.reload),
-                Answer("Keep mine", "k", desk.document.keep_mine),
-            )
+            answers = (Answer("Reload", "r", self.reload), Answer("Keep mine", "k", desk.document.keep_mine))
             words = f"Something else has changed {desk.document.title}. Reloading can be undone."
             desk.asked = Question("The file has changed", words, answers)
 
@@ -331,26 +299,14 @@ class Documents:
         self.desk.asked = FileQuestion("Picture under the map", self.desk.folder, chosen, PICTURES)
 
     def underlay(self, path: Path) -> None:
-        """Put a picture under the map.
-
-        Raises
-        ------
-        MapError
-            When it is no picture.
-        """
+        """Put a picture under the map."""
         lay_under(self.desk, path)
         self.desk.choose("picture")
         self._fit()
 
 
 def lay_under(desk: Desk, path: Path) -> None:
-    """Put a picture under the map, as wide as the map is, or 20 m.
-
-    Raises
-    ------
-    MapError
-        When it is no picture.
-    """
+    """Put a picture under the map, as wide as the map is, or 20 m."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -380,13 +336,7 @@ def _from_map(path: Path, of: Path | None) -> str:
 
 
 def opened(path: Path, drafts: Path | None) -> Document | Importer:
-    """Return the document of a file; or the format of one that has to be imported.
-
-    Raises
-    ------
-    RobocovError
-        When it cannot be read.
-    """
+    """Return the document of a file; or the format of one that has to be imported."""
     if path.suffix.lower() == SUFFIX and not path.exists():
         return Document.new(drafts, path)
     try:

@@ -49,13 +49,7 @@ class Option:
     help: str
 
     def value(self, text: str) -> Any:
-        """Return what a text means.
-
-        Raises
-        ------
-        ParameterError
-            When it is no number where one was wanted.
-        """
+        """Return what a text means."""
         if self.kind == "choice":
             return True if text == ON else text
         if self.kind == "words":
@@ -154,16 +148,6 @@ class Importing:
 class ImportQuestion:
     """Model of the import dialogue: the options of a file's format, and a live preview of the result.
 
-    Parameters
-    ----------
-    path : Path
-    importer : Importer
-        Of its format.
-    worker : Worker
-        Ended by `close`.
-    call : callable
-        Takes what was imported.
-
     Attributes
     ----------
     options : tuple of Option
@@ -242,13 +226,7 @@ class ImportQuestion:
         self._ask()
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
-        """Return what is set.
-
-        Raises
-        ------
-        ParameterError
-            When a value cannot be, or is out of range.
-        """
+        """Return what is set."""
         values = {
             option.name: option.value(self.given[option.name])
             for option in self.options

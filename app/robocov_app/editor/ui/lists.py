@@ -38,12 +38,7 @@ class Row(NamedTuple):
 
 
 class PanelList(ABC):
-    """A list that scrolls.
-
-    Parameters
-    ----------
-    desk : Desk
-    """
+    """A list that scrolls."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk

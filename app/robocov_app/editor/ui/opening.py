@@ -34,21 +34,7 @@ NO_DISPLAY = (
 
 
 class EditorOpening:
-    """How the editor is opened.
-
-    Parameters
-    ----------
-    path : Path or None
-        The map; None for an empty sheet.
-    folder : Path
-        Where things are saved.
-    background : Path or None
-        A picture to put under the map.
-    theme, size, scale
-        None for what was used last.
-    headless : bool
-        Draw without a display; no draft is kept and none is offered.
-    """
+    """How the editor is opened."""
 
     def __init__(
         self,
@@ -66,13 +52,7 @@ class EditorOpening:
 
     @contextmanager
     def window(self) -> Iterator[EditorWindow]:
-        """Give the window; settings are read before and kept afterwards.
-
-        Raises
-        ------
-        InputError
-            When there is no display, or the map cannot be read.
-        """
+        """Give the window; settings are read before and kept afterwards."""
         drafts = None if self.headless else autosave_folder()
         if self.path is not None and not self.headless and opened_elsewhere(drafts, self.path):
             raise InputError(f"{self.path}: another editor has it open; close that one, or open a copy")

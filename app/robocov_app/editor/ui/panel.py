@@ -38,14 +38,7 @@ TABS = ("map", "object", "snap", "problems", "history")
 
 
 class Panel(Paged):
-    """Builds the widgets, and keeps them as the desk is.
-
-    Parameters
-    ----------
-    desk : Desk
-    do : callable
-        Does an action by its name.
-    """
+    """Builds the widgets, and keeps them as the desk is."""
 
     tabs = TABS
     tab_widths = (44, 56, 46, 72, 54)

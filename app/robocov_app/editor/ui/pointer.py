@@ -35,14 +35,7 @@ _SHAPES = {
 
 
 class Pointer(Mouse):
-    """Turns events of the mouse into what panel, sheet and tools do.
-
-    Parameters
-    ----------
-    desk, arena, panel
-    menu : callable
-        Opens the menu at a pixel.
-    """
+    """Turns events of the mouse into what panel, sheet and tools do."""
 
     def __init__(
         self, desk: Desk, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]

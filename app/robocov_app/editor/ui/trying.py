@@ -97,15 +97,7 @@ class Trial(Window):
 
 
 def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) -> Trial:
-    """Return the demo on the map of a desk, with its team at its start.
-
-    Raises
-    ------
-    MapError
-        When the map is only a draft; the message says why.
-    StartError
-        When the team has no room at the start.
-    """
+    """Return the demo on the map of a desk, with its team at its start."""
     environment = desk.sketch.environment()
     name = desk.start_name if desk.start_name in environment.starts else None
     scenario = Scenario(

@@ -54,19 +54,7 @@ _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no
 
 
 class EditorWindow:
-    """Shows a desk and lets it be touched.
-
-    Parameters
-    ----------
-    desk : Desk
-    size : (width, height), px
-    scale : float
-        Of text and lines.
-    drafts : Path or None
-        Where drafts are kept.
-    patient : bool
-        Nobody watches: what is tried waits for its cost.
-    """
+    """Shows a desk and lets it be touched."""
 
     def __init__(
         self, desk: Desk, size: tuple[int, int], scale: float, drafts: Path | None, *, patient: bool = False
