@@ -14,7 +14,7 @@ from PIL import Image
 
 from robocov.mapfile import load_map, map_file
 from robocov_app.editor.edits.create import rectangle_drawn
-from robocov_app.editor.ui.opening import EditorOpening
+from robocov_app.editor.ui.launch import EditorOpening
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.opening import HEADLESS_FPS, Opening
 from robocov_app.viewer.session.scenario import Law, Scenario

@@ -16,7 +16,7 @@ from robocov_app.editor.model.document import FIRST_SHEET, Document
 from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.viewer.opening import display
@@ -55,7 +55,7 @@ def opened_editor(
     with display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
-        desk = Desk(document, readings or measurement_worker(direct=True), OwnPasteboard(), folder)
+        desk = Editor(document, readings or measurement_worker(direct=True), OwnPasteboard(), folder)
         desk.theme = theme
         hands = Hands(EditorWindow(desk, size, scale, drafts, patient=True))
         hands.settle()

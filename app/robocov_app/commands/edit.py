@@ -51,7 +51,7 @@ class Arguments:
 
 def command(options: Arguments) -> int:
     """Open the editor, or save a picture of it."""
-    from robocov_app.editor.ui.opening import EditorOpening
+    from robocov_app.editor.ui.launch import EditorOpening
 
     opening = EditorOpening(
         None if options.map is None else map_path(options.map),

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.model.selection import Selection
     from robocov_app.editor.model.sketch import Owner, Sketch
     from robocov_app.editor.model.validation import Problem
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.team import Team
     from robocov_app.render.canvas import Canvas
     from robocov_app.render.theme import Theme
@@ -68,7 +68,7 @@ EMPTY = (0.0, 0.0, 10.0, 10.0)
 class Arena:
     """Draws what is on a desk, and finds what is under the cursor."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Editor) -> None:
         self.desk = desk
         self.sheet = Sheet()
         self.strips = Strips(desk)

@@ -10,7 +10,7 @@ import pygame
 import shapely
 
 from robocov_app.editor.canvas.drawn_rings import Outlines
-from robocov_app.editor.canvas.picture import Underlaid
+from robocov_app.editor.canvas.reference_image import ReferenceImage
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.fonts import shortened
@@ -99,7 +99,7 @@ class Sheet:
 
     def __init__(self) -> None:
         self.outlines = Outlines()
-        self.underlaid = Underlaid()
+        self.underlaid = ReferenceImage()
         self.full = self.patched = self.scrolled = 0
         self._page: pygame.Surface | None = None
         self._look: tuple[object, ...] = ()

@@ -23,7 +23,7 @@ from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import density_entry
 
 if TYPE_CHECKING:
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.team import Team
     from robocov_app.render.canvas import Canvas
     from robocov_app.render.layers import LegendEntry
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class Strips:
     """Draws the strips, and says what they leave to the sheet."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Editor) -> None:
         self._desk = desk
         self._entries: list[LegendEntry] = []
         self._rows = 1
@@ -101,7 +101,7 @@ class Strips:
         own.text(words, (width - EDGE * canvas.scale, high / 2), anchor="right")
 
 
-def map_words(desk: Desk) -> str:
+def map_words(desk: Editor) -> str:
     """Return what the strip below the sheet says: whose map it is, and what it is like."""
     sketch, measurement = desk.sketch, desk.measurement
     count = len(sketch.obstacles)

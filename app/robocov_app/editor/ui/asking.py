@@ -35,7 +35,7 @@ class Answer:
 
 
 class Question:
-    """A question, with answers side by side: Enter gives the first, Escape the last, which changes nothing."""
+    """A question, with answers side by side: Enter gives the first, Escape the last."""
 
     def __init__(self, title: str, words: str, answers: Sequence[Answer]) -> None:
         self.title, self.words, self.answers = title, words, tuple(answers)

@@ -26,7 +26,7 @@ from robocov_app.editor.model.selection import Change, Selection, Vertex, place_
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.toolbox import toolbox
-from robocov_app.editor.ui.desk import Desk
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
 from robocov_app.viewer.actions import Action
 from robocov_app.viewer.typed import parted
@@ -51,7 +51,7 @@ _SEPARATE = ""
 class Command(Action):
     """An action with what it does to a desk; `run` is None where the window does it."""
 
-    run: Callable[[Desk], object] | None = None
+    run: Callable[[Editor], object] | None = None
     repeats: bool = False  # while its key is held down
 
 
@@ -61,7 +61,7 @@ class Row(NamedTuple):
     name: str
     title: str
     keys: str = ""
-    run: Callable[[Desk], object] | None = None
+    run: Callable[[Editor], object] | None = None
     repeats: bool = False
 
 
@@ -69,18 +69,18 @@ class Typed(NamedTuple):
     """A command with a value after it: an example of one with what it is, and what it does."""
 
     example: str
-    run: Callable[[Desk, str], object]
+    run: Callable[[Editor, str], object]
 
 
 # what commands do
 
 
-def edited(edit: Callable[..., Change], *rest: object, single: bool = False) -> Callable[[Desk], None]:
+def edited(edit: Callable[..., Change], *rest: object, single: bool = False) -> Callable[[Editor], None]:
     """Return what makes an edit of the selected things; with `single`, of single vertices if some are."""
     return lambda desk: _do(desk, edit, *rest, single=single)
 
 
-def _do(desk: Desk, edit: Callable[..., Change], *rest: object, single: bool = False) -> None:
+def _do(desk: Editor, edit: Callable[..., Change], *rest: object, single: bool = False) -> None:
     """Make an edit of whole things; with `single`, of single vertices where some are selected."""
     selection = desk.selection
     if not (single and selection.vertices):
@@ -95,7 +95,7 @@ def whole(selection: Selection) -> Selection:
     return selection.without_vertices().plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
 
 
-def play(desk: Desk) -> str:
+def play(desk: Editor) -> str:
     """Show where obstacles that move get to, or show them no more."""
     if desk.moves_since is not None:
         desk.moves_since = None
@@ -106,13 +106,13 @@ def play(desk: Desk) -> str:
     return "obstacles move as they will; L ends it"
 
 
-def back(desk: Desk) -> None:
+def back(desk: Editor) -> None:
     """Take the last point back, else delete what is selected."""
     if not desk.tool.back(desk) and not desk.tool.busy and desk.selection:
         delete(desk)
 
 
-def delete(desk: Desk) -> None:
+def delete(desk: Editor) -> None:
     """Delete the selected vertices, or else the selected things."""
     selection = desk.selection
     if not selection:
@@ -122,20 +122,20 @@ def delete(desk: Desk) -> None:
     desk.change(act(desk.sketch, single if selection.vertices else selection))
 
 
-def copy(desk: Desk) -> str:
+def copy(desk: Editor) -> str:
     """Copy what is selected to the clipboard."""
     selection = whole(desk.selection)
     desk.pasteboard.put(copied(desk.sketch, selection))
     return f"copied: {selection.words(desk.sketch)}"
 
 
-def cut(desk: Desk) -> None:
+def cut(desk: Editor) -> None:
     """Copy what is selected, and delete it."""
     copy(desk)
     desk.change(properties.deleted(desk.sketch, whole(desk.selection)))
 
 
-def paste(desk: Desk, at: Point | None) -> None:
+def paste(desk: Editor, at: Point | None) -> None:
     """Paste what is in the clipboard, its middle at a place."""
     text = desk.pasteboard.get()
     if not text.strip():
@@ -144,10 +144,10 @@ def paste(desk: Desk, at: Point | None) -> None:
     desk.change(pasted(desk.sketch, text, at, grid))
 
 
-def nudge(x: int, y: int) -> Callable[[Desk], None]:
+def nudge(x: int, y: int) -> Callable[[Editor], None]:
     """Return what moves the selection by so many spacings of the grid."""
 
-    def run(desk: Desk) -> None:
+    def run(desk: Editor) -> None:
         selection = desk.selection
         if not selection:
             raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
@@ -158,7 +158,7 @@ def nudge(x: int, y: int) -> Callable[[Desk], None]:
     return run
 
 
-def cancel(desk: Desk) -> None:
+def cancel(desk: Editor) -> None:
     """Give up what is half done, else put the tool away, else select nothing."""
     if desk.typed:
         desk.typed = ""
@@ -166,7 +166,7 @@ def cancel(desk: Desk) -> None:
         desk.choose("select", tell=False)
 
 
-def select_next(desk: Desk, by: int) -> None:
+def select_next(desk: Editor, by: int) -> None:
     """Select the next obstacle, start or boundary, in the order of the map."""
     order: list[Owner] = [
         *(item.key for item in desk.sketch.obstacles if not item.hidden),
@@ -181,7 +181,7 @@ def select_next(desk: Desk, by: int) -> None:
     desk.select(Selection.of(order[place % len(order)]))
 
 
-def one_vertex(desk: Desk) -> Vertex:
+def one_vertex(desk: Editor) -> Vertex:
     """Return the one vertex that is selected."""
     if len(desk.selection.vertices) != 1:
         raise MapError("select one vertex first: click an obstacle, then one of its corners")
@@ -189,29 +189,29 @@ def one_vertex(desk: Desk) -> Vertex:
     return vertex
 
 
-def corners(desk: Desk) -> Selection:
+def corners(desk: Editor) -> Selection:
     """Return the selected corners."""
     if not desk.selection.vertices:
         raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
     return Selection(vertices=desk.selection.vertices)
 
 
-def bevel(desk: Desk, length: float) -> None:
+def bevel(desk: Editor, length: float) -> None:
     """Cut the selected corners off."""
     desk.change(vertices.bevelled(desk.sketch, corners(desk), length))
 
 
-def round_corners(desk: Desk, radius: float) -> None:
+def round_corners(desk: Editor, radius: float) -> None:
     """Round the selected corners."""
     desk.change(vertices.rounded_off(desk.sketch, corners(desk), radius))
 
 
-def simplify_outlines(desk: Desk, tolerance: float) -> None:
+def simplify_outlines(desk: Editor, tolerance: float) -> None:
     """Leave vertices out of what is selected."""
     _do(desk, simplify.simplified, tolerance)
 
 
-def extend(desk: Desk) -> None:
+def extend(desk: Editor) -> None:
     """Go on with a wall from the vertex that is selected, to where the cursor is."""
     if desk.cursor is None:
         raise MapError("move the mouse to where the wall is to go on to")
@@ -220,7 +220,7 @@ def extend(desk: Desk) -> None:
     desk.change(vertices.extended(desk.sketch, vertex, to))
 
 
-def fill(desk: Desk) -> None:
+def fill(desk: Editor) -> None:
     """Fill the hole whose vertex is selected."""
     vertex = one_vertex(desk)
     if not isinstance(vertex.of, int) or vertex.ring == 0:
@@ -228,7 +228,7 @@ def fill(desk: Desk) -> None:
     desk.change(vertices.hole_filled(desk.sketch, vertex.of, vertex.ring))
 
 
-def widen(desk: Desk, factor: float) -> None:
+def widen(desk: Editor, factor: float) -> None:
     """Make the selected walls wider or narrower, and those that are drawn."""
     walls = {key: desk.sketch.item(key).shape for key in whole(desk.selection).items}
     widths = [shape.width for shape in walls.values() if isinstance(shape, WallObstacle)]
@@ -241,7 +241,7 @@ def widen(desk: Desk, factor: float) -> None:
     desk.say(f"walls are {width:g} m wide")
 
 
-def next_start(desk: Desk) -> None:
+def next_start(desk: Editor) -> None:
     """Show the team at the next start."""
     names = desk.start_names
     if not names:
@@ -253,7 +253,7 @@ def next_start(desk: Desk) -> None:
     desk.say(f"start “{name}”")
 
 
-def make_default(desk: Desk) -> None:
+def make_default(desk: Editor) -> None:
     """Make the selected start the map's default."""
     if len(desk.selection.starts) != 1:
         raise MapError("select one start first")
@@ -261,13 +261,13 @@ def make_default(desk: Desk) -> None:
     desk.change(properties.start_first(desk.sketch, name))
 
 
-def density_weight(desk: Desk) -> float:
+def density_weight(desk: Editor) -> float:
     """Return the weight of what is drawn next with the tool Density."""
     tool = desk.tools["density"]
     return tool.weight if isinstance(tool, DensityTool) else 1.0
 
 
-def fix_problem(desk: Desk) -> None:
+def fix_problem(desk: Editor) -> None:
     """Mend the problem that is shown, or the first that can be."""
     found = [desk.problem] if desk.problem is not None else list(desk.problems)
     for problem in found:
@@ -278,7 +278,7 @@ def fix_problem(desk: Desk) -> None:
     raise MapError("there is nothing that can be mended by itself")
 
 
-def next_problem(desk: Desk) -> None:
+def next_problem(desk: Editor) -> None:
     """Show the next problem with its words."""
     found = desk.problems
     if not found:
@@ -293,7 +293,7 @@ def next_problem(desk: Desk) -> None:
 # values that are typed
 
 
-def _selected(desk: Desk) -> Selection:
+def _selected(desk: Editor) -> Selection:
     selection = whole(desk.selection)
     if not selection:
         raise MapError("nothing is selected: click something first, or press Ctrl A")
@@ -307,7 +307,7 @@ def _whole_number(word: str, text: str) -> int:
         raise MapError(f"{word}: {text!r}, but a whole number was wanted") from None
 
 
-def _set_angle(desk: Desk, text: str) -> None:
+def _set_angle(desk: Editor, text: str) -> None:
     angle = angle_of(text)
     if not 0.1 <= angle <= 90.0:
         raise MapError(f"angle: {angle:g}°, but 0.1° to 90° was wanted")
@@ -315,16 +315,16 @@ def _set_angle(desk: Desk, text: str) -> None:
     desk.say(f"angles snap to multiples of {angle:g}°")
 
 
-def _set_seed(desk: Desk, text: str) -> None:
+def _set_seed(desk: Editor, text: str) -> None:
     desk.seed = max(_whole_number("seed", text), 0)
 
 
-def _edit_to(edit: Callable[..., Change], read: Callable[[str], object]) -> Callable[[Desk, str], None]:
+def _edit_to(edit: Callable[..., Change], read: Callable[[str], object]) -> Callable[[Editor, str], None]:
     """Return what makes an edit of the selected things to a typed value."""
     return lambda desk, text: desk.change(edit(desk.sketch, _selected(desk), read(text)))
 
 
-def _move(desk: Desk, text: str) -> None:
+def _move(desk: Editor, text: str) -> None:
     text = text.strip()
     dx, dy = point_of(text if text[0] in "+@" else f"@{text}", last=(0.0, 0.0))
     selection = desk.selection
@@ -334,14 +334,14 @@ def _move(desk: Desk, text: str) -> None:
     desk.change(act(desk.sketch, selection, dx, dy))
 
 
-def _place(desk: Desk, text: str) -> None:
+def _place(desk: Editor, text: str) -> None:
     selection = _selected(desk)
     bounds = bounds_of(desk.sketch, selection)
     x, y = point_of(text, last=bounds[:2] if bounds else None)
     desk.change(transform.placed(desk.sketch, selection, x, y))
 
 
-def _scale(desk: Desk, text: str) -> None:
+def _scale(desk: Editor, text: str) -> None:
     selection = _selected(desk)
     bounds = bounds_of(desk.sketch, selection)
     if bounds is None:
@@ -350,24 +350,24 @@ def _scale(desk: Desk, text: str) -> None:
     desk.change(transform.scaled(desk.sketch, selection, factor))
 
 
-def _size(desk: Desk, text: str) -> None:
+def _size(desk: Editor, text: str) -> None:
     width, height = size_of(text)
     desk.change(transform.resized(desk.sketch, _selected(desk), width, height))
 
 
-def _name(desk: Desk, text: str) -> None:
+def _name(desk: Editor, text: str) -> None:
     owners = sorted(whole(desk.selection).owners, key=str)
     if len(owners) != 1:
         raise MapError("select one obstacle or start first")
     desk.change(properties.renamed(desk.sketch, owners[0], text))
 
 
-def _offset(desk: Desk, text: str) -> None:
+def _offset(desk: Editor, text: str) -> None:
     sign = -1.0 if text.strip().startswith("-") else 1.0
     desk.change(boolean.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
 
 
-def _set_density(desk: Desk, text: str) -> None:
+def _set_density(desk: Editor, text: str) -> None:
     if text.strip() != "none":
         raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
     desk.change(density_edits.density_removed(desk.sketch))
@@ -380,7 +380,7 @@ def _number(word: str, text: str) -> float:
         raise MapError(f"{word}: {text!r}, but a number was wanted") from None
 
 
-def _array(desk: Desk, text: str) -> None:
+def _array(desk: Editor, text: str) -> None:
     parts = text.replace("x", " ").split()
     if len(parts) != 4:
         raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
@@ -444,8 +444,8 @@ _ROWS: dict[str, tuple[Row, ...]] = {
         Row("quit", "Quit", "ctrl+q"),
     ),
     "Edit": (
-        Row("undo", "Undo", "ctrl+z", Desk.undo, repeats=True),
-        Row("redo", "Redo", "ctrl+y, ctrl+shift+z", Desk.redo, repeats=True),
+        Row("undo", "Undo", "ctrl+z", Editor.undo, repeats=True),
+        Row("redo", "Redo", "ctrl+y, ctrl+shift+z", Editor.redo, repeats=True),
         Row("cut", "Cut", "ctrl+x", cut),
         Row("copy", "Copy", "ctrl+c", copy),
         Row("paste", "Paste at the cursor", "ctrl+v", lambda desk: paste(desk, desk.cursor), repeats=True),
@@ -698,7 +698,7 @@ TYPED: dict[str, Typed] = {
 """What can be typed, each with a value after it."""
 
 
-def run_typed(desk: Desk, text: str) -> None:
+def run_typed(desk: Editor, text: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
     word, rest = parted(text)
     if word not in TYPED:
@@ -711,7 +711,7 @@ def run_typed(desk: Desk, text: str) -> None:
 # the menu at the cursor
 
 
-def offered(desk: Desk) -> list[str]:
+def offered(desk: Editor) -> list[str]:
     """Return the names of the actions that apply to what is selected, with an empty one between groups."""
     selection = desk.selection
     if not selection:
@@ -761,7 +761,7 @@ def offered(desk: Desk) -> list[str]:
     return _tidy(names)
 
 
-def _of_vertices(desk: Desk) -> list[str]:
+def _of_vertices(desk: Editor) -> list[str]:
     selection = desk.selection
     names = ["delete", "bevel", "round"]
     if len(selection.vertices) == 1:

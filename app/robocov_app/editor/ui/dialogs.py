@@ -20,7 +20,7 @@ from robocov_app.viewer.typed import parted
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.render.theme import Theme
     from robocov_app.viewer.layout import Layout
 
@@ -31,7 +31,7 @@ _MOST_LINES = 14
 class Dialogs:
     """Shows what a desk asks, and takes the answers."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Editor) -> None:
         self._desk = desk
         self._boxes: list[tuple[pygame.Rect, int]] = []
         self._drawn: Question | ListQuestion | ImportQuestion | None = None  # what the boxes are of

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from robocov.environment import Point
     from robocov_app.editor.model.background import Background
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Field:
     tip : str
     """
 
-    text: Callable[[Desk], str]
-    take: Callable[[Desk, str], object]
+    text: Callable[[Editor], str]
+    take: Callable[[Editor, str], object]
     tip: str = ""
 
 
@@ -60,7 +60,7 @@ def coordinate(text: str, now: float) -> float:
     )
 
 
-def _corner(desk: Desk) -> Point:
+def _corner(desk: Editor) -> Point:
     """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
     sketch, selection = desk.preview
     if len(selection.vertices) == 1:
@@ -75,7 +75,7 @@ def _corner(desk: Desk) -> Point:
     return bounds[0], bounds[1]
 
 
-def _center(desk: Desk) -> Point | None:
+def _center(desk: Editor) -> Point | None:
     sketch, selection = desk.preview
     if selection.vertices or len(selection.owners) != 1:
         return None
@@ -89,7 +89,7 @@ def _center(desk: Desk) -> Point | None:
     return shape.center if isinstance(shape, CircleObstacle) else None
 
 
-def _put(desk: Desk, axis: int, text: str) -> None:
+def _put(desk: Editor, axis: int, text: str) -> None:
     """Put what is selected at a typed coordinate."""
     now = _corner(desk)
     by = coordinate(text, now[axis]) - now[axis]
@@ -99,13 +99,13 @@ def _put(desk: Desk, axis: int, text: str) -> None:
     desk.change(act(desk.sketch, selection, dx, dy))
 
 
-def _size(desk: Desk, axis: int) -> str:
+def _size(desk: Editor, axis: int) -> str:
     sketch, selection = desk.preview
     bounds = bounds_of(sketch, whole(selection))
     return "" if bounds is None else number(bounds[axis + 2] - bounds[axis])
 
 
-def _resize(desk: Desk, axis: int, text: str) -> None:
+def _resize(desk: Editor, axis: int, text: str) -> None:
     """Give what is selected a typed width or height; the other stays, but of circles."""
     selection = whole(desk.selection)
     bounds = bounds_of(desk.sketch, selection)
@@ -117,7 +117,7 @@ def _resize(desk: Desk, axis: int, text: str) -> None:
     desk.change(transform.resized(desk.sketch, selection, wide or None, high or None))
 
 
-def _shown_name(desk: Desk) -> str:
+def _shown_name(desk: Editor) -> str:
     owners = whole(desk.selection).owners
     if len(owners) != 1:
         return ""
@@ -127,34 +127,34 @@ def _shown_name(desk: Desk) -> str:
     return desk.sketch.item(owner).shape.name or "" if owner in desk.sketch.places else ""
 
 
-def _rename(desk: Desk, text: str) -> None:
+def _rename(desk: Editor, text: str) -> None:
     (owner,) = whole(desk.selection).owners
     if text.strip() != _shown_name(desk):
         desk.change(properties.renamed(desk.sketch, owner, text.strip()))
 
 
-def _shown_note(desk: Desk) -> str:
+def _shown_note(desk: Editor) -> str:
     notes = {desk.sketch.item(key).note for key in desk.selection.items if key in desk.sketch.places}
     return notes.pop() if len(notes) == 1 else ""
 
 
-def _note(desk: Desk, text: str) -> None:
+def _note(desk: Editor, text: str) -> None:
     desk.change(properties.noted(desk.sketch, whole(desk.selection), text.strip()))
 
 
-def _wall_width(desk: Desk) -> str:
+def _wall_width(desk: Editor) -> str:
     shapes = [desk.sketch.item(key).shape for key in desk.selection.items if key in desk.sketch.places]
     widths = {shape.width for shape in shapes if isinstance(shape, WallObstacle)}
     return number(widths.pop()) if len(widths) == 1 else ""
 
 
-def _set_width(desk: Desk, text: str) -> None:
+def _set_width(desk: Editor, text: str) -> None:
     now = _wall_width(desk)
     width = length_of(text, now=float(now) if now else None)
     desk.change(properties.widened(desk.sketch, whole(desk.selection), width))
 
 
-def _radius(desk: Desk) -> str:
+def _radius(desk: Editor) -> str:
     sketch, selection = desk.preview
     for owner in selection.owners:
         if isinstance(owner, str):
@@ -168,19 +168,19 @@ def _radius(desk: Desk) -> str:
     return ""
 
 
-def _set_radius(desk: Desk, text: str) -> None:
+def _set_radius(desk: Editor, text: str) -> None:
     now = _radius(desk)
     radius = length_of(text, now=float(now) if now else None)
     desk.change(properties.sized(desk.sketch, whole(desk.selection), radius))
 
 
-def _picture(desk: Desk) -> Background:
+def _picture(desk: Editor) -> Background:
     if desk.sketch.background is None:
         raise MapError("there is no picture under the map: Ctrl B takes one")
     return desk.sketch.background
 
 
-def _set_scale(desk: Desk, text: str) -> None:
+def _set_scale(desk: Editor, text: str) -> None:
     laid = _picture(desk)
     scale = length_of(text, now=laid.scale)
     if not scale > 0.0:
@@ -188,22 +188,22 @@ def _set_scale(desk: Desk, text: str) -> None:
     desk.change(underlaid(desk.sketch, replace(laid, scale=scale)))
 
 
-def _set_turn(desk: Desk, text: str) -> None:
+def _set_turn(desk: Editor, text: str) -> None:
     desk.change(underlaid(desk.sketch, replace(_picture(desk), turn=angle_of(text))))
 
 
-def _set_opacity(desk: Desk, text: str) -> None:
+def _set_opacity(desk: Editor, text: str) -> None:
     laid = _picture(desk)
     part = min(max(float(text), 0.0), 1.0)
     desk.change(underlaid(desk.sketch, replace(laid, opacity=round(part, 2))), drag="opacity")
 
 
-def _on_picture(desk: Desk, words: Callable[[Background], str]) -> str:
+def _on_picture(desk: Editor, words: Callable[[Background], str]) -> str:
     return words(desk.sketch.background) if desk.sketch.background is not None else ""
 
 
-def _or_empty(text: Callable[[Desk], str]) -> Callable[[Desk], str]:
-    def shown(desk: Desk) -> str:
+def _or_empty(text: Callable[[Editor], str]) -> Callable[[Editor], str]:
+    def shown(desk: Editor) -> str:
         try:
             return text(desk)
         except (MapError, LookupError):

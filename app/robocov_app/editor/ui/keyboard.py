@@ -14,8 +14,8 @@ from robocov_app.viewer.keyboard import key_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.editor.ui.desk import Desk
     from robocov_app.editor.ui.dialogs import Dialogs
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.panel import Panel
     from robocov_app.viewer.overlays import CommandList
 
@@ -30,7 +30,7 @@ class Keyboard(DemoKeyboard):
     """Turns events of the keyboard into actions, or letters for whatever is open."""
 
     def __init__(
-        self, desk: Desk, panel: Panel, palette: CommandList, dialogs: Dialogs, do: Callable[[str], None]
+        self, desk: Editor, panel: Panel, palette: CommandList, dialogs: Dialogs, do: Callable[[str], None]
     ) -> None:
         commands = all_commands()
         repeating = frozenset(command.name for command in commands if command.repeats)

@@ -21,7 +21,7 @@ from robocov_app.viewer.layout import inside
 from robocov_app.viewer.overlays import FLAT, wrapped
 
 if TYPE_CHECKING:
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.render.theme import Theme
     from robocov_app.viewer.layout import Box
 
@@ -40,7 +40,7 @@ class Row(NamedTuple):
 class PanelList(ABC):
     """A list that scrolls."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Editor) -> None:
         self._desk = desk
         self.box: Box = (0, 0, 0, 0)
         self._scale = 1.0

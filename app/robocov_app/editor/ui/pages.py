@@ -14,7 +14,7 @@ from robocov_app.viewer.actions import key_words
 from robocov_app.viewer.pages import GAP, MARGIN, WIDE, columns
 
 if TYPE_CHECKING:
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.viewer.widgets import Widgets
 
 ROW = 29
@@ -43,7 +43,7 @@ _FACT_TIPS = {
 
 
 def field(
-    widgets: Widgets, desk: Desk, name: str, place: tuple[float, float, float], word: str, unit: str = ""
+    widgets: Widgets, desk: Editor, name: str, place: tuple[float, float, float], word: str, unit: str = ""
 ) -> None:
     """Make a field with a word before it and its unit after it; what is typed goes to the desk."""
     x, y, wide = place
@@ -57,7 +57,7 @@ def field(
         widgets.label(unit, widgets.rect(x + wide - after + 5, y, after, 26), style="#unit")
 
 
-def map_page(widgets: Widgets, desk: Desk, top: float) -> None:
+def map_page(widgets: Widgets, desk: Editor, top: float) -> None:
     """Name and description, what the map is like, robots and starts."""
 
     def build(bar: float) -> None:
@@ -102,7 +102,7 @@ def map_page(widgets: Widgets, desk: Desk, top: float) -> None:
     widgets.page("map", top, 2 * ROW + 4 + 20 * len(FACTS) + 6 + 20 + ROW + 4 + 20 + 30 + 22, build)
 
 
-def object_kind(desk: Desk) -> str:
+def object_kind(desk: Editor) -> str:
     """Return what kind of thing is selected, on which it depends what the page offers."""
     selection = desk.selection
     if not selection:
@@ -139,7 +139,7 @@ OBJECT_HEIGHTS = {
 """Pixels at scale 1 that the page's widgets are high; below them is the list of vertices."""
 
 
-def object_page(widgets: Widgets, desk: Desk, top: float) -> None:
+def object_page(widgets: Widgets, desk: Editor, top: float) -> None:
     """What is selected: its name, place and size, typed; and what can be done with it."""
     kind = object_kind(desk)
 
@@ -228,7 +228,7 @@ def _buttons(widgets: Widgets, kind: str, y: float, wide: float) -> None:
         y += 30
 
 
-def snap_page(widgets: Widgets, desk: Desk, top: float) -> None:
+def snap_page(widgets: Widgets, desk: Editor, top: float) -> None:
     """What is snapped to, what is shown, and the picture under the map."""
     keys = {action.name: action for action in all_commands()}
 
@@ -302,7 +302,7 @@ def history_page(widgets: Widgets, top: float) -> None:
     widgets.page("history", top, 34, build)
 
 
-def facts(desk: Desk) -> dict[str, str]:
+def facts(desk: Editor) -> dict[str, str]:
     """Return what the map page says of the map."""
     sketch, measurement = desk.sketch, desk.measurement
     said = dict.fromkeys(FACTS, "…")
@@ -325,7 +325,7 @@ def facts(desk: Desk) -> dict[str, str]:
     return said
 
 
-def object_words(desk: Desk) -> str:
+def object_words(desk: Editor) -> str:
     """Return what the object page is about."""
     selection = desk.selection
     if not selection:

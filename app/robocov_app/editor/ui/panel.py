@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     import pygame
 
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.render.theme import Theme
     from robocov_app.viewer.layout import Box
     from robocov_app.viewer.widgets import Widgets
@@ -43,7 +43,7 @@ class Panel(Paged):
     tabs = TABS
     tab_widths = (44, 56, 46, 72, 54)
 
-    def __init__(self, desk: Desk, do: Callable[[str], None]) -> None:
+    def __init__(self, desk: Editor, do: Callable[[str], None]) -> None:
         super().__init__(desk, all_commands(), do)
         self.desk = desk
         self.vertices, self.things, self.problems = VertexList(desk), ThingList(desk), ProblemList(desk)

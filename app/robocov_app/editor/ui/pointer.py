@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov_app.editor.canvas.arena import Arena
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.panel import Panel
     from robocov_app.viewer.layout import Box
 
@@ -38,7 +38,7 @@ class Pointer(Mouse):
     """Turns events of the mouse into what panel, sheet and tools do."""
 
     def __init__(
-        self, desk: Desk, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
+        self, desk: Editor, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
     ) -> None:
         super().__init__(panel)
         self._desk, self._arena, self._menu = desk, arena, menu

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from robocov_app.editor.tools.tool import place_words
 
 if TYPE_CHECKING:
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.team import Team
 
 HINT = "F5 try it · F1 keys"
 
 
-def hovered_words(desk: Desk) -> str:
+def hovered_words(desk: Editor) -> str:
     """Return what is noted about what the cursor is on."""
     owner = desk.selector.hovered
     if desk.tool is not desk.selector or not isinstance(owner, int) or owner not in desk.sketch.places:
@@ -22,7 +22,7 @@ def hovered_words(desk: Desk) -> str:
     return f"{item.shape.name or 'note'}: {item.note}" if item.note else ""
 
 
-def facts(desk: Desk, frames: float, team: Team | None) -> list[str]:
+def facts(desk: Editor, frames: float, team: Team | None) -> list[str]:
     """Return what the line says, the most important first."""
     said = [f"{desk.tool.title}: {desk.tool.hint}" if desk.tool is not desk.selector else ""]
     if desk.cursor is not None:

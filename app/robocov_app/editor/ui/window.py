@@ -15,14 +15,14 @@ from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.ui.commands import GROUPS, all_commands, offered, told_commands
 from robocov_app.editor.ui.dialogs import Commands, Dialogs, Menu
-from robocov_app.editor.ui.documents import Documents
+from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.editor.ui.keyboard import Keyboard
 from robocov_app.editor.ui.panel import TABS, Panel
+from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
 from robocov_app.editor.ui.pointer import Pointer
 from robocov_app.editor.ui.status import HINT, facts
 from robocov_app.editor.ui.team import TeamThread
-from robocov_app.editor.ui.trying import Trial, begun, brought_back
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
 
 _SELDOM = 0.1
 """Seconds after which the panel looks at its widgets also while nobody is near."""
@@ -57,16 +57,16 @@ class EditorWindow:
     """Shows a desk and lets it be touched."""
 
     def __init__(
-        self, desk: Desk, size: tuple[int, int], scale: float, drafts: Path | None, *, patient: bool = False
+        self, desk: Editor, size: tuple[int, int], scale: float, drafts: Path | None, *, patient: bool = False
     ) -> None:
         self.desk, self.scale = desk, scale
         self.closed = False
         self.help = False
-        self.trial: Trial | None = None
+        self.trial: PlayWindow | None = None
         self.windowed: tuple[int, int] | None = None
         self.screen = shown(size)
         self.arena = Arena(desk)
-        self.documents = Documents(desk, drafts, self.arena.fit, patient=patient)
+        self.documents = FileCommands(desk, drafts, self.arena.fit, patient=patient)
         self.panel = Panel(desk, self.do)
         self.palette = Commands()
         self.dialogs = Dialogs(desk)

@@ -1,4 +1,4 @@
-"""Documents opened, saved and left, with the questions that have to be asked. Knows no pygame."""
+"""FileCommands opened, saved and left, with the questions that have to be asked. Knows no pygame."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov_app.editor.model.autosave import Autosave
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.importers import Importer
 
 _PATIENCE = 2.0
@@ -33,11 +33,11 @@ _PATIENCE = 2.0
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
 
-class Documents:
+class FileCommands:
     """What can be done with whole documents."""
 
     def __init__(
-        self, desk: Desk, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
+        self, desk: Editor, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
     ) -> None:
         self.desk, self.drafts, self._fit, self._patient = desk, drafts, fit, patient
         self.leaving = False
@@ -305,7 +305,7 @@ class Documents:
         self._fit()
 
 
-def lay_under(desk: Desk, path: Path) -> None:
+def lay_under(desk: Editor, path: Path) -> None:
     """Put a picture under the map, as wide as the map is, or 20 m."""
     from PIL import Image, UnidentifiedImageError
 

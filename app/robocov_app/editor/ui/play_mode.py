@@ -22,13 +22,13 @@ from robocov_app.viewer.window import Window
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from robocov_app.editor.ui.desk import Desk
+    from robocov_app.editor.ui.editor import Editor
     from robocov_app.viewer.costs import Costs
 
 BACK = ("f5",)
 
 
-class TrialDesk(DemoDesk):
+class PlayPresenter(DemoDesk):
     """The demo's desk, which knows whether the map is still the one that is tried.
 
     Attributes
@@ -57,7 +57,7 @@ class TrialDesk(DemoDesk):
         return list(dict.fromkeys([self._title, *super().maps()]))
 
 
-class Trial(Window):
+class PlayWindow(Window):
     """The demo's window, out of which F5 and Escape lead back.
 
     Attributes
@@ -68,10 +68,10 @@ class Trial(Window):
         The key that began it, until it comes up: its repeated presses are none of their own.
     """
 
-    desk: TrialDesk
+    desk: PlayPresenter
     hint = "F5 back to the editor · F1 keys"
 
-    def __init__(self, desk: TrialDesk, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
+    def __init__(self, desk: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
         self.ended = False
         self.held: int | None = None
         super().__init__(desk, screen.get_size(), scale, patient=patient, screen=screen)
@@ -96,7 +96,7 @@ class Trial(Window):
         super().do(name)
 
 
-def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) -> Trial:
+def begun(desk: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
     """Return the demo on the map of a desk, with its team at its start."""
     environment = desk.sketch.environment()
     name = desk.start_name if desk.start_name in environment.starts else None
@@ -109,9 +109,9 @@ def begun(desk: Desk, screen: pygame.Surface, scale: float, *, patient: bool) ->
     costs: Costs = Costs(LATTICE, direct=True) if patient else Costs(LATTICE)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
-        demo = TrialDesk(session, costs, shown, desk.folder, desk.document.title)
+        demo = PlayPresenter(session, costs, shown, desk.folder, desk.document.title)
         demo.theme = desk.theme
-        trial = Trial(demo, screen, scale, patient=patient)
+        trial = PlayWindow(demo, screen, scale, patient=patient)
     except BaseException:
         costs.close()
         raise

@@ -16,8 +16,8 @@ from robocov_app.editor.tools.snapping import KINDS
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui import commands
 from robocov_app.editor.ui.commands import GROUPS, TYPED, all_commands, offered, run_typed, told_commands
-from robocov_app.editor.ui.desk import GRIDS
 from robocov_app.editor.ui.dialogs import Commands
+from robocov_app.editor.ui.editor import GRIDS
 from robocov_app.editor.ui.fields import FIELDS, coordinate
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, EditorSettings, kinds_of
 from robocov_app.render.picture import standard_layers

@@ -11,8 +11,8 @@ from robocov_app.editor.model.autosave import opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.ui.asking import Answer, Question
-from robocov_app.editor.ui.desk import Desk
-from robocov_app.editor.ui.documents import heading, lay_under, opened
+from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
 from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
 from robocov_app.toolkit.autosave import autosave_folder, discard
@@ -92,9 +92,9 @@ class EditorOpening:
         finally:
             readings.close()
 
-    def _desk(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Desk:
+    def _desk(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Editor:
         pasteboard = OwnPasteboard() if self.headless else SystemPasteboard()
-        desk = Desk(document, readings, pasteboard, self.folder)
+        desk = Editor(document, readings, pasteboard, self.folder)
         desk.theme = self.theme or settings.theme
         desk.shown = set(settings.shown) & set(SHOWN)
         desk.snaps = set(settings.snaps) & set(SNAPS)
@@ -106,7 +106,7 @@ class EditorOpening:
             desk.choose("picture", tell=False)
         return desk
 
-    def _opened(self, desk: Desk, settings: EditorSettings, drafts: Path | None) -> EditorWindow:
+    def _opened(self, desk: Editor, settings: EditorSettings, drafts: Path | None) -> EditorWindow:
         from robocov_app.editor.ui.window import EditorWindow
 
         size = self.size or (settings.width, settings.height)

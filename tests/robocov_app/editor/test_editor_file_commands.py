@@ -1,4 +1,4 @@
-"""Documents opened, saved and left, with all the questions; and how the editor is opened."""
+"""FileCommands opened, saved and left, with all the questions; and how the editor is opened."""
 
 import json
 import time
@@ -22,7 +22,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.asking import FileQuestion, Picker, Question
 from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.importing import ImportQuestion
-from robocov_app.editor.ui.opening import EditorOpening, offer
+from robocov_app.editor.ui.launch import EditorOpening, offer
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.toolkit.settings import FOLDER
 

@@ -10,7 +10,7 @@ from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
 from robocov_app.editor.edits import properties
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.trying import brought_back
+from robocov_app.editor.ui.play_mode import brought_back
 
 PILLAR = CircleObstacle((7, 7), 1.0)
 

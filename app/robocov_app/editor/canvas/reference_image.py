@@ -21,7 +21,7 @@ _LARGEST_SHOWN = 8192
 """Pixels of a side of what is made of it at most."""
 
 
-class Underlaid:
+class ReferenceImage:
     """Keeps the picture that was loaded last, and draws it."""
 
     def __init__(self) -> None:

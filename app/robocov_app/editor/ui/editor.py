@@ -57,7 +57,7 @@ class Pasteboard(Protocol):
         """Return the text that is there, empty if none is."""
 
 
-class Desk:
+class Editor:
     """What the user does, and what of it is shown.
 
     Attributes
