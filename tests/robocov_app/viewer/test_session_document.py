@@ -122,6 +122,30 @@ def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
     session.enter(*here)
 
 
+@pytest.mark.parametrize("how", ["undo", "branch", "touch"])
+def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> None:
+    """What is left of the drag is played as it was; who touches something there has let go."""
+    session = stepped(begun(RAPF), 5)
+    session.playing = True
+    for k in range(60):
+        session.grab(2, (1.0 + k / 20, 2.0))
+        session.advance(1 / 60)
+    session.release()
+    session.look_at(0.5)
+    if how == "branch":
+        session.branch()
+    else:
+        session.fail_robot(1)
+        stepped(session, 5)
+    if how == "undo":
+        session.undo()
+    stepped(session, 80)
+    assert session.hand is None
+    twin = again(session)
+    for mine, theirs in zip(positions_of(twin), positions_of(session), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
 def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -> None:
     conditions = Conditions(
         loss=0.2,

@@ -340,6 +340,9 @@ class Session:
 
     def _advance(self) -> None:
         self.head.happenings.update(self._run.advance())
+        for when, change in self.head.changes:
+            if when == self._run.step:  # it goes on amid a touch that lasted, as a drag
+                self._run.apply(change)
         self.head.end = max(self.head.end, self._run.step)
         self.history.add(self._run.moment(self.head.number))
         if self._script:
@@ -373,7 +376,7 @@ class Session:
         if self.head not in self._script:
             self._script = []
             return
-        todo = [change for when, change in self.head.changes if when == step and when > self.head.begin]
+        todo: list[Change] = []
         for node in self._script[self._script.index(self.head) + 1 :]:
             if node.at != step:
                 break
@@ -576,11 +579,15 @@ class Session:
         """
         self.finish_remaking()
         self._script = []
+        let_go = False
         if self._cursor is None:
             self._run.apply(change)
         else:
             moment, history = self.history[self._cursor], self.history.until(self._cursor)
-            self._take_over(Lockstep.resumed(moment), moment.node, history, change)
+            resumed = Lockstep.resumed(moment)
+            let_go = resumed.hand is not None and not isinstance(change, (Drag, Release))
+            resumed.hand = None if let_go else resumed.hand
+            self._take_over(resumed, moment.node, history, change)
         run = self._run
         if (
             gesture is not None
@@ -595,6 +602,8 @@ class Session:
             head.kind, head.words = kind, words
         else:
             self.head = self.document.add(self.head, run.step, kind, words, change)
+            if let_go:  # of what was dragged at that moment of the past
+                self.head.changes.insert(0, (run.step, Release()))
         self._gesture = None if gesture is None else (gesture, self.end)
         self.revision += 1
         self._ghosts = None
