@@ -152,6 +152,19 @@ def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> No
     assert not hands.window.panel.typing and hands.sketch.name == "Untitled"
 
 
+def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:
+    hands.desk.change(circle_drawn(hands.sketch, (5, 5), 0.2))
+    drawn = hands.sketch
+    hands.turn("map")
+    hands.write("title", "ab")
+    field = hands.widget("entry", "title")
+    texts = [field.get_text()]
+    for key in ("ctrl+z", "ctrl+z", "ctrl+z", "ctrl+y", "ctrl+y"):
+        hands.key(key)
+        texts.append(field.get_text())
+    assert texts == ["ab", "a", "Untitled", "Untitled", "a", "ab"] and hands.sketch is drawn
+
+
 def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
     for radius in (0.2, 0.3, 0.4):
         hands.desk.change(circle_drawn(hands.sketch, (5, 5), radius))

@@ -35,7 +35,10 @@ class Keyboard(DemoKeyboard):
         commands = all_commands()
         repeating = frozenset(command.name for command in commands if command.repeats)
         super().__init__(self, panel, palette, commands, do, repeating)
-        self._editor, self._dialogs = desk, dialogs
+        self._editor, self._dialogs, self._page = desk, dialogs, panel
+        self._field: object = None  # the one whose former texts are known
+        self._undone: list[str] = []
+        self._texts: list[str] = []
 
     def attempt(self, action: Callable[[], object]) -> None:
         """Do something; what cannot be done is told, in a sentence."""
@@ -66,9 +69,32 @@ class Keyboard(DemoKeyboard):
             event, name
         ):
             return
+        if not self._palette.open and self._field_takes(name):
+            return
         super()._pressed(event)
         if self._dialogs.open:
             self._dialogs.opened_by(event.unicode)
+
+    def _field_takes(self, name: str) -> bool:
+        """Undo or redo what was typed into a field; say whether the key was for that."""
+        field = self._page.widgets.typed_into if self._page.widgets is not None else None
+        if field is not self._field:
+            self._field, self._texts, self._undone = field, [], []
+        if field is None:
+            return False
+        now = field.get_text()
+        back = name == "ctrl+z"
+        if back or name in ("ctrl+y", "ctrl+shift+z"):
+            source, other = (self._texts, self._undone) if back else (self._undone, self._texts)
+            while source and source[-1] == now:
+                source.pop()
+            if source:
+                other.append(now)
+                field.set_text(source.pop())
+            return True
+        if not self._texts or self._texts[-1] != now:
+            self._texts.append(now)
+        return False
 
     def _number(self, event: pygame.event.Event, name: str) -> bool:
         """Take a key for the number that is typed while something is drawn; say whether it was one."""
