@@ -70,6 +70,7 @@ def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
 
 @pytest.mark.parametrize("size", [None, (720, 400), (900, 600), (2560, 1440)])
 @pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.slow
 def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
     figure = plot_coverage(
         curves(count), [moment_of(HALL, seed=k) for k in range(count)], size=size, times=curves(count)

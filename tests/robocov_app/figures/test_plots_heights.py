@@ -29,7 +29,9 @@ def test_the_best_place_at_a_height() -> None:
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-@pytest.mark.parametrize("scale", [0.01, 1.0, 30.0])
+@pytest.mark.parametrize(
+    "scale", [pytest.param(0.01, marks=pytest.mark.slow), 1.0, pytest.param(30.0, marks=pytest.mark.slow)]
+)
 def test_the_plot_shows_the_path_in_its_frame(theme, scale) -> None:
     ring = [(scale * x, scale * y) for x, y in PENTAGON]
     figure = plot_heights(ring, theme, size=(900, 380))

@@ -143,6 +143,7 @@ def test_fifty_long_runs_of_large_teams_do_as_well() -> None:
     assert page.shown == (50,) and len(page.html.encode()) < 3_000_000
 
 
+@pytest.mark.slow
 def test_several_results_are_sections_that_share_nothing() -> None:
     one = watched([entry(), entry("rpf", final=3.0)])
     other = watched([entry("lloyd", map_name="hall")], HALL)

@@ -49,6 +49,7 @@ def test_what_tells_nothing_is_left_out() -> None:
     assert "Connectivity" in plots_of([apart])
 
 
+@pytest.mark.slow
 def test_the_mean_time_is_there_where_it_is_known_of_all() -> None:
     assert "Time to come" in plots_of([run_of(timed=True), run_of("rpf", timed=True)])
     assert "Time to come" not in plots_of([run_of(timed=True), run_of("rpf")])
