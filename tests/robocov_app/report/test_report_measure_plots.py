@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from reported_results import entry, falling, result_of, walk
 
 from robocov.metrics import CostHistory
