@@ -11,18 +11,22 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov_app.editor.canvas.findings import Hatching, badge_places, draw_gap, draw_problems, tag_gap
-from robocov_app.editor.canvas.handles import (
+from robocov_app.editor.canvas.overlay import (
+    Hatching,
     accent,
+    badge_places,
     draw_box,
+    draw_gap,
     draw_ghost,
     draw_grips,
     draw_guides,
     draw_outline,
     draw_path,
     draw_preview,
+    draw_problems,
     draw_start,
     draw_typed,
+    tag_gap,
 )
 from robocov_app.editor.canvas.sheet import Sheet, View
 from robocov_app.editor.canvas.strips import Strips

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov_app.editor.canvas.findings import legend_entries
+from robocov_app.editor.canvas.overlay import legend_entries
 from robocov_app.editor.canvas.sheet import beyond
 from robocov_app.render.annotations import (
     EDGE,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pygame
 
-from robocov_app.editor.canvas.findings import draw_badge
+from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits.fixes import TITLES
 from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
