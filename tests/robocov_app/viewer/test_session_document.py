@@ -146,6 +146,18 @@ def test_a_run_that_goes_on_amid_a_drag_is_made_again_bit_for_bit(how: str) -> N
         np.testing.assert_array_equal(mine, theirs)
 
 
+def test_all_of_a_gesture_while_paused_is_kept() -> None:
+    """Dabs add up; robots that were slowed down by a limit do not become faster with the next."""
+    session = stepped(begun(RAPF), 25)
+    for speed in (1.0, 0.05, 1.0):
+        session.set_limits(Limits(max_speed=speed, radius=0.11))
+    for x in (1.0, 2.0, 3.0):
+        session.paint(((x, 2.0),), 0.7, lowers=False, stroke=1)
+    stepped(session, 20)
+    for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
 def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -> None:
     conditions = Conditions(
         loss=0.2,

@@ -596,7 +596,8 @@ class Session:
             and (kind == "hand" or self.end - self._gesture[1] < _SLIDE)
         ):
             head, last = self.head, self.head.changes[-1]
-            if last[0] == run.step and type(last[1]) is type(change) and len(head.changes) > 1:
+            both_pull = isinstance(change, Drag) and isinstance(last[1], Drag)
+            if both_pull and last[0] == run.step and len(head.changes) > 1:  # other changes add up
                 head.changes.pop()
             head.changes.append((run.step, change))
             head.kind, head.words = kind, words
