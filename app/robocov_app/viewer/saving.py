@@ -45,6 +45,7 @@ class RunSaver:
     def __init__(self, lattice: int = LATTICE) -> None:
         self._lattice = lattice
         self._jobs: list[_Job] = []
+        self._said: list[Said] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
         """Begin to save the story up to the present in a new folder; return what to tell.
@@ -69,37 +70,43 @@ class RunSaver:
 
     def poll(self) -> list[Said]:
         """Return what is to be told since the last call."""
-        said = []
         for job in [job for job in self._jobs if job.process.poll() is not None]:
-            self._jobs.remove(job)
-            job.errors.seek(0)
-            lines = job.errors.read().decode(errors="replace").strip().splitlines()
-            job.errors.close()
-            job.temporary.cleanup()
-            if job.process.returncode == 0:
-                said.append(Said(f"run saved: {job.target}/ (record, cost, pictures)", trouble=False))
-            else:
-                reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
-                with suppress(OSError):
-                    job.target.rmdir()  # fails, as it should, where there is something in it
-                said.append(Said(f"run not saved: {job.target}/: {reason}", trouble=True))
+            self._end(job)
+        said, self._said = self._said, []
         return said
 
     def finish(self) -> None:
         """Wait until all is saved; after Ctrl-C what is being saved stays as it is."""
-        for k, job in enumerate(self._jobs):
-            try:
-                job.process.wait(0.5)
-            except subprocess.TimeoutExpired:
-                if k == 0:
-                    sys.stderr.write("saving runs; Ctrl-C gives up\n")
+        try:
+            for k, job in enumerate(self._jobs):
                 try:
+                    job.process.wait(0.5)
+                except subprocess.TimeoutExpired:
+                    if k == 0:
+                        sys.stderr.write("saving runs; Ctrl-C gives up\n")
                     job.process.wait()
-                except BaseException:
-                    for each in self._jobs:
-                        each.process.kill()
-                        each.process.wait()
-                    raise
+        except BaseException:
+            for job in self._jobs:
+                job.process.kill()
+                job.process.wait()
+            raise
+        finally:
+            for job in self._jobs[:]:
+                self._end(job)
+
+    def _end(self, job: _Job) -> None:
+        """Note how a job went, and clear up after it."""
+        self._jobs.remove(job)
+        with job.errors as errors, job.temporary:
+            errors.seek(0)
+            lines = errors.read().decode(errors="replace").strip().splitlines()
+        if job.process.returncode == 0:
+            self._said.append(Said(f"run saved: {job.target}/ (record, cost, pictures)", trouble=False))
+            return
+        reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
+        with suppress(OSError):
+            job.target.rmdir()  # fails, as it should, where there is something in it
+        self._said.append(Said(f"run not saved: {job.target}/: {reason}", trouble=True))
 
 
 def own_controllers(document: Document) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from touched_run import HALL, LLOYD, RAPF, begun, stepped, with_curves
 from robocov.environment import CircleObstacle
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.session import Session
@@ -126,3 +128,14 @@ def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: py
         session.advance(1 / 60)
     assert session.at_end_of_record and not session.playing, "it stops where the story does"
     assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
+
+
+def test_a_run_is_saved_by_another_process_and_nothing_else_stays(tmp_path: Path) -> None:
+    saver = RunSaver(16)
+    words = saver.save(played(), tmp_path)
+    assert words == f"saving the run: {tmp_path / 'hall-comparison-1'}/" and saver.poll() == []
+    saver.finish()
+    (said,) = saver.poll()
+    assert said.words.startswith("run saved: ") and not said.trouble
+    assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
+    assert not list(Path(tempfile.gettempdir()).glob("robocov-*/session.robocov"))
