@@ -11,10 +11,11 @@ from robocov_app.editor.model.autosave import opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.ui.asking import Answer, Question
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.editor import Editor, Pasteboard
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
-from robocov_app.editor.ui.pasteboard import OwnPasteboard, SystemPasteboard
+from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
+from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.autosave import autosave_folder, discard
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.viewer.opening import display, fitting, screen_scale
@@ -93,7 +94,7 @@ class EditorOpening:
             readings.close()
 
     def _desk(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Editor:
-        pasteboard = OwnPasteboard() if self.headless else SystemPasteboard()
+        pasteboard: Pasteboard = OwnPasteboard() if self.headless else clipboard
         desk = Editor(document, readings, pasteboard, self.folder)
         desk.theme = self.theme or settings.theme
         desk.shown = set(settings.shown) & set(SHOWN)
