@@ -13,7 +13,9 @@ from touched_run import HALL, RAPF, begun
 
 from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.ui import Shown
+from robocov_app.viewer.commands import desk_commands, parameter_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.opening import display
@@ -66,6 +68,29 @@ def opened(
         yield driver
         driver.window.close()
         driver.window.keeper.finish()
+
+
+def key_event(name: str) -> dict[str, Any]:
+    """Return what an event tells of a key, by its name in the list of commands."""
+    plus = name == "+" or name.endswith("++")
+    *held, last = [*name[:-1].split("+"), "+"] if plus else name.split("+")
+    text = last if len(last) == 1 and "ctrl" not in held else ""
+    mod = sum(MODIFIERS[each] for each in held if each)
+    return {"key": KEYS.get(last) or pygame.key.key_code(last), "mod": mod, "unicode": text, "scancode": 0}
+
+
+def listed(desk: Desk) -> Commands:
+    """Return a desk's commands without a window."""
+    titles = {layer.name: layer.title for layer in standard_layers()}
+    return Commands(desk_commands(desk, titles), desk.attempt, lambda: parameter_commands(desk))
+
+
+def do(desk: Desk, name: str) -> None:
+    listed(desk).do(name)
+
+
+def typed(desk: Desk, text: str) -> None:
+    listed(desk).typed(text)
 
 
 class Driver:
@@ -149,16 +174,12 @@ class Driver:
 
     def key(self, name: str, times: int = 1) -> None:
         """Press a key as the list of actions calls it: ``ctrl+shift+z``."""
-        plus = name == "+" or name.endswith("++")
-        *held, last = [*name[:-1].split("+"), "+"] if plus else name.split("+")
-        mod = sum(MODIFIERS[each] for each in held if each)
-        code = KEYS.get(last) or pygame.key.key_code(last)
-        text = last if len(last) == 1 and "ctrl" not in held else ""
+        what = key_event(name)
         for _ in range(times):
-            self.post(pygame.KEYDOWN, key=code, mod=mod, unicode=text, scancode=0)
-            if text:
-                self.post(pygame.TEXTINPUT, text=text)
-            self.post(pygame.KEYUP, key=code, mod=mod, unicode=text, scancode=0)
+            self.post(pygame.KEYDOWN, **what)
+            if what["unicode"]:
+                self.post(pygame.TEXTINPUT, text=what["unicode"])
+            self.post(pygame.KEYUP, **what)
             self.settle()
 
     def type(self, text: str) -> None:

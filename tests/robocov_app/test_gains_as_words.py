@@ -177,10 +177,10 @@ def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
         driver.push("target:median")
         assert target() == "median" and driver.session.events[-1].text.endswith("target = median")
         assert chosen("median") and not chosen("centroid")
-        driver.desk.attempt(lambda: driver.desk.command("target sens"))
+        driver.desk.attempt(lambda: driver.window.commands.typed("target sens"))
         driver.settle()
         assert target() == "sensing" and chosen("sensing")
-        driver.desk.attempt(lambda: driver.desk.command("target 3"))
+        driver.desk.attempt(lambda: driver.window.commands.typed("target 3"))
         assert driver.desk.trouble and "one of centroid, sensing, median" in driver.desk.message
         driver.push("reset:target")
         assert target() == "centroid"

@@ -30,6 +30,7 @@ from robocov_app.toolkit.ui import TEXT, Ui
 ROWS = 9
 """Lines of a list that are in sight."""
 
+_NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 _MOST_LINES = 14
 _MARGIN = 20.0
 
@@ -287,15 +288,21 @@ class Dialogs:
         self._ui: Ui | None = None
         self._high = 0.0
         self._swallow = ""
+        self._early: list[pygame.event.Event] = []
 
     @property
     def open(self) -> bool:
         """Whether something is asked."""
         return self.asked is not None
 
-    def ask(self, dialog: Dialog, opened_by: str = "") -> None:
-        """Ask something; the letter of the key that opened it is not meant for it."""
-        self.asked, self._ui, self._swallow = dialog, None, opened_by
+    def ask(self, dialog: Dialog) -> None:
+        """Ask something."""
+        self.asked, self._ui, self._swallow = dialog, None, ""
+        self._early.clear()
+
+    def swallow(self, letter: str) -> None:
+        """Take note that the letter of the key that has opened it is still to come, and not meant for it."""
+        self._swallow = letter if self.open else ""
 
     def close(self) -> None:
         """Give up what is asked."""
@@ -308,8 +315,9 @@ class Dialogs:
         asked, ui = self.asked, self._ui
         if asked is None:
             return False
-        if ui is None:
-            return True
+        if ui is None:  # it has not been seen yet
+            self._early.append(event)
+            return event.type not in _NOT_OURS
         ui.stale = True
         if event.type == pygame.TEXTINPUT and self._swallow:
             swallowed, self._swallow = self._swallow, ""
@@ -326,7 +334,7 @@ class Dialogs:
             ui.take(event)
         if asked.done and self.asked is asked:
             self.asked = None
-        return event.type not in (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
+        return event.type not in _NOT_OURS
 
     def _key(self, asked: Dialog, ui: Ui, event: pygame.event.Event) -> None:
         name, self._swallow = key_of(event), ""
@@ -360,6 +368,12 @@ class Dialogs:
             top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
             ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
             ui._run(None, None)
+        if self._early:
+            early, self._early = self._early, []
+            for event in early:
+                self.take(event)
+            if self.asked is not asked:
+                return
         card(screen, ui.box, theme, scale)
         ui.stale = True
         ui.draw(screen)

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import pygame
 
-from robocov_app.viewer.actions import REPEATING
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
@@ -66,7 +64,7 @@ class Keyboard:
         palette: CommandList,
         actions: Iterable[Action],
         do: Callable[[str], None],
-        repeating: frozenset[str] = REPEATING,
+        repeating: frozenset[str] = frozenset(),
     ) -> None:
         self._desk, self._panel, self._palette, self._do = desk, panel, palette, do
         self._keys = {key: action.name for action in actions for key in action.keys}

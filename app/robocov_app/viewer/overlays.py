@@ -13,8 +13,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import mix
-from robocov_app.viewer.actions import all_actions, key_words, matching
-from robocov_app.viewer.typed import COMMAND_WORDS, parted
+from robocov_app.viewer.actions import key_words, matching
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -23,12 +22,9 @@ if TYPE_CHECKING:
     from robocov_app.viewer.actions import Action
     from robocov_app.viewer.layout import Layout
     from robocov_app.viewer.lessons import LessonPlayer
-    from robocov_app.viewer.presenter import Desk
 
 FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
 """For strokes and words that are placed in pixels alone."""
-
-_GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
 
 
 def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]:
@@ -102,12 +98,6 @@ def draw_message(screen: pygame.Surface, desk: Saying, layout: Layout, theme: Th
     for k, line in enumerate(lines):
         picture = label(line, size, theme.ink)
         screen.blit(picture, picture.get_rect(center=(box.centerx, round(box.top + (16 + 18 * k) * scale))))
-
-
-def draw_help(screen: pygame.Surface, layout: Layout, theme: Theme, titles: dict[str, str]) -> None:
-    """Show all keys, in columns."""
-    hint = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
-    draw_keys(screen, layout, theme, all_actions(titles), _GROUPS, hint)
 
 
 def draw_keys(
@@ -254,21 +244,6 @@ class CommandList:
             y += row
         hint = label("↑ ↓ choose · Enter does it · Esc closes", round(11 * scale), theme.faint)
         screen.blit(hint, hint.get_rect(midbottom=(box.centerx, box.bottom - round(9 * scale))))
-
-
-class Palette(CommandList):
-    """The demo's commands by name; or a command such as ``k_rep 0.5``."""
-
-    def __init__(self, desk: Desk, titles: dict[str, str]) -> None:
-        ghost = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
-        super().__init__(all_actions(titles), ghost)
-        self._desk = desk
-
-    def is_command(self) -> bool:
-        """Whether what is typed is a command with a value, not the name of an action."""
-        word, value = parted(self.text)
-        names = {each.name.removeprefix("team.") for each in self._desk.parameters()} | set(COMMAND_WORDS)
-        return bool(value) and word in names
 
 
 def draw_caption(

@@ -13,9 +13,9 @@ from robocov.errors import ParameterError
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.overlay import FLAT
 from robocov_app.toolkit.ui import SMALL, Ui
-from robocov_app.viewer.actions import all_actions, key_words
 from robocov_app.viewer.inspector import NOTHING, Line, Report
 from robocov_app.viewer.layout import Layout
 from robocov_app.viewer.parameters import Parameter, Pick
@@ -43,7 +43,7 @@ _KEPT = (
     (("◀ Branch", "branch:previous"), ("Branch ▶", "branch:next")),
     (("Undo", "undo"), ("Redo", "redo")),
     (("Keys", "help"), ("Commands…", "palette")),
-    (("Guided tour", "tour"), ("Full screen", "fullscreen")),
+    (("Lesson", "tour"), ("Full screen", "fullscreen")),
 )
 
 _ASKED_AGAIN = 0.25
@@ -60,8 +60,9 @@ class Panel:
     desk : Desk
     titles : dict of name to title
         Of the layers.
+    commands : Commands
     do : callable
-        Does an action by its name.
+        Does a command by its name.
 
     Attributes
     ----------
@@ -73,12 +74,10 @@ class Panel:
         What the inspector says of the robot that is asked about.
     """
 
-    def __init__(self, desk: Desk, titles: dict[str, str], do: Callable[[str], None]) -> None:
-        self.desk, self.titles, self._do = desk, titles, do
-        self.tips = {}
-        for action in all_actions(titles):
-            keys = " or ".join(key_words(key) for key in action.keys)
-            self.tips[action.name] = f"{action.title} ({keys})" if keys else action.title
+    def __init__(
+        self, desk: Desk, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
+    ) -> None:
+        self.desk, self.titles, self._commands, self._do = desk, titles, commands, do
         self.tab = TABS[0]
         self.covered = self.hidden = False
         self.report: Report | None = None
@@ -147,7 +146,7 @@ class Panel:
         pages[self.tab](ui)
 
     def _does(self, ui: Ui, text: str, action: str, *, chosen: bool = False, small: bool = False) -> None:
-        if ui.button(text, key=action, tip=self.tips[action], chosen=chosen, small=small):
+        if ui.button(text, key=action, tip=self._commands[action].tip, chosen=chosen, small=small):
             self._do(action)
 
     def _environment(self, ui: Ui) -> None:
@@ -164,14 +163,14 @@ class Panel:
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
         if (robots := ui.text_entry("robots", str(desk.robots))) is not None:
-            desk.attempt(lambda: desk.command(f"robots {robots}"))
+            desk.attempt(lambda: self._commands.typed(f"robots {robots}"))
         self._does(ui, "−", "fewer")
         self._does(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
         if (seed := ui.text_entry("seed", str(session.scenario.seed))) is not None:
-            desk.attempt(lambda: desk.command(f"seed {seed}"))
-        self._does(ui, "↻", "seed")
+            desk.attempt(lambda: self._commands.typed(f"seed {seed}"))
+        self._does(ui, "↻", "seed:next")
 
     def _controllers(self, ui: Ui) -> None:
         desk, session = self.desk, self.desk.session
@@ -289,7 +288,7 @@ class Panel:
                     continue
                 name = names[place]
                 title = _SHORT.get(self.titles[name], self.titles[name])
-                tip = self.tips[f"layer:{name}"]
+                tip = self._commands[f"layer:{name}"].tip
                 if ui.check(title, key=name, now=name in desk.shown, tip=tip) is not None:
                     self._do(f"layer:{name}")
             ui.space(5)
@@ -305,7 +304,7 @@ class Panel:
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
         for text, action in (("Fail", "robot:fail"), ("Remove", "robot:remove")):
-            if ui.button(text, key=action, tip=self.tips[action], why=why):
+            if ui.button(text, key=action, tip=self._commands[action].tip, why=why):
                 self._do(action)
         report = self.report
         with ui.scroll(f"robot:{self.desk.selected}"):

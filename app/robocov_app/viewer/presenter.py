@@ -15,7 +15,6 @@ from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
 from robocov_app.viewer.tools import Hand, Wall, toolbox
-from robocov_app.viewer.typed import command
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -96,7 +95,6 @@ class Desk:
         self._mapped: object = None
         self._kept_in = kept_in
         self.workspace = Workspace(session, kept_in, file)
-        self._doing: dict[str, Callable[[], None]] = self._what_to_do()
         self.look_at_map()
 
     # what there is
@@ -172,68 +170,15 @@ class Desk:
 
     # doing
 
-    def do(self, name: str) -> bool:
-        """Do the action of this name; return whether it is one of the desk's."""
-        kind, _, what = name.partition(":")
-        if kind == "layer":
-            self.shown ^= {what}
-            self.version += 1
-            return True
-        if kind == "tool":
-            self.tool.cancel(self.session)
-            self.tool = self.tools[what]
-            self.say(f"{self.tool.title}: {self.tool.hint}")
-            self.version += 1
-            return True
-        if name not in self._doing:
-            return False
-        self.attempt(self._doing[name])
-        return True
+    def switch_layer(self, name: str) -> None:
+        """Show a layer, or do not."""
+        self.shown ^= {name}
 
-    def _what_to_do(self) -> dict[str, Callable[[], None]]:
-        return {
-            "pause": self.pause,
-            "step": lambda: self.session.step(),
-            "restart": self.restart,
-            "settle": self.settle,
-            "slower": lambda: self.change_speed(-1),
-            "faster": lambda: self.change_speed(1),
-            "seed": lambda: self.restart(seed=self.session.scenario.seed + 1),
-            "start": self.next_start,
-            "more": lambda: self.restart(robots=self.robots + 1),
-            "fewer": lambda: self.restart(robots=self.robots - 1),
-            "map:next": lambda: self.next_map(1),
-            "map:previous": lambda: self.next_map(-1),
-            "back": lambda: self.look_by(-1),
-            "forward": lambda: self.look_by(1),
-            "back:second": lambda: self.look_at(self.session.time - 1.0),
-            "forward:second": lambda: self.look_at(self.session.time + 1.0),
-            "first": lambda: self.look_at(0.0),
-            "live": lambda: self.session.look_at(self.session.end),
-            "branch": self.branch,
-            "law": self.next_law,
-            "pane:add": self.add_pane,
-            "pane:remove": lambda: self.session.remove_pane(self.lane),
-            "pane:next": self.next_pane,
-            "undo": self.undo,
-            "redo": self.redo,
-            "robot:next": lambda: self.ask_next(1),
-            "robot:previous": lambda: self.ask_next(-1),
-            "robot:fail": self.fail_or_revive,
-            "robot:remove": self.remove_robot,
-            "finish": lambda: self.say(self.tool.finish(self.session) or ""),
-            "cancel": self.cancel,
-            "wider": lambda: self.widen(1.25),
-            "narrower": lambda: self.widen(0.8),
-            "theme": self.switch_theme,
-            "fade": self.switch_fade,
-            "panel": self.switch_panel,
-            "save:map": self.save_map,
-            "save:session": self.save_session,
-            "recover": self.recover,
-            "branch:previous": lambda: self.enter_branch(-1),
-            "branch:next": lambda: self.enter_branch(1),
-        }
+    def take_tool(self, name: str) -> None:
+        """Take another tool; what was begun with the one before is given up."""
+        self.tool.cancel(self.session)
+        self.tool = self.tools[name]
+        self.say(f"{self.tool.title}: {self.tool.hint}")
 
     def pause(self) -> None:
         """Play or pause."""
@@ -415,9 +360,9 @@ class Desk:
         """What is shown, and how, for the session's file."""
         return {"shown": sorted(self.shown), "theme": self.theme, "map": self.map_name}
 
-    def save_session(self) -> None:
-        """Write the session to its file, or to a new one."""
-        self.say(f"session saved: {self.workspace.save(self.folder, self.view)}")
+    def save_session(self, path: Path | None = None) -> None:
+        """Write the session to its file, or to another."""
+        self.say(f"session saved: {self.workspace.save(self.folder, self.view, path)}")
 
     def open_session(self, path: Path) -> None:
         """Go on with a session from its file; what was not saved of this one stays aside."""
@@ -479,9 +424,23 @@ class Desk:
             self.session.set_law(lane, Law(name))
         self.active = pane
 
-    def command(self, text: str) -> None:
-        """Do what was typed, see `typed.command`: ``k_rep 0.5``, ``robots 12``, ``map office``, ..."""
-        command(self, text)
+    def use_law(self, name: str) -> None:
+        """Let a controller take over in the chosen pane; it may be new to the list."""
+        Law(name).made()
+        if name not in self.laws:
+            self.laws.append(name)
+        self.set_law(self.active, name)
+
+    def ask(self, number: int) -> None:
+        """Ask a robot by its number."""
+        circumstances = self.session.circumstances(self.lane)
+        if number not in {*circumstances.numbers, *circumstances.failed}:
+            raise ParameterError(f"there is no robot {number}")
+        self.hand.selected = number
+
+    def enter_named_branch(self, name: str) -> None:
+        """Go to the end of a branch, by its number or name."""
+        self.session.enter(self.session.document.branch(name).node)
 
 
 def plain(message: str) -> str:

@@ -15,16 +15,21 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
-from robocov_app.viewer.actions import all_actions
+from robocov_app.toolkit.command import Command, Commands
+from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.help import draw_keys
+from robocov_app.toolkit.input import OF_THE_MOUSE
+from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.palette import palette
 from robocov_app.viewer.arena import Arena
 from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.commands import GROUPS, desk_commands, parameter_commands
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film, pixels
 from robocov_app.viewer.inspector import report_on
-from robocov_app.viewer.keyboard import Keyboard
 from robocov_app.viewer.layout import laid_out
 from robocov_app.viewer.lessons import LessonPlayer, load_lesson
-from robocov_app.viewer.overlays import Palette, draw_caption, draw_help, draw_message, draw_tour
+from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import plain
@@ -35,8 +40,6 @@ from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, draw_status, facts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from robocov_app.viewer.presenter import Desk
 
 FPS = 60
@@ -56,8 +59,7 @@ _GOES_ON_WITH = frozenset(
 )
 """What may be done without leaving the lesson."""
 
-OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
-"""Types of events that the mouse makes."""
+_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 
 
 class Window:
@@ -99,13 +101,12 @@ class Window:
         pygame.display.set_caption("robocov")
         self.arena = Arena(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
-        self.panel = Panel(desk, self.titles, self.do)
-        self.palette = Palette(desk, self.titles)
+        self.dialogs = Dialogs()
+        listed = [*desk_commands(desk, self.titles), *self._own_commands()]
+        self.commands = Commands(listed, desk.attempt, lambda: parameter_commands(desk))
+        self.panel = Panel(desk, self.titles, self.commands, self.do)
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._leave_lesson)
-        actions = all_actions(self.titles)
-        self.keyboard = Keyboard(desk, self.panel, self.palette, actions, lambda name: self.do(name))
         self._patient = patient
-        self._own = self._what_to_do()
         self._arranged: tuple[object, ...] | None = None
         self._report_at = 0.0
         self._now = 0.0
@@ -255,11 +256,10 @@ class Window:
         if self.tour is not None and self._lesson_shown and not layout.panel[2]:
             words = " ".join([self.tour.text, *self.tour.asks])
             draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
-        draw_message(self.screen, desk, layout, theme)
+        draw_message(self.screen, desk, layout.arena, theme, layout.scale)
         if self.help:
-            draw_help(self.screen, layout, theme, self.titles)
-        elif self.palette.open:
-            self.palette.draw(self.screen, layout, theme)
+            draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
+        self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
 
     def _inspect(self) -> None:
@@ -282,37 +282,80 @@ class Window:
             return
         if name not in _GOES_ON_WITH and name != "tour":
             self._leave_lesson()
-        if name == "cancel" and (self.help or self.palette.open):
-            self.help = self.palette.open = False
+        if name == "cancel" and self.help:
+            self.help = False
             return
-        if name in self._own:
-            self.desk.attempt(self._own[name])
-        else:
-            self.desk.do(name)
+        self.commands.do(name)
         self.panel.report = None
         if name in ("robot:next", "robot:previous"):
             self.panel.show_tab("robot")
 
-    def _what_to_do(self) -> dict[str, Callable[[], object]]:
-        return {
-            "fit": self.arena.fit,
-            "zoom:in": lambda: self.arena.zoom(1.25, self._middle()),
-            "zoom:out": lambda: self.arena.zoom(0.8, self._middle()),
-            "pan:left": lambda: self.arena.pan(_PAN, 0),
-            "pan:right": lambda: self.arena.pan(-_PAN, 0),
-            "pan:up": lambda: self.arena.pan(0, _PAN),
-            "pan:down": lambda: self.arena.pan(0, -_PAN),
-            "plot": self.chart.switch,
-            "tab": self._next_tab,
-            "fullscreen": self._fullscreen,
-            "screenshot": self.screenshot,
-            "film": self.toggle_film,
-            "help": self._toggle_help,
-            "palette": self.palette.show,
-            "tour": self._start_tour,
-            "save:run": self._save_run,
-            "quit": self._quit,
-        }
+    def _own_commands(self) -> list[Command]:
+        return [
+            Command("fit", "Show the whole map", "View", self.arena.fit, ("f",)),
+            Command(
+                "zoom:in",
+                "Zoom in",
+                "View",
+                lambda: self.arena.zoom(1.25, self._middle()),
+                (
+                    "ctrl+=",
+                    "ctrl++",
+                ),
+                repeats=True,
+            ),
+            Command(
+                "zoom:out",
+                "Zoom out",
+                "View",
+                lambda: self.arena.zoom(0.8, self._middle()),
+                ("ctrl+-",),
+                repeats=True,
+            ),
+            Command(
+                "pan:left", "Pan left", "View", lambda: self.arena.pan(_PAN, 0), ("ctrl+left",), repeats=True
+            ),
+            Command(
+                "pan:right",
+                "Pan right",
+                "View",
+                lambda: self.arena.pan(-_PAN, 0),
+                ("ctrl+right",),
+                repeats=True,
+            ),
+            Command("pan:up", "Pan up", "View", lambda: self.arena.pan(0, _PAN), ("ctrl+up",), repeats=True),
+            Command(
+                "pan:down", "Pan down", "View", lambda: self.arena.pan(0, -_PAN), ("ctrl+down",), repeats=True
+            ),
+            Command("plot", "Plot mean distance or mean time", "View", self.chart.switch, ("y",)),
+            Command("tab", "Next page of the panel", "View", self._next_tab, ("ctrl+tab",)),
+            Command("fullscreen", "Full screen", "View", self._fullscreen, ("f11",)),
+            Command("screenshot", "Screenshot", "Keep", self.screenshot, ("f12",)),
+            Command("film", "Record a film, or end it", "Keep", self.toggle_film, ("f9",)),
+            Command("save:run", "Save the run", "Keep", self._save_run, ("ctrl+e",)),
+            Command(
+                "help",
+                "Keys",
+                "Help",
+                self._toggle_help,
+                (
+                    "f1",
+                    "shift+/",
+                ),
+            ),
+            Command(
+                "palette",
+                "Commands by name",
+                "Help",
+                self._open_palette,
+                (
+                    "ctrl+k",
+                    "/",
+                ),
+            ),
+            Command("tour", "The lesson, or just play", "Help", self._start_tour, ("f2",)),
+            Command("quit", "Quit", "Help", self._quit, ("ctrl+q",)),
+        ]
 
     def _end_tour(self) -> bool:
         if self.tour is None:
@@ -335,6 +378,14 @@ class Window:
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
         windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
         self.screen = shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+
+    def _open_palette(self) -> None:
+        def told(words: str) -> None:
+            self.desk.attempt(lambda: words or None)
+            self.panel.report = None
+
+        ghost = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
+        self.dialogs.ask(palette(self.commands, ghost, told))
 
     def _toggle_help(self) -> None:
         self.help = not self.help
@@ -394,8 +445,14 @@ class Window:
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
+        if event.type == pygame.KEYUP:
+            self.commands.release(event)
+        elif event.type == pygame.WINDOWFOCUSLOST:
+            self.commands.forget_keys()
         if event.type == pygame.QUIT:
             self.closed = True
+        elif self.dialogs.take(event):
+            return
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.DROPFILE:
@@ -409,18 +466,22 @@ class Window:
             assert self.tour is not None
             self.tour.reply(int(event.unicode))
         elif event.type == pygame.KEYDOWN:
-            self.keyboard.press(event)
-        elif event.type == pygame.TEXTINPUT and self.palette.open:
-            self.keyboard.letters(event.text)
-        elif event.type == pygame.MOUSEBUTTONDOWN and (self.help or self.palette.open):
-            self.help = self.palette.open = False
+            self._press(event)
+        elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
+            self.help = False
         elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
-            if event.type == pygame.KEYUP:
-                self.keyboard.release(event)
-            elif event.type == pygame.WINDOWFOCUSLOST:
-                self.keyboard.leave()
             self.panel.take(event)
+
+    def _press(self, event: pygame.event.Event) -> None:
+        """Take a key: for a field first, else for a command."""
+        if self.panel.take(event):
+            return
+        command = self.commands.of_key(event)
+        if command is not None:
+            self.do(command.name)
+        # the key's letter is still to come, and not meant for the palette
+        self.dialogs.swallow(event.unicode)

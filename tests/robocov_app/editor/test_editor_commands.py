@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
+from driven_window import opened as opened_viewer
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
@@ -20,8 +21,6 @@ from robocov_app.editor.ui.dialogs import Commands
 from robocov_app.editor.ui.editor import GRIDS
 from robocov_app.editor.ui.fields import FIELDS, coordinate
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, EditorSettings, kinds_of
-from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.actions import all_actions as demo_actions
 
 LOW = PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)))
 HIGH = PolygonObstacle(((3, 3), (6, 3), (6, 6), (3, 6)))
@@ -46,9 +45,9 @@ def test_no_key_does_two_things_and_every_action_has_a_group() -> None:
     assert {action.group for action in told_commands()} == set(GROUPS)
 
 
-def test_the_same_things_have_the_same_keys_as_in_the_demo() -> None:
-    layers = {layer.name: layer.title for layer in standard_layers()}
-    theirs = {action.name: action.keys for action in demo_actions(layers)}
+def test_the_same_things_have_the_same_keys_as_in_the_demo(tmp_path: Path) -> None:
+    with opened_viewer(tmp_path) as driver:
+        theirs = {command.name: command.keys for command in driver.window.commands.listed}
     ours = {action.name: action.keys for action in all_commands()}
     same = {
         *(

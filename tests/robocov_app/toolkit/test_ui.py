@@ -233,7 +233,8 @@ def test_keys_do_commands_once_and_tell_why_they_cannot_be_done() -> None:
 
 def test_the_palette_completes_and_keeps_what_was_wrong(screen: pygame.Surface) -> None:
     its, dialogs, told = Done(), Dialogs(), []
-    dialogs.ask(palette(its.commands, "", told.append), opened_by="/")
+    dialogs.ask(palette(its.commands, "", told.append))
+    dialogs.swallow("/")
 
     def does(*events: pygame.event.Event) -> None:
         for event in events:

@@ -5,54 +5,63 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import pygame
 import pytest
-from driven_window import KEYS, Driver, opened
+from driven_window import KEYS, Driver, do, key_event, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
 import robocov_app.viewer as package
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.command import Command, matching
+from robocov_app.toolkit.input import key_words
 from robocov_app.viewer import panel, window
-from robocov_app.viewer.actions import all_actions, key_words, layer_actions, matching, tool_actions
-from robocov_app.viewer.overlays import _GROUPS
+from robocov_app.viewer.commands import GROUPS, layer_commands, tool_commands
 from robocov_app.viewer.tools import toolbox
 
 TITLES = {layer.name: layer.title for layer in standard_layers()}
-ACTIONS = all_actions(TITLES)
-KEYED = [(key, action) for action in ACTIONS for key in action.keys]
 TEXTS = [path.read_text() for path in Path(package.__path__[0]).glob("*.py")]
 
 HARMLESS = frozenset({"quit", "film", "screenshot", "save:run", "save:map", "fullscreen"})
 """Left out where each action is done: tested for themselves, or they write files."""
 
 
-def test_no_key_does_two_things() -> None:
-    keys = [key for key, _ in KEYED]
+@pytest.fixture(scope="module")
+def actions(shared: Driver) -> list[Command]:
+    return shared.window.commands.listed
+
+
+def test_no_key_does_two_things(actions: list[Command]) -> None:
+    keys = [key for action in actions for key in action.keys]
     assert len(keys) == len(set(keys))
 
 
-def test_no_two_actions_have_one_name_or_one_title() -> None:
-    for words in ([action.name for action in ACTIONS], [action.title for action in ACTIONS]):
+def test_no_two_actions_have_one_name_or_one_title(actions: list[Command]) -> None:
+    for words in ([action.name for action in actions], [action.title for action in actions]):
         assert len(words) == len(set(words))
 
 
-def test_everything_has_a_key_and_is_in_a_group_that_the_help_shows() -> None:
-    for action in ACTIONS:
-        assert action.keys, action.name
+def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions: list[Command]) -> None:
+    for action in actions:
+        assert action.keys or action.takes, action.name
         assert action.title[0].isupper() and not action.title.endswith(".")
-        assert action.group in _GROUPS
-    assert {action.group for action in ACTIONS} == set(_GROUPS)
+        assert action.group in GROUPS
+    assert {action.group for action in actions} == set(GROUPS)
 
 
-def test_all_layers_and_all_tools_are_there() -> None:
-    assert [action.name for action in tool_actions()] == [f"tool:{name}" for name in toolbox()]
-    assert {action.name for action in layer_actions(TITLES)} == {f"layer:{name}" for name in TITLES}
+def test_all_layers_and_all_tools_are_there(shared: Driver) -> None:
+    assert [action.name for action in tool_commands(shared.desk)] == [f"tool:{name}" for name in toolbox()]
+    assert {each.name for each in layer_commands(shared.desk, TITLES)} == {f"layer:{name}" for name in TITLES}
 
 
-def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key() -> None:
-    (new,) = (action for action in layer_actions({**TITLES, "dust": "Dust"}) if action.name == "layer:dust")
-    assert new.title == "Dust" and new.keys == ()
+def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver) -> None:
+    (new,) = (
+        action
+        for action in layer_commands(shared.desk, {**TITLES, "dust": "Dust"})
+        if action.name == "layer:dust"
+    )
+    assert new.name == "layer:dust" and new.keys == ()
 
 
 @pytest.mark.parametrize(
@@ -75,23 +84,17 @@ def test_keys_are_written_as_on_the_keyboard(key: str, words: str) -> None:
     assert key_words(key) == words
 
 
-@pytest.mark.parametrize(("key", "action"), KEYED, ids=[key for key, _ in KEYED])
-def test_every_key_is_one_that_there_is(key: str, action) -> None:
-    import pygame
-
-    *held, last = [*key[:-1].split("+"), "+"] if key.endswith("++") or key == "+" else key.split("+")
-    assert {each for each in held if each} <= {"ctrl", "alt", "shift"}
-    pygame.display.init()  # which knows the names of keys
-    try:
+def test_every_key_is_one_that_there_is(actions: list[Command]) -> None:
+    for key in (key for action in actions for key in action.keys):
+        *held, last = [*key[:-1].split("+"), "+"] if key.endswith("++") or key == "+" else key.split("+")
+        assert {each for each in held if each} <= {"ctrl", "alt", "shift"}
         code = KEYS.get(last) or pygame.key.key_code(last)
         assert pygame.key.name(code) == last
-    finally:
-        pygame.display.quit()
 
 
-def test_what_panel_pages_and_window_name_exists() -> None:
+def test_what_panel_pages_and_window_name_exists(actions: list[Command]) -> None:
     """Every text that looks like an action's name, and is used where one is wanted, is one."""
-    names = {action.name for action in ACTIONS}
+    names = {action.name for action in actions}
     calls = {"does", "do", "_do"}
     for text in TEXTS:
         for node in ast.walk(ast.parse(text)):
@@ -107,9 +110,9 @@ def test_what_panel_pages_and_window_name_exists() -> None:
 
 
 def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_panels_own(
-    tmp_path: Path,
+    tmp_path: Path, actions: list[Command]
 ) -> None:
-    names = {action.name for action in ACTIONS}
+    names = {action.name for action in actions}
     options = {name for law in CONTROLLERS.values() for name in gains_of(law)}
     with opened(tmp_path) as driver:
         for tab in panel.TABS:
@@ -132,27 +135,34 @@ def state_of(driver: Driver) -> list[object]:
         desk.tool.preview(session),
         session.circumstances(session.lanes[0]),
         its.help,
-        its.palette.open,
+        its.dialogs.open,
         its.tour,
         its.panel.tab,
     ]
     return told
 
 
-@pytest.mark.parametrize("action", [a for a in ACTIONS if a.name not in HARMLESS], ids=lambda a: a.name)
-def test_every_action_does_something(action, shared: Driver) -> None:
-    driver = prepared(shared)
-    before = state_of(driver)
-    driver.window.do(action.name)
-    assert state_of(driver) != before
+def test_every_action_does_something(shared: Driver) -> None:
+    for action in shared.window.commands.listed:
+        if action.name in HARMLESS or action.takes is not None:
+            continue
+        driver = prepared(shared)
+        before = state_of(driver)
+        driver.window.do(action.name)
+        assert state_of(driver) != before, action.name
 
 
-@pytest.mark.parametrize(("key", "action"), KEYED, ids=[key for key, _ in KEYED])
-def test_every_key_does_its_action(key: str, action, shared: Driver, monkeypatch) -> None:
+def test_every_key_does_its_action(shared: Driver, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[str] = []
+    shared.window.dialogs.close()
+    shared.window.panel.stop_typing()
     monkeypatch.setattr(shared.window, "do", done.append)
-    shared.key(key)
-    assert done == [action.name]
+    for action in shared.window.commands.listed:
+        for key in action.keys:
+            shared.post(pygame.KEYDOWN, **key_event(key))
+            shared.post(pygame.KEYUP, **key_event(key))
+    shared.window.advance(0.0)
+    assert done == [action.name for action in shared.window.commands.listed for _ in action.keys]
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +174,8 @@ def shared(tmp_path_factory: pytest.TempPathFactory):
 def prepared(driver: Driver) -> Driver:
     """Bring a window into a state in which every action has something to do."""
     its, desk, session = driver.window, driver.desk, driver.session
-    its.help = its.palette.open = False
+    its.help = False
+    its.dialogs.close()
     its._end_tour()
     desk.attempt(lambda: desk.open_map("square"))
     while len(session.lanes) > 1:
@@ -177,7 +188,7 @@ def prepared(driver: Driver) -> Driver:
     session.add_robot((8.0, 2.0))
     session.undo()
     session.playing = False
-    desk.do("tool:polygon")
+    do(desk, "tool:polygon")
     desk.tool.press(session, (6.0, 6.0), 0.1, None)
     desk.tool.press(session, (7.0, 6.0), 0.1, None)
     desk.tool.press(session, (7.0, 7.0), 0.1, None)
@@ -192,13 +203,15 @@ def prepared(driver: Driver) -> Driver:
 
 
 @given(st.text(max_size=30))
-def test_what_is_found_holds_all_words_typed(typed: str) -> None:
-    found = matching(ACTIONS, typed)
-    for action in ACTIONS:
-        assert (action in found) == all(word in action.title.lower() for word in typed.lower().split())
+def test_what_is_found_holds_all_words_typed(actions: list[Command], typed: str) -> None:
+    found = matching(actions, typed)
+    for action in actions:
+        assert (action in found) == all(
+            word in f"{action.title} {action.name}".lower() for word in typed.lower().split()
+        )
 
 
-def test_what_begins_with_the_words_comes_first() -> None:
-    found = [action.title for action in matching(ACTIONS, "re")]
+def test_what_begins_with_the_words_comes_first(actions: list[Command]) -> None:
+    found = [action.title for action in matching(actions, "re")]
     first = [title for title in found if title.lower().startswith("re")]
     assert first and found[: len(first)] == first

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
+from driven_window import do, listed, typed
 from hypothesis import given
 from hypothesis import strategies as st
 from touched_run import RAPF, RPF, all_told, begun, desk_of
@@ -15,15 +16,14 @@ from robocov_app.terminal.output import free_name
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import SAID_FOR, Desk, plain
 from robocov_app.viewer.session.scenario import MOST_ROBOTS
-from robocov_app.viewer.typed import COMMAND_WORDS
 
 # what is shown
 
 
 def test_layers_theme_fading_and_panel_are_switched() -> None:
     desk = desk_of()
-    desk.do("layer:cells")
-    desk.do("layer:scan")
+    do(desk, "layer:cells")
+    do(desk, "layer:scan")
     assert desk.shown == {"robots", "scan"}
     for action, what, values in (
         ("theme", "theme", ("light", "dark")),
@@ -31,17 +31,10 @@ def test_layers_theme_fading_and_panel_are_switched() -> None:
         ("panel", "panel", (True, False)),
     ):
         assert getattr(desk, what) == values[0]
-        desk.do(action)
+        do(desk, action)
         assert getattr(desk, what) == values[1]
-        desk.do(action)
+        do(desk, action)
         assert getattr(desk, what) == values[0]
-
-
-def test_what_the_desk_does_not_know_is_left_to_the_window() -> None:
-    desk = desk_of()
-    version = desk.version
-    assert not desk.do("fullscreen") and desk.version == version
-    assert desk.do("pause") and desk.version > version
 
 
 def test_messages_stay_for_a_while() -> None:
@@ -64,7 +57,7 @@ def test_a_new_map_is_told_to_the_cost() -> None:
     desk = desk_of()
     told = []
     desk.costs.environment = told.append  # type: ignore[method-assign]
-    desk.do("step")
+    do(desk, "step")
     assert told == []
     desk.attempt(lambda: desk.open_map("square"))
     assert told == [desk.session.environment]
@@ -86,10 +79,10 @@ def test_gains_are_of_the_chosen_pane_and_limits_of_all() -> None:
 
 def test_no_limit_can_be_set_where_there_may_be_none() -> None:
     desk = desk_of()
-    desk.command("sensing_range none")
+    typed(desk, "sensing_range none")
     assert desk.lane.circumstances.limits.sensing_range == math.inf
     with pytest.raises(ParameterError, match="number was wanted"):
-        desk.command("max_speed none")
+        typed(desk, "max_speed none")
 
 
 # typed commands
@@ -98,37 +91,37 @@ def test_no_limit_can_be_set_where_there_may_be_none() -> None:
 @pytest.mark.parametrize("text", ["k_rep 0.5", "k_rep=0.5", " k_rep  =  0.5 ", "k_rep 0,5"])
 def test_gains_can_be_typed(text: str) -> None:
     desk = desk_of()
-    desk.command(text)
+    typed(desk, text)
     assert desk.lane.law.value("k_rep") == 0.5
 
 
 def test_what_can_be_typed_is_done(tmp_path: Path) -> None:
     desk = desk_of(folder=tmp_path)
-    desk.command("robots 4")
-    desk.command("seed 7")
-    desk.command("start far")
+    typed(desk, "robots 4")
+    typed(desk, "seed 7")
+    typed(desk, "start far")
     scenario = desk.session.scenario
     assert (scenario.robots, scenario.seed, scenario.start_name) == (4, 7, "far")
-    desk.command("controller rpf")
+    typed(desk, "controller rpf")
     assert desk.lane.law == RPF
-    desk.command("speed max")
+    typed(desk, "speed max")
     assert math.isinf(desk.session.clock.speed)
-    desk.command("speed 4×")
+    typed(desk, "speed 4×")
     assert desk.session.clock.speed == 4.0
     for _ in range(60):
         desk.session.step()
-    desk.command("time 0.5")
+    typed(desk, "time 0.5")
     assert desk.session.time == pytest.approx(0.5)
-    desk.command("robot 3")
+    typed(desk, "robot 3")
     assert desk.selected == 3
-    desk.command("branch 1")
-    desk.command(f"save {tmp_path / 'story.robocov'}")
-    desk.command(f"open {tmp_path / 'story.robocov'}")
+    typed(desk, "branch 1")
+    typed(desk, f"save {tmp_path / 'story.robocov'}")
+    typed(desk, f"open {tmp_path / 'story.robocov'}")
     assert desk.message.startswith("session opened: ")
-    desk.command("map square")
+    typed(desk, "map square")
     assert desk.map_name == "square"
     words = "robots seed start controller speed time robot map open save branch"
-    assert set(words.split()) == set(COMMAND_WORDS)
+    assert set(words.split()) == {each.name for each in listed(desk).listed if each.takes is not None}
 
 
 def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Path) -> None:
@@ -142,10 +135,10 @@ def test_an_own_controller_can_be_typed_and_is_offered_from_then_on(tmp_path: Pa
         "        return np.zeros(2)\n"
     )
     desk = desk_of()
-    desk.command(f"controller {mine}:Still")
+    typed(desk, f"controller {mine}:Still")
     assert desk.laws[-1] == f"{mine}:Still" == desk.lane.law.name
     desk.session.step()
-    desk.do("law")
+    do(desk, "law")
     assert desk.lane.law.name == desk.laws[0]
 
 
@@ -201,7 +194,7 @@ def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> 
     for _ in range(3):
         desk.session.step()
     before = all_told(desk.session), desk.map_name, desk.hand.selected, list(desk.laws)
-    desk.attempt(lambda: desk.command(text))
+    desk.attempt(lambda: typed(desk, text))
     assert desk.trouble, text
     assert desk.message and "\n" not in desk.message and "Traceback" not in desk.message
     assert (all_told(desk.session), desk.map_name, desk.hand.selected, list(desk.laws)) == before
@@ -209,14 +202,14 @@ def test_what_means_nothing_is_told_in_a_line_and_changes_nothing(text: str) -> 
 
 def test_a_slip_of_the_finger_is_answered_with_what_was_meant() -> None:
     with pytest.raises(InputError, match="robots"):
-        desk_of().command("robts 3")
+        typed(desk_of(), "robts 3")
 
 
 @given(st.text(max_size=12))
 def test_no_text_is_too_odd(text: str) -> None:
     desk = Desk(begun(robots=1), Costs(2, direct=True), set(), Path(), "hall")
     try:
-        desk.command(text)
+        typed(desk, text)
     except RobocovError as error:
         assert str(error)
 

@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from driven_window import KEYS, MODIFIERS, Driver, opened
+from driven_window import KEYS, MODIFIERS, Driver, opened, typed
 from touched_run import RAPF, RPF, too_deep
 
-from robocov_app.render.picture import standard_layers
-from robocov_app.viewer.actions import all_actions
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.scenario import MOST_PANES
 from robocov_app.viewer.window import Window
@@ -34,8 +32,6 @@ MOST = {
 }
 """What is done so often at most, since it writes files or takes long."""
 
-ACTIONS = all_actions({layer.name: layer.title for layer in standard_layers()})
-NAMED = [key for action in ACTIONS for key in action.keys if MOST.get(action.name) != 0]
 MAPS = ("square", "trap", "rooms", "l-shape", "pentagon")
 # fmt: off
 WORDS = (
@@ -76,6 +72,8 @@ class Monkey:
     def __init__(self, driver: Driver, seed: int) -> None:
         self.driver, self.random = driver, random.Random(seed)
         self.held: list[int] = []
+        listed = [each for each in driver.window.commands.listed if MOST.get(each.name) != 0]
+        self.named = [key for each in listed for key in each.keys if not key.endswith("+")]
 
     def play(self, events: int) -> None:
         window = self.driver.window
@@ -119,13 +117,15 @@ class Monkey:
             pygame.display.set_mode(size, pygame.RESIZABLE)
             self.driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
         elif what < 0.985:
-            self.driver.desk.attempt(lambda: self.driver.desk.command(f"map {self.random.choice(MAPS)}"))
+            self.driver.desk.attempt(
+                lambda: self.driver.window.commands.typed(f"map {self.random.choice(MAPS)}")
+            )
         else:
             self.drag()
 
     def key(self) -> None:
         if self.random.random() < 0.7:
-            *held, last = self.random.choice([key for key in NAMED if not key.endswith("+")]).split("+")
+            *held, last = self.random.choice(self.named).split("+")
             mod = sum(MODIFIERS[each] for each in held)
             code = KEYS.get(last) or pygame.key.key_code(last)
             text = last if len(last) == 1 and "ctrl" not in held else ""
@@ -268,9 +268,9 @@ def usual(driver: Driver) -> None:
     while len(driver.session.lanes) > 1:
         driver.session.remove_pane(driver.session.lanes[-1])
     desk.attempt(lambda: desk.open_map("square"))
-    desk.command("robots 2")
+    typed(desk, "robots 2")
     for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
-        desk.command(name)
+        typed(desk, name)
     driver.settle()
     driver.settle()
     driver.push("tool:hand")

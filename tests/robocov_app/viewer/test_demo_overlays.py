@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.fonts import text_width
-from robocov_app.viewer import overlays
-from robocov_app.viewer.actions import all_actions
+from robocov_app.toolkit import help as keys_page
+from robocov_app.toolkit.overlay import wrapped
+from robocov_app.viewer.commands import GROUPS
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.overlays import Palette, wrapped
 
 
 @given(st.text(st.characters(whitelist_categories=("Ll", "Zs")), max_size=80), st.integers(60, 300))
@@ -34,7 +34,7 @@ def test_the_keys_are_all_on_one_card(
 ) -> None:
     boxes: list[pygame.Rect] = []
     words: set[str] = set()
-    real_label, real_card = overlays.label, overlays.card
+    real_label, real_card = keys_page.label, keys_page.card
 
     def label(text, *rest):
         words.add(text)
@@ -47,39 +47,21 @@ def test_the_keys_are_all_on_one_card(
     with opened(tmp_path, size=size, scale=scale) as driver:
         window = driver.window
         paler = window.screen.copy()
-        overlays.dim(paler, window.theme)
-        monkeypatch.setattr(overlays, "label", label)
-        monkeypatch.setattr(overlays, "card", card)
-        overlays.draw_help(window.screen, window.layout, window.theme, window.titles)
+        keys_page.dim(paler, window.theme)
+        monkeypatch.setattr(keys_page, "label", label)
+        monkeypatch.setattr(keys_page, "card", card)
+        keys_page.draw_keys(
+            window.screen, window.theme, window.layout.scale, window.commands.listed, GROUPS, ""
+        )
         (box,) = boxes
         assert window.screen.get_rect().contains(box)
-        for action in all_actions(window.titles):
+        for action in (each for each in window.commands.listed if each.keys):
             title = action.title.partition(":")[0]
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
         # nothing sticks out
         for picture in (paler, window.screen):
             picture.fill((0, 0, 0), box)
         assert np.array_equal(pixels(paler), pixels(window.screen))
-
-
-def test_the_palette_finds_actions_and_knows_commands(tmp_path: Path) -> None:
-    with opened(tmp_path) as driver:
-        palette = Palette(driver.desk, driver.window.titles)
-        palette.show()
-        assert len(palette.found) == Palette.ROWS
-        palette.type("single")
-        assert [action.name for action in palette.found] == ["step"]
-        assert not palette.is_command()
-        palette.text = "k_rep = 0.5"
-        assert palette.is_command()
-        palette.text = "robots 12"
-        assert palette.is_command()
-        palette.text = "robots"
-        assert not palette.is_command()
-        palette.text = "no such thing"
-        assert palette.found == []
-        palette.move(1)
-        assert palette.chosen == 0
 
 
 def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from touched_run import RAPF, begun
 
 from robocov_app.toolkit.settings import FOLDER
 from robocov_app.viewer.opening import Opening
-from robocov_app.viewer.overlays import Palette
 from robocov_app.viewer.screen import show_compiling
 from robocov_app.viewer.status import cursor_words
 
@@ -154,31 +153,27 @@ def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Drive
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])
 def test_commands_are_found_by_their_names(key: str, driver: Driver) -> None:
     driver.key(key)
-    palette = driver.window.palette
-    assert palette.open and palette.text == ""
+    dialogs = driver.window.dialogs
+    assert dialogs.open and dialogs.asked.text == ""
     driver.type("single")
-    assert [action.name for action in palette.found] == ["step"]
+    assert [each.text for each in dialogs.asked.options("single")] == ["Single step"]
     driver.key("return")
-    assert driver.session.end > 0.0 and not palette.open
+    assert driver.session.end > 0.0 and not dialogs.open
 
 
 def test_the_palette_is_moved_through_erased_and_left(driver: Driver) -> None:
-    palette = driver.window.palette
     driver.key("ctrl+k")
     driver.type("rob")
-    several = palette.found
-    assert len(several) > 2
+    asked = driver.window.dialogs.asked
     driver.key("down", 2)
     driver.key("up")
-    assert palette.chosen == 1
+    assert asked.chosen == 1
     driver.key("backspace")
-    assert palette.text == "ro" and palette.chosen == 0
-    driver.key("up")
-    assert palette.chosen == 0
-    driver.key("down", Palette.ROWS + 3)
-    assert palette.chosen == len(palette.found) - 1
+    assert asked.text == "ro" and asked.chosen == 0
+    driver.key("down", 30)
+    assert asked.chosen == len(asked.options("ro")) - 1
     driver.key("escape")
-    assert not palette.open and driver.session.end == 0.0
+    assert not driver.window.dialogs.open and driver.session.end == 0.0
 
 
 def test_values_are_set_by_typing(driver: Driver) -> None:
@@ -193,7 +188,8 @@ def test_values_are_set_by_typing(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("robots many")
     driver.key("return")
-    assert driver.desk.trouble
+    asked = driver.window.dialogs.asked
+    assert asked.text == "robots many" and "whole number" in asked.trouble  # nothing typed is lost
 
 
 def test_a_key_that_is_held_down_saves_one_picture_but_goes_on_stepping(

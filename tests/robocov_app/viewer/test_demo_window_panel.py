@@ -41,7 +41,7 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     }
     with opened(tmp_path, RAPF, RPF, RPF, RPF) as driver:
         for name in names:
-            driver.desk.attempt(lambda name=name: driver.desk.command(f"controller {name}"))
+            driver.desk.attempt(lambda name=name: driver.window.commands.typed(f"controller {name}"))
         driver.desk.attempt(lambda: driver.desk.set_law(0, "rapf"))
         driver.settle()
         driver.click(*driver.widget("menu", "law:1").rect.center)
@@ -64,7 +64,7 @@ def test_a_start_that_an_obstacle_covers_stays_in_the_menu_until_another_is_chos
     driver.key("c")
     driver.drag_at((5.2, 3.2), (5.2, 3.5), (5.2, 3.75))
     assert "far" not in driver.session.environment.starts and driver.session.scenario.start_name == "far"
-    driver.push("seed")
+    driver.push("seed:next")
     driver.choose("start", "spread")
     assert driver.session.scenario.start_name == "spread"
 
@@ -196,7 +196,7 @@ def test_typing_goes_on_in_the_middle_after_a_second_click(driver: Driver) -> No
 
 
 def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
-    driver.desk.attempt(lambda: driver.desk.command("k_rep 4"))
+    driver.desk.attempt(lambda: driver.window.commands.typed("k_rep 4"))
     driver.settle()
     assert driver.widget("slider", "k_rep").value > 0.7
     driver.push("reset:k_rep")
@@ -215,9 +215,9 @@ def test_robots_and_seed_are_typed_and_counted(driver: Driver) -> None:
     assert driver.session.scenario.robots == 6 and driver.widget("entry", "robots").text == "6"
     driver.write("seed", "41")
     driver.key("return")
-    driver.push("seed")
+    driver.push("seed:next")
     assert driver.session.scenario.seed == 42 and driver.widget("entry", "seed").text == "42"
-    assert driver.widget("button", "seed").text == "↻"
+    assert driver.widget("button", "seed:next").text == "↻"
 
 
 def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:

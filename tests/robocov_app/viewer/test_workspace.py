@@ -77,10 +77,10 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
         assert driver.desk.message == "branch 1 of 2: robot 2 failed" and driver.session.numbers == (1, 3)
         driver.key("alt+right")
         assert driver.session.numbers == (2, 3)
-        driver.desk.command(f"open {path}")
+        driver.window.commands.typed(f"open {path}")
         driver.frames(2)
         assert driver.desk.session.numbers == (2, 3) and len(driver.desk.session.branches) == 2
-        driver.desk.command("branch 1")
+        driver.window.commands.typed("branch 1")
         assert driver.desk.session.numbers == (1, 3)
 
 

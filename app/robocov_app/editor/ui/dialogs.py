@@ -13,9 +13,9 @@ from robocov_app.editor.ui.import_view import ImportView
 from robocov_app.editor.ui.importing import ImportQuestion
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, mix
+from robocov_app.toolkit.command import parted
 from robocov_app.viewer.actions import Action, key_words
 from robocov_app.viewer.overlays import CommandList, card, dim, wrapped
-from robocov_app.viewer.typed import parted
 
 if TYPE_CHECKING:
     from collections.abc import Callable

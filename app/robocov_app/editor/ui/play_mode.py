@@ -12,8 +12,8 @@ from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.keyboard import key_of
 from robocov_app.viewer.presenter import Desk as DemoDesk
 from robocov_app.viewer.session.scenario import Limits, Scenario
 from robocov_app.viewer.session.session import Session
@@ -89,7 +89,7 @@ class PlayWindow(Window):
 
     def do(self, name: str) -> None:
         """Do the action of this name; Escape leads back where it would do nothing."""
-        idle = not (self.help or self.palette.open or self.tour is not None)
+        idle = not (self.help or self.dialogs.open or self.tour is not None)
         if name == "cancel" and idle and self.desk.tool is self.desk.hand and self.desk.selected is None:
             self.ended = not self.desk.hand.cancel(self.desk.session)
             return

@@ -26,12 +26,13 @@ from robocov_app.editor.ui.team import TeamThread
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.layout import inside, laid_out
 from robocov_app.viewer.overlays import draw_keys, draw_message
 from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.status import draw_status
-from robocov_app.viewer.window import FPS, OF_THE_MOUSE
+from robocov_app.viewer.window import FPS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
