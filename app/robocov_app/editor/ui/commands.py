@@ -28,8 +28,8 @@ from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
+from robocov_app.toolkit.command import parted
 from robocov_app.viewer.actions import Action
-from robocov_app.viewer.typed import parted
 
 FAR = 10
 """How many times farther arrows nudge with Shift."""
