@@ -121,6 +121,13 @@ class Hands(Driver):
     def wait(self, seconds: float = 0.5) -> None:
         self.window.frame(seconds)
 
+    def widget(self, kind: str, name: str) -> Any:
+        widgets = self.window.panel.widgets
+        assert widgets is not None, "the panel is hidden"
+        found = widgets.find(kind, name)
+        assert found is not None, f"no {kind} {name}"
+        return found
+
     def select(self, *keys: Any) -> None:
         self.desk.select(Selection.of(*keys))
         self.settle()

@@ -21,8 +21,8 @@ import pygame
 
 from robocov.errors import RobocovError
 from robocov_app.render.fonts import label
-from robocov_app.render.theme import Theme
-from robocov_app.toolkit.input import key_of, wheel_notches
+from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.toolkit.input import OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.overlay import card, dim, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import TEXT, Ui
@@ -288,7 +288,7 @@ class Dialogs:
         self._ui: Ui | None = None
         self._high = 0.0
         self._swallow = ""
-        self._early: list[pygame.event.Event] = []
+        self._drawn = False
 
     @property
     def open(self) -> bool:
@@ -298,7 +298,7 @@ class Dialogs:
     def ask(self, dialog: Dialog) -> None:
         """Ask something."""
         self.asked, self._ui, self._swallow = dialog, None, ""
-        self._early.clear()
+        self._drawn = False
 
     def swallow(self, letter: str) -> None:
         """Take note that the letter of the key that has opened it is still to come, and not meant for it."""
@@ -315,9 +315,10 @@ class Dialogs:
         asked, ui = self.asked, self._ui
         if asked is None:
             return False
-        if ui is None:  # it has not been seen yet
-            self._early.append(event)
-            return event.type not in _NOT_OURS
+        if ui is None:  # keys come before it was drawn
+            ui = self._made(asked, LIGHT, 1.0)
+        if not self._drawn and event.type in OF_THE_MOUSE:
+            return True
         ui.stale = True
         if event.type == pygame.TEXTINPUT and self._swallow:
             swallowed, self._swallow = self._swallow, ""
@@ -336,6 +337,20 @@ class Dialogs:
             self.asked = None
         return event.type not in _NOT_OURS
 
+    def _made(self, asked: Dialog, theme: Theme, scale: float) -> Ui:
+        def page(ui: Ui) -> None:
+            ui.inset(_MARGIN, _MARGIN - 4, _MARGIN)
+            asked.page(ui)
+            ui.end_row()
+            self._high = ui.y + _MARGIN - 4
+
+        self._ui = ui = Ui(page, theme, scale)
+        self._high = 0.0
+        ui.background = None
+        ui.box = pygame.Rect(0, 0, round(asked.width * scale), 100)
+        ui.run(None, None)
+        return ui
+
     def _key(self, asked: Dialog, ui: Ui, event: pygame.event.Event) -> None:
         name, self._swallow = key_of(event), ""
         composing = ui.edit is not None and bool(ui.edit.composed)
@@ -349,17 +364,9 @@ class Dialogs:
         asked = self.asked
         if asked is None:
             return
-        if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
-
-            def page(ui: Ui) -> None:
-                ui.inset(_MARGIN, _MARGIN - 4, _MARGIN)
-                asked.page(ui)
-                ui.end_row()
-                self._high = ui.y + _MARGIN - 4
-
-            self._ui, self._high = Ui(page, theme, scale), 0.0
-            self._ui.background = None
-        ui = self._ui
+        ui, self._drawn = self._ui, True
+        if ui is None or ui.theme is not theme or ui.scale != scale:
+            ui = self._made(asked, theme, scale)
         dim(screen, theme)
         wide = min(asked.width * scale, screen.get_width() - 24 * scale)
         for _ in range(2):  # its height is known after it has run
@@ -367,13 +374,7 @@ class Dialogs:
             ui.box = pygame.Rect(0, 0, round(wide), high)
             top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
             ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
-            ui._run(None, None)
-        if self._early:
-            early, self._early = self._early, []
-            for event in early:
-                self.take(event)
-            if self.asked is not asked:
-                return
+            ui.run(None, None)
         card(screen, ui.box, theme, scale)
         ui.stale = True
         ui.draw(screen)

@@ -163,7 +163,8 @@ class Ui:
         self._order = []
         self.shown = {}
 
-    def _run(self, event: pygame.event.Event | None, surface: pygame.Surface | None) -> None:
+    def run(self, event: pygame.event.Event | None, surface: pygame.Surface | None) -> None:
+        """Run the page for an event, for a drawing, or to learn how high it is."""
         self._event, self.surface = event, surface
         self._begin()
         self.page(self)
@@ -195,7 +196,7 @@ class Ui:
         if kind == pygame.MOUSEBUTTONDOWN:
             self._leave_unless(event.pos)
         self.stale = True
-        self._run(event, None)
+        self.run(event, None)
         if kind == pygame.MOUSEBUTTONUP:
             self.active = None
         return held is not None or kind == pygame.KEYDOWN or self.box.collidepoint(self.at)
@@ -205,7 +206,7 @@ class Ui:
             self.open_list.chosen = k
         if self.active is not None:
             self.stale = True
-            self._run(event, None)
+            self.run(event, None)
             return True
         under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
         if under != self._hot:
@@ -254,7 +255,7 @@ class Ui:
                 self._again = False
                 if self.background is not None:
                     screen.fill(self.background, self.box)
-                self._run(None, screen)
+                self.run(None, screen)
                 if not self._again:
                     break
             if self.background is not None:
@@ -888,7 +889,7 @@ class Ui:
     def _pick(self, found: _List, k: int) -> None:
         found.picked = found.options[k]
         self.focus = None
-        self._run(None, None)
+        self.run(None, None)
         self.open_list = None
 
     def _draw_list(self, screen: pygame.Surface, found: _List) -> None:
