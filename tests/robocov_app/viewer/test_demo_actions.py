@@ -110,17 +110,16 @@ def test_what_panel_pages_and_window_name_exists(actions: list[Command]) -> None
 
 
 def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_panels_own(
-    tmp_path: Path, actions: list[Command]
+    shared: Driver, actions: list[Command]
 ) -> None:
     names = {action.name for action in actions}
     options = {name for law in CONTROLLERS.values() for name in gains_of(law)}
-    with opened(tmp_path) as driver:
-        for tab in panel.TABS:
-            driver.window.panel.show_tab(tab)
-            driver.settle()
-            for each in driver.window.panel.ui.shown.values():
-                own = each.key.partition(":")[0] in {"tab", "reset", "close", *options}
-                assert each.kind != "button" or own or each.key in names, each.key
+    for tab in panel.TABS:
+        shared.window.panel.show_tab(tab)
+        shared.settle()
+        for each in shared.window.panel.ui.shown.values():
+            own = each.key.partition(":")[0] in {"tab", "reset", "close", *options}
+            assert each.kind != "button" or own or each.key in names, each.key
 
 
 def state_of(driver: Driver) -> list[object]:
