@@ -158,6 +158,17 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
         np.testing.assert_array_equal(mine, theirs)
 
 
+def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resumed() -> None:
+    session = stepped(begun(LLOYD), 5)
+    session.set_limits(Limits(max_speed=0.5))
+    stepped(session, 10)
+    session.look_at(7 / 60)
+    session.branch()
+    stepped(session, 20)
+    for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
 def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -> None:
     conditions = Conditions(
         loss=0.2,

@@ -122,8 +122,9 @@ class Lane:
         """
         old, circumstances = self.simulation, wanted.circumstances
         environment, team = circumstances.solid, circumstances.team
-        # the same controller goes on remembering
-        controller = None if circumstances.law == self.law else circumstances.law.made()
+        # the same controller goes on remembering; one without memory begins anew, as when resumed
+        goes_on = circumstances.law == self.law and remembers(old.controller)
+        controller = None if goes_on else circumstances.law.made()
         if self._only_weighed(wanted):
             return old.with_density(environment)
         changed = _fitted(
