@@ -87,7 +87,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
             window.do("robot:next")
             for _ in range(10):
                 window.frame(1 / 30)
-        for deed in ("live", "step", "restart", "first", "branch", "more", "save:run"):
+        for deed in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
             window.do(deed)
             window.frame(1 / 30)
         sessions.append(window.desk.session)
