@@ -170,9 +170,7 @@ class Choice:
             ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
         ui.row(height=32, below=8)
         ui.text_entry("text", self.text, ghost=self.ghost)
-        assert ui.edit is not None
-        if ui.edit.text != self.text:
-            self.text, self.chosen, self.top, self.trouble = ui.edit.text, 0, 0, ""
+        self.typed(ui)
         if self.trouble:
             ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
         found = list(self.options(self.text))
@@ -186,6 +184,11 @@ class Choice:
         ui.row(height=22, below=0)
         more = f"{len(found)} in all · " if len(found) > ROWS else ""
         ui.label(more + self.hint, style="unit", at="center")
+
+    def typed(self, ui: Ui) -> None:
+        """Take note of what the field holds: letters and Enter may come within one frame."""
+        if ui.focus == "text" and ui.edit is not None and ui.edit.text != self.text:
+            self.text, self.chosen, self.top, self.trouble = ui.edit.text, 0, 0, ""
 
     def _accept(self, option: Option | None, ui: Ui) -> None:
         try:
@@ -333,6 +336,8 @@ class Dialogs:
                 self.close()
         else:
             ui.take(event)
+        if isinstance(asked, Choice):
+            asked.typed(ui)
         if asked.done and self.asked is asked:
             self.asked = None
         return event.type not in _NOT_OURS

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pygame
 import pytest
+from driven_window import opened
 
 from robocov.errors import InputError
 from robocov_app.render.theme import DARK, LIGHT
@@ -289,3 +291,16 @@ def test_a_menu_at_the_cursor_stays_in_the_window_and_passes_over_what_cannot_be
     menu.take(key("down"))
     menu.take(key("return"))
     assert its.done == ["pause"] and not menu.open
+
+
+def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> None:
+    """As on a slow machine: the key that asks, letters and Enter come before anything is drawn."""
+    with opened(tmp_path) as driver:
+        for letter in ("/", *"robots 1", "\r"):
+            key = pygame.key.key_code("return") if letter == "\r" else ord(letter)
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode=letter, scancode=0))
+            if letter.isprintable():
+                pygame.event.post(pygame.event.Event(pygame.TEXTINPUT, text=letter))
+            pygame.event.post(pygame.event.Event(pygame.KEYUP, key=key, mod=0, unicode=letter, scancode=0))
+        driver.frames(2)
+        assert not driver.window.dialogs.open and driver.desk.session.numbers == (1,)
