@@ -98,7 +98,13 @@ class Kernel:
 
     def __call__(self, *args: Any) -> Any:
         """Return what the function returns."""
-        return self._dispatcher(*args)
+        try:
+            return self._dispatcher(*args)
+        except SystemError as error:
+            # Ctrl-C while numba looks at the arguments
+            if isinstance(error.__cause__, KeyboardInterrupt):
+                raise KeyboardInterrupt from None
+            raise
 
     @cached_property
     def _callees(self) -> dict[str, Kernel]:

@@ -169,3 +169,19 @@ def test_a_kernel_that_cannot_be_compiled_says_so_each_time(monkeypatch, tmp_pat
         with pytest.raises(Exception, match="nowhere"):
             missing(1.0)
         assert gc.isenabled()
+
+
+def test_ctrl_c_amid_a_call_is_ctrl_c() -> None:
+    """numba's dispatcher makes a SystemError of it."""
+    from robocov.compiled import Kernel
+
+    def interrupted(*args: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise SystemError("returned a result with an exception set") from error
+
+    kernel = Kernel(lambda x: x, {})
+    kernel.__dict__["_dispatcher"] = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        kernel(1)
