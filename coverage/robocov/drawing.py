@@ -18,7 +18,7 @@ DEFAULT = "matplotlib"
 
 
 class DrawingBackend(Protocol):
-    """Who draws; what axes and options are is the backend's affair.
+    """Interface of a drawing backend; axes and options are the backend's own types.
 
     ``plot_...(thing, axes=None, **options)`` draws on the axes and returns them; where they are None, on a
     page of its own, and returns that page's. Notebooks show what ``..._html(thing)`` returns, a str, and

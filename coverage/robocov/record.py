@@ -162,12 +162,12 @@ class Record(Drawable):
 
     @cached_property
     def working(self) -> BoolArray:
-        """Which robots were there and had not failed, (T, n) bool; read-only."""
+        """Mask of robots present and not failed, (T, n) bool; read-only."""
         return self._of_robots(Conditions.working)
 
     @cached_property
     def present(self) -> BoolArray:
-        """Which robots were there, whether they worked or had failed, (T, n) bool; read-only."""
+        """Mask of robots present, failed ones included, (T, n) bool; read-only."""
         return self._of_robots(Conditions.present)
 
     def _of_robots(self, which: Callable[[Conditions, Array, int], BoolArray]) -> BoolArray:

@@ -179,7 +179,7 @@ class Simulation:
 
     @property
     def working(self) -> BoolArray:
-        """Which robots are there and have not failed, (n,) bool."""
+        """Mask of robots present and not failed, (n,) bool."""
         return self._world.working
 
     def observe(self) -> Observations:

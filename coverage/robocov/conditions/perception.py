@@ -1,4 +1,4 @@
-"""What robots know under conditions: the ideal observations, made as bad as the conditions say.
+"""Imperfect perception and communication: observations degraded by noise, loss, delay and rate.
 
 A message tells where its sender believes itself to be. It goes to all that are in range of it, and it in
 range of them, when it is sent; for each of these it is lost or not by itself; and it arrives after the
@@ -165,7 +165,7 @@ class Broadcast(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inbox:
-    """What has arrived, and what is on its way; never changed, only replaced."""
+    """Messages received and messages in flight; immutable, replaced at each step."""
 
     sent: IntArray
     """The step at which the newest message that row's robot has of column's was sent, or `NEVER`, (n, n)."""

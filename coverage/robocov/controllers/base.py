@@ -1,4 +1,4 @@
-"""What a controller is: a law for the whole team, or one that is asked for each robot in turn."""
+"""The controller interface: a law for the whole team, or one called for each robot in turn."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _REMEMBERED = 64
 
 @dataclass(frozen=True, eq=False)
 class Sites:
-    """Where the sites of a lattice are."""
+    """Sites of a lattice: centres of its cells in free space, where the cost is integrated."""
 
     lattice: int
     """Cells along a side."""

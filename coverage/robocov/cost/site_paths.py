@@ -45,7 +45,7 @@ class Tiles(NamedTuple):
 
 
 class CornerViews(NamedTuple):
-    """Which sites each corner sees, in rows of a corner and a tile, by tile."""
+    """Sites visible from each corner, in rows of one corner and one tile, sorted by tile."""
 
     first: IntArray
     """(t + 1,) The rows of a tile are those from its own `first` up to the next."""

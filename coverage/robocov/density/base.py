@@ -89,7 +89,7 @@ def _moments(start: Array, end: Array, cell: IntArray, count: int) -> Array:
 
 
 class Density(ABC):
-    """How much each place counts: φ of equation (4), dimensionless, never negative. Immutable."""
+    """Importance of each place: φ of equation (4), dimensionless, never negative. Immutable."""
 
     kind: ClassVar[str]
     """As map files call it."""

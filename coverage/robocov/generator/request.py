@@ -1,4 +1,4 @@
-"""What is asked of a generated map, and how its coordinates are rounded."""
+"""Parameters of a generated map, and the rounding of its coordinates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot heads for in its cell: the point from which the cell's locational cost (4) is best.
+"""The point of a cell with the least locational cost (4): a robot's target.
 
 It is found by Newton's method, in all cells at once. For f = r the cost of a convex cell is strictly convex.
 For f = 1/(r²+h²) it need not be, but it has no second optimum: f is (-1/2)-concave, and in the plane the

@@ -189,7 +189,7 @@ class StartReport(NamedTuple):
 
 @dataclass(frozen=True)
 class MapReport:
-    """What `check_map` finds.
+    """Findings of `check_map`.
 
     Attributes
     ----------

@@ -51,7 +51,7 @@ class Results:
         self.columns: tuple[str, ...] = tuple(dataset.schema.names)
 
     def __len__(self) -> int:
-        """How many runs there are, with those that failed."""
+        """Number of runs, failed ones included."""
         return int(self.dataset.count_rows())
 
     def __repr__(self) -> str:

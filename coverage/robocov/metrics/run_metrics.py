@@ -1,4 +1,4 @@
-"""What the field measures of a run: coverage, sight, energy, ways, connectivity, clearance, by moments."""
+"""Metrics of a run over time: coverage, visible area, energy, path lengths, connectivity, clearance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What robots see of a map: visibility polygons, exact, and the areas that a team covers.
+"""Exact visibility polygons, and the area of a map that a team sees.
 
 A robot's view is divided at the directions of the ends of all walls that face it. Between two neighbouring
 ones the nearest wall is one and the same, so that one ray through the middle finds it, and the view there is

@@ -1,4 +1,4 @@
-"""What the robots know, and what they decide: the types between the world and the controllers.
+"""Observations and decisions: the types between the world and the controllers.
 
 *Distributed* and *unknown obstacles* are facts of these types. Row i of `Observations` belongs to
 robot i: its own state, the robots it hears, the nearest obstacle point it senses, the convex region.
@@ -33,7 +33,7 @@ MOST_RAYS = 3600
 
 @dataclass(frozen=True, slots=True)
 class Scanning:
-    """How a controller wants its robots to scan; it says so in an attribute `scanning`.
+    """Range-scan settings that a controller asks for by its attribute `scanning`.
 
     The rays are spread evenly round a full turn, the first along +x. The period (s) between two scans is
     rounded to whole control periods; the first scan is at the beginning. A ParameterError is raised when one
@@ -140,7 +140,7 @@ class Observations:
 
 @dataclass(slots=True, eq=False)
 class Decision:
-    """What a controller decides, and what explains it."""
+    """Forces that a controller commands, with the quantities that explain them."""
 
     forces: Array
     """(n, 2) N, what each robot wants to be driven with, before any limit; viscosity is the world's."""

@@ -1,4 +1,4 @@
-"""Who hears whom, and who is close to whom."""
+"""Communication graph and near pairs of a team."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _BINNED_FROM = 24
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbours:
-    """Who hears whom: compressed rows, or the complete graph without its n² entries."""
+    """Communication graph: compressed rows, or the complete graph without its n² entries."""
 
     count: int
     """Number of robots n."""
@@ -61,7 +61,7 @@ class Neighbours:
 
     @property
     def complete(self) -> bool:
-        """Whether everybody hears everybody whatever the distance."""
+        """Whether the graph is complete: communication without a limit of range."""
         return self.indptr is None
 
     def of(self, robot: int) -> IntArray:

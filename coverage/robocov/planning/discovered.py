@@ -1,4 +1,4 @@
-"""What one robot has discovered of the obstacles: a grid that its own ray scans fill.
+"""Occupancy grid of one robot, filled by its own range scans.
 
 A cell is *unknown* until a ray has passed it (then it is *free*) or ended in it (then it is a *wall*). The
 ends of neighbouring rays that are closer together than `BRIDGE` belong to one surface: what lies between

@@ -1,4 +1,4 @@
-"""Where the robots of a team should be, for all that one of them knows: plans on a lattice of ways.
+"""Target placement of a team by the knowledge of one robot: k-median on a road lattice.
 
 The cost is (22) on the nodes of `GridPlanner`, each weighted with its area (times the density):
 
@@ -52,7 +52,7 @@ class CoverageDemand:
 
     @cached_property
     def weights(self) -> Array:
-        """How many cells each node stands for, (m,); unknown ones count by their openness."""
+        """Number of cells that each node stands for, (m,); unknown ones count by their openness."""
         window = self.window
         worth = np.where(self._state == FREE, 1.0, 0.0 if self.sure else self._openness)
         worth[self._outside] = 0.0
