@@ -81,6 +81,7 @@ def test_who_turns_back_before_a_gap_does_not_touch_its_rim() -> None:
     assert clearances(record).min() > 0.005
 
 
+@pytest.mark.slow
 def test_nothing_is_touched_on_the_way() -> None:
     record = simulation().run(25.0)
     clearance = clearances(record)
@@ -88,6 +89,7 @@ def test_nothing_is_touched_on_the_way() -> None:
     assert clearance.min() > 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Atlas, AtlasShared])
 def test_copies_and_repeated_runs_go_on_identically(kind: type[Atlas]) -> None:
     one, other = simulation(kind), simulation(kind)

@@ -44,6 +44,7 @@ def names(folder: Path) -> list[str]:
 # old or new, whatever happens
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("outcome", ["kill", "fail"])
 @pytest.mark.parametrize(

@@ -122,6 +122,7 @@ def test_files_hold_the_same_map(tmp_path_factory, words):
         assert word in f"{environment.name} {environment.description}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", GENERATORS)
 def test_starts_have_room_for_a_team(kind):
     for seed in range(12):

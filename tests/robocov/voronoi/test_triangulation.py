@@ -179,6 +179,7 @@ def test_what_is_mended_is_delaunay(seed: int, family: Family, n: int, exponent:
         points = np.clip(points + 10.0**exponent * rng.normal(size=points.shape), -9.0, 15.0)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(seeds, st.integers(16, 40))
 def test_a_triangulation_of_other_places_does_no_harm(seed: int, n: int) -> None:
@@ -241,6 +242,7 @@ class Home:
         return 2.0 * (own.centroid - own.position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", [Rapf(), Lloyd(), Individually(Home())], ids=lambda law: law.name)
 def test_thousands_of_steps_have_the_cells_of_the_first(controller: Controller) -> None:
     room = Environment(

@@ -133,6 +133,7 @@ def test_no_command_runs_the_code_of_results(
         assert lost == ([False, True, True] if words[1] == "both" else [True])
 
 
+@pytest.mark.slow
 def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(shared)
     for folder in ("run", "offered", "both/Mine", "both/planted"):

@@ -114,6 +114,7 @@ def waited(asked: ImportQuestion) -> None:
     assert not asked.busy
 
 
+@pytest.mark.slow
 def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     # every older import is given up
     worker: Any = LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=0.0)

@@ -133,6 +133,7 @@ WAYS: dict[str, tuple[str, WriteOptions]] = {
     **{place: (".geojson", WriteOptions(origin=at)) for place, at in PLACES.items()},
 }
 MAPS = [*bundled_maps(), *(f"generated {kind}" for kind in ("blocks", "caves", "mazes", "polygons", "rooms"))]
+QUICK = ("rooms", "campus", "generated polygons")
 
 
 @functools.cache
@@ -141,7 +142,9 @@ def a_map(name: str) -> Environment:
     return load_map(name) if kind == name else generated_map(1, kind=kind)
 
 
-@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MAPS]
+)
 @pytest.mark.parametrize("way", WAYS)
 def test_maps_go_out_and_in(tmp_path: Path, name: str, way: str) -> None:
     environment, (suffix, options) = a_map(name), WAYS[way]

@@ -35,6 +35,7 @@ def out_and_in(environment: Environment, path: Path, **options: Any) -> ForeignM
     return foreign
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "options"), FORMATS)
 @pytest.mark.parametrize("name", bundled_maps())
 def test_bundled_maps(tmp_path: Path, name: str, kind: str, options: dict[str, Any]) -> None:

@@ -127,6 +127,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured as Linux tells it")
 def test_they_are_refused(tmp_path: Path) -> None:
     files: list[tuple[Path, float | None]] = []

@@ -82,6 +82,7 @@ def test_walls_that_moved_by_the_tolerance_are_nothing_lost() -> None:
     assert not marked(figure.axes[1], LIGHT.start)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "free", [HALL, box(0, 0, 60, 2), box(0, 0, 2, 60), box(5e5, 5e6, 5e5 + 30, 5e6 + 20), box(0, 0, 1, 1)],
     ids=["hall", "corridor", "shaft", "far away", "small"],
@@ -102,6 +103,7 @@ def test_free_space_that_is_not_valid_is_drawn_all_the_same() -> None:
     assert any(isinstance(patch, PathPatch) for patch in figure.axes[0].patches)
 
 
+@pytest.mark.slow
 def test_files_are_the_same_every_time(tmp_path: Path) -> None:
     read = foreign(HALL - PILLARS)
     environment, report = shaped(read, Shaping(), "plan.svg")

@@ -211,6 +211,7 @@ def test_a_gap_that_has_closed_is_found() -> None:
     assert len(closed_gaps(sides, wide, solid, 0.2, 0.05)[0]) == 0
 
 
+@pytest.mark.slow
 def test_a_comb_of_many_teeth_does_not_exhaust_the_stack() -> None:
     # teeth of equal height make the usual recursion as deep as there are teeth
     teeth = 20_000

@@ -366,6 +366,7 @@ def test_uses_without_an_end_are_refused(tmp_path: Path, body: str, wanted: str)
     assert wanted in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_path_may_have_many_subpaths(tmp_path: Path) -> None:
     data = "".join(f"M{x} {y}h4v4h-4z" for x in range(10, 990, 10) for y in range(10, 590, 10))
     foreign = drawn(tmp_path, f'{PAGE}<path d="{data}"/>')

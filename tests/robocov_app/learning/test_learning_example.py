@@ -9,6 +9,7 @@ import pytest
 from robocov_app import learning
 
 
+@pytest.mark.slow
 def test_the_example_learns(capsys: pytest.CaptureFixture[str]) -> None:
     """What the package shows, with fewer tries: the best law is better than most on starts it never saw."""
     _, _, code = (learning.__doc__ or "").partition("    import numpy")

@@ -50,6 +50,7 @@ def test_there_is_something_to_say_of_each():
         draw_figure(9, RUNS, PARTITION, "light")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", NUMBERS)
 def test_files_have_the_width_of_a_journals_columns_and_come_out_the_same(number, tmp_path):
     figure = draw_figure(number, RUNS, PARTITION, "light")

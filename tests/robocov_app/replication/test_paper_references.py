@@ -21,6 +21,7 @@ def found(folder, maps=MAPS, restarts=2, stop=None, **other):
     return references(maps, folder, restarts=restarts, stop=stop or Interruption(), **options)
 
 
+@pytest.mark.slow
 def test_each_map_has_its_reference_and_its_file(tmp_path):
     answers = found(tmp_path / "references")
     assert set(answers) == {"square", "hall"}
@@ -35,6 +36,7 @@ def test_each_map_has_its_reference_and_its_file(tmp_path):
     assert sorted(x for x, _ in answers["hall"].positions) == pytest.approx([1.5, 4.5, 7.5], abs=0.4)
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_searched_for_again(tmp_path):
     first = found(tmp_path)
     path = tmp_path / "hall.json"

@@ -135,6 +135,7 @@ def test_an_unfinished_comparison_is_said_to_be_one(tmp_path, capsys) -> None:
     assert "Not finished: 1 of 3 runs is missing." in (tmp_path / "both/report.html").read_text()
 
 
+@pytest.mark.slow
 def test_one_damaged_run_is_named_and_the_report_goes_on(run, tmp_path, capsys) -> None:
     saved_comparison(tmp_path / "both")
     (tmp_path / "both/rpf/record.npz").write_bytes(b"PK")

@@ -113,6 +113,7 @@ def test_workers_that_end_again_and_again_end_the_sweep() -> None:
     assert executor.lost == 21
 
 
+@pytest.mark.slow
 def test_processes_do_what_this_one_does(tasks: list[Task]) -> None:
     with LocalPool(2) as pool:
         assert done_by(pool, tasks) == {task.name: perform(task) for task in tasks}

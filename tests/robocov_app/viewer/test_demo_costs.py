@@ -342,6 +342,7 @@ def test_another_process_says_the_same(worker_costs):
     assert answered(worker_costs)[0].time == 3.0
 
 
+@pytest.mark.slow
 def test_another_process_knows_where_obstacles_are(worker_costs):
     worker_costs.environment(CROSSED)
     speeds = np.array([0.5, 1.0])
@@ -370,6 +371,7 @@ def test_a_map_without_a_cost_is_said():
         costs.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 def test_a_process_that_dies_is_replaced(worker_costs):
     worker_costs.environment(HALL)

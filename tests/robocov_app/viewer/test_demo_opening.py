@@ -39,6 +39,7 @@ def test_without_a_display_it_says_so_in_one_line(
     assert complaint(capsys, "demo", "square") == NO_DISPLAY
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="X11")
 def test_a_display_that_does_not_answer_is_none(tmp_path: Path) -> None:
     kept = {

@@ -25,6 +25,7 @@ def test_wrapped_words_are_all_there_and_fit(text: str, width: int) -> None:
     assert all(text_width(line, 12) <= width for line in lines), "a word that is too wide is broken"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5), ((3840, 2160), 2.0)]
 )

@@ -89,6 +89,7 @@ def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -
     assert (tmp_path / "robocov-2.png").exists()
 
 
+@pytest.mark.slow
 def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> None:
     for _ in range(30):
         driver.session.step()

@@ -169,6 +169,7 @@ def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resume
         np.testing.assert_array_equal(mine, theirs)
 
 
+@pytest.mark.slow
 def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -> None:
     conditions = Conditions(
         loss=0.2,

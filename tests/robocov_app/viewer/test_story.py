@@ -74,6 +74,7 @@ def test_a_story_is_saved_with_its_parts_costs_and_film(
     assert load_session(out / "session.robocov").step == session.step_now
 
 
+@pytest.mark.slow
 def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = saved(played(), tmp_path)
     assert main(["run", path, *SMALL, "--out", str(tmp_path / "all"), "--all-branches"]) == 0
@@ -130,6 +131,7 @@ def test_replay_shows_a_story_from_its_beginning(tmp_path: Path, monkeypatch: py
     assert main(["replay", path, "--video", "--out", str(tmp_path / "film")]) == 2
 
 
+@pytest.mark.slow
 def test_a_run_is_saved_by_another_process_and_nothing_else_stays(tmp_path: Path) -> None:
     saver = RunSaver(16)
     words = saver.save(played(), tmp_path)
