@@ -137,6 +137,7 @@ def command(options: Arguments) -> int:
         laws=laws,
         lattice=options.lattice,
         file=file,
+        offers_lesson=file is None and options.lesson is None and not options.tour,
     )
     if options.headless:
         return rendered(opening, options)

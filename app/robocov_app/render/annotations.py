@@ -71,10 +71,14 @@ class Caption(Layer):
         left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
         y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
         size = 1.15 * canvas.theme.text
-        name = shortened(scene.label, canvas.text_size(size), right - left, bold=True)
-        left += canvas.text(name, (left, y), size=size, bold=True) + 12 * canvas.scale
-        if canvas.text_width(scene.cost) <= right - left:
-            canvas.text(scene.cost, (right, y), anchor="right")
+        brief = scene.cost.replace("mean distance by φ ", "").replace("mean distance ", "")
+        costs = [scene.cost, brief, brief.partition(",")[0]]  # the number stays where the words have no room
+        gap = 12 * canvas.scale
+        room = right - left - gap - canvas.text_width(costs[-1])
+        name = shortened(scene.label, canvas.text_size(size), room, bold=True)
+        left += canvas.text(name, (left, y), size=size, bold=True) + gap
+        cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
+        canvas.text(cost, (right, y), anchor="right")
 
 
 class Status(Layer):

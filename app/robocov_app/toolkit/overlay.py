@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import pygame
 
 from robocov_app.render.camera import Camera
@@ -85,27 +83,26 @@ def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Them
     screen.blit(picture, picture.get_rect(center=box.center))
 
 
-class Saying(Protocol):
-    """Who tells something for a while."""
-
-    message: str
-    trouble: bool
-
-
 def draw_message(
-    screen: pygame.Surface, said: Saying, arena: tuple[int, int, int, int], theme: Theme, scale: float
+    screen: pygame.Surface,
+    words: str,
+    arena: tuple[int, int, int, int],
+    theme: Theme,
+    scale: float,
+    trouble: bool,
 ) -> None:
-    """Show what was said last, at the foot of a box."""
-    if not said.message:
+    """Show a message at the foot of a box; nothing where there is none."""
+    if not words:
         return
     size = round(12.5 * scale)
     left, top, width, height = arena
-    lines = wrapped(said.message, size, min(width - 80 * scale, 620 * scale))
+    room = min(width - 80 * scale, 620 * scale)
+    lines = [line for part in words.split("\n") for line in wrapped(part, size, room)]
     wide = max(text_width(line, size) for line in lines) + 28 * scale
     box = pygame.Rect(0, 0, round(wide), round((len(lines) * 18 + 14) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
-    fill = mix(theme.panel, theme.trajectory, 0.14) if said.trouble else theme.panel
-    edge = theme.trajectory if said.trouble else mix(theme.panel, theme.ink, 0.3)
+    fill = mix(theme.panel, theme.trajectory, 0.14) if trouble else theme.panel
+    edge = theme.trajectory if trouble else mix(theme.panel, theme.ink, 0.3)
     rounded(screen, box, fill, edge, round(8 * scale), max(1, round(scale)))
     for k, line in enumerate(lines):
         picture = label(line, size, theme.ink)

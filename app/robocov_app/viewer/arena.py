@@ -23,6 +23,7 @@ from robocov_app.render.theme import mix, robot_hues
 from robocov_app.render.trajectories import Trajectories
 from robocov_app.viewer.overlays import tag
 from robocov_app.viewer.presenter import FADE
+from robocov_app.viewer.session.curves import TIME, compared
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
@@ -42,6 +43,9 @@ RAYS = 120
 
 FAR_SCAN = 12.0
 """Metres that scans reach where the sensor has no limit."""
+
+_OLD = 0.25
+"""Seconds from which on a cost that lags behind is shown with its time."""
 
 _REACH = 12.0
 """Pixels at scale 1 that a finger is wide."""
@@ -201,8 +205,7 @@ class Arena:
             self._scale_colours(known.field.largest)
         number = desk.selected
         selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
-        what = mean_words(circumstances.environment)
-        cost = "" if known is None else cost_words(what, known.result.mean_distance, known.travel_time)
+        cost = self._caption_cost(lane)
         starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
         scene = Scene.of(
             circumstances.environment,
@@ -226,6 +229,17 @@ class Arena:
             sensed=lane.sensed,
             path=known.path if known is not None and desk.cursor is not None else None,
         )
+
+    def _caption_cost(self, lane: Lane) -> str:
+        """Return the numbers that the chart shows, with their time where that is not the present's."""
+        session = self.desk.session
+        time, distances = compared(session)
+        _, times = compared(session, TIME)
+        if lane.number not in distances:
+            return ""
+        what = mean_words(session.circumstances(lane).environment)
+        words = cost_words(what, distances[lane.number], times.get(lane.number))
+        return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
     def _scale_colours(self, largest: float) -> None:
         """Let the scale of colours follow what is shown, without trembling."""

@@ -89,6 +89,7 @@ class Chart:
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self._page: pygame.Surface | None = None
+        self._place: Callable[[Array, Array], Array]
         self._key: object = None
         self._samples: object = None
         self._drawn_at = -1.0
@@ -179,6 +180,7 @@ class Chart:
             self._plot(canvas)
             self._track(canvas)
         screen.blit(self._page, self.layout.chart[:2])
+        self._values(screen)
         self._cursor(screen)
         self._hovered(screen)
 
@@ -253,7 +255,7 @@ class Chart:
             points = place(curve.time, curve.value)
             if len(points) > 1:
                 self._curve(canvas, _thinned(points), self._colour(lane))
-        self._values(canvas, place)
+        self._place = place
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
@@ -293,9 +295,14 @@ class Chart:
             )
             free = x + wide + 8 * self.layout.scale
 
-    def _values(self, canvas: Canvas, place: Callable[[Array, Array], Array]) -> None:
-        """Write each pane's value at the right, with the gap to the best; none over another."""
+    def _values(self, screen: pygame.Surface) -> None:
+        """Write each pane's value at the right, with the gap to the best; none over another.
+
+        They are those of the captions, which are newer than a page that is drawn ten times a second.
+        """
         session, theme, scale = self.desk.session, self.theme, self.layout.scale
+        chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
+        canvas = Canvas(chart, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
         _, right, _ = self._span
         time, known = compared(session, self.plotted)
         if not known:
@@ -305,7 +312,7 @@ class Chart:
             (each for each in session.lanes if each.number in known), key=lambda each: -known[each.number]
         )
         now = np.full(len(lanes), time)
-        wanted = place(now, np.array([known[lane.number] for lane in lanes]))[:, 1]
+        wanted = self._place(now, np.array([known[lane.number] for lane in lanes]))[:, 1]
         rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
         for y, lane in zip(rows, lanes, strict=True):
             value = known[lane.number]

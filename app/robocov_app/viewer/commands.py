@@ -197,6 +197,13 @@ def desk_commands(desk: Desk, titles: dict[str, str]) -> list[Command]:
         ),
         Command("theme", "Light or dark", "View", desk.switch_theme, ("t",)),
         Command("fade", "Trajectories fade", "View", desk.switch_fade, ("shift+t",)),
+        Command(
+            "suggestions",
+            "Suggestions once the team has settled",
+            "View",
+            desk.switch_suggestions,
+            ("shift+h",),
+        ),
         Command("panel", "Hide or show the panel", "View", desk.switch_panel, ("h",)),
         Command("save:session", "Save the session", "Keep", desk.save_session, ("ctrl+s",)),
         Command("recover", "Recover a session", "Keep", desk.recover, ("ctrl+shift+o",)),

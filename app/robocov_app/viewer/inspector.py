@@ -318,6 +318,9 @@ def _verdict(case: _Case, motion: str) -> str:
         return f"setting off {_compass(case.resultant)}" + (f" to {aim.name}" if aim and ahead else "")
     if case.stuck:
         return f"at rest, stuck: {where}"
+    if aim and abs(aim.offset) <= FAR and not case.balanced and not held:
+        pushed = f"a force of {_force(abs(case.resultant))} {_compass(case.resultant)} acts on it"
+        return f"{_length(abs(aim.offset))} from {aim.name}, not at rest: {pushed}"
     if aim and abs(aim.offset) <= FAR:
         near = "on" if abs(aim.offset) <= SETTLED_DISTANCE else f"{_length(abs(aim.offset))} from"
         return f"arrived: at rest {near} {aim.name}" + (f", which is {aim.hidden}" if aim.hidden else "")

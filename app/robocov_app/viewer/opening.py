@@ -13,6 +13,7 @@ from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.viewer.actions import KEY_REPEAT
 from robocov_app.viewer.costs import LATTICE, Costs
+from robocov_app.viewer.layout import SMALLEST
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings
@@ -109,7 +110,9 @@ class Opening:
         laws: tuple[str, ...] = (),
         lattice: int = LATTICE,
         file: Path | None = None,
+        offers_lesson: bool = False,
     ) -> None:
+        self._offers_lesson = offers_lesson
         self.session, self.map_name, self.folder = session, map_name, folder
         self.theme, self.size, self.scale = theme, size, scale
         self.also, self.without = also, without
@@ -134,6 +137,8 @@ class Opening:
                 window.desk.say(trouble)
                 if not self.headless and (left := recoverable(autosave_folder())):
                     window.desk.say(f"{left[0].words}: Ctrl K, “recover” opens it")
+                elif self._offers_lesson and file is not None and not file.exists():
+                    window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)
                 try:
                     yield window
@@ -160,8 +165,10 @@ class Opening:
             shown = {layer.name for layer in layers} & set(settings.shown)
         self._only_now, self._not_now = self.also - shown, self.without & shown
         shown = (shown | self.also) - self.without
-        size = self.size or (settings.width, settings.height)
         scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+        size = self.size or (settings.width, settings.height)
+        if self.size is None and self.scale is not None:  # text of that size needs a window of that size
+            size = max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale))
         if self.size is None and not self.headless:
             size = fitting(size)
         if self.headless:
@@ -171,8 +178,13 @@ class Opening:
             kept_in = None if self.headless else autosave_folder()
             desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file)
             desk.theme = self.theme or settings.theme
-            desk.fade = settings.fade
+            desk.fade, desk.suggests, desk.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(desk, size, scale, patient=self.headless)
+            if self.scale is not None and window.layout.scale < self.scale:
+                wide, high = (round(each * self.scale) for each in SMALLEST)
+                desk.say(
+                    f"scale {self.scale:g} needs a window of {wide} × {high}: {window.layout.scale:g} it is"
+                )
         except BaseException:
             costs.close()
             raise
@@ -187,6 +199,8 @@ class Opening:
         changes = {
             "theme": window.desk.theme,
             "fade": window.desk.fade,
+            "suggests": window.desk.suggests,
+            "recent": tuple(window.desk.recent),
             "shown": tuple(sorted((window.desk.shown - self._only_now) | self._not_now)),
             "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
             "width": min(max(width, 900), 7680),

@@ -79,6 +79,8 @@ class Pointer:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
         desk, arena, layout = self._desk, self._arena, self._arena.layout
         pane = arena.pane_at(self.at) if desk.cursor is not None else None
+        if pane is not None:  # the cameras may have moved below it
+            desk.cursor, desk.cursor_pane = arena.to_world(self.at, pane), pane
         number = None
         if pane is not None and desk.tool.name in _TAKES_ROBOTS:
             number = arena.robot_at(self.at, pane)
@@ -150,7 +152,9 @@ class Pointer:
         desk = self._desk
         pane = self._arena.pane_at(event.pos)
         over = inside(self._arena.layout.panel, event.pos)
-        desk.cursor = self._arena.to_world(event.pos, pane) if pane is not None and not over else None
+        desk.cursor = None
+        if pane is not None and not over:
+            desk.cursor, desk.cursor_pane = self._arena.to_world(event.pos, pane), pane
         self._chart.hover = event.pos if not self._drag else None
         if self._drag == "time":
             time = self._chart.time_at(event.pos[0])

@@ -12,6 +12,7 @@ from robocov_app.terminal.output import free_name
 from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
+from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
 from robocov_app.viewer.tools import Hand, Wall, toolbox
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 SAID_FOR = 5.0
 """Seconds for which a message stays."""
+
+_RECENT = 9  # sessions that are offered again
 
 FADE = 12.0
 """Seconds of path that trajectories show where they fade."""
@@ -85,6 +88,8 @@ class Desk:
         self.version = 0
         self.theme = "light"
         self.fade = False
+        self.suggests = True
+        self.recent: list[str] = []
         self.panel = True
         self.message = ""
         self.trouble = False
@@ -92,6 +97,7 @@ class Desk:
         self._said = 0.0
         self.now = 0.0
         self.cursor: Point | None = None
+        self.cursor_pane = 0
         self._mapped: object = None
         self._kept_in = kept_in
         self.workspace = Workspace(session, kept_in, file)
@@ -343,6 +349,11 @@ class Desk:
         self.fade = not self.fade
         self.say(f"trajectories show the last {FADE:g} s" if self.fade else "trajectories stay")
 
+    def switch_suggestions(self) -> None:
+        """Say what can be tried once the team has settled, or do not."""
+        self.suggests = not self.suggests
+        self.say(f"suggestions {'on' if self.suggests else 'off'}")
+
     def switch_panel(self) -> None:
         """Hide the panel, or show it."""
         self.panel = not self.panel
@@ -362,11 +373,26 @@ class Desk:
 
     def save_session(self, path: Path | None = None) -> None:
         """Write the session to its file, or to another."""
-        self.say(f"session saved: {self.workspace.save(self.folder, self.view, path)}")
+        saved = self.workspace.save(self.folder, self.view, path)
+        self._note_recent(saved)
+        self.say(f"session saved: {saved}")
+
+    def open_file(self, path: Path) -> None:
+        """Open a session or a map, by the ending of its name."""
+        if path.suffix == SUFFIX:
+            self.open_session(path)
+        else:
+            self.open_map(str(path))
+            self.say(f"map opened: {path}")
+
+    def _note_recent(self, path: Path) -> None:
+        name = str(path.absolute())
+        self.recent = [name, *(each for each in self.recent if each != name)][:_RECENT]
 
     def open_session(self, path: Path) -> None:
         """Go on with a session from its file; what was not saved of this one stays aside."""
         self._take(*opened(path, self.laws, self._kept_in))
+        self._note_recent(path)
         self.say(f"session opened: {path}")
 
     def recover(self) -> None:

@@ -19,3 +19,5 @@ class Settings(BaseModel):
     shown: tuple[str, ...] | None = None
     tab: str = "parameters"
     fade: bool = False
+    suggests: bool = True
+    recent: tuple[str, ...] = ()

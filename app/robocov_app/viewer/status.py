@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from robocov_app.viewer.presenter import Desk
 
 HINT = "Space pause · F1 keys"
+_SLOW = 30.0  # frames per second
 _FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
 
 
@@ -43,11 +44,11 @@ def facts(desk: Desk, frames: float, steps: float, filmed: float | None) -> list
             said.append(f"cut off {known.result.uncovered_area:.1f} m²")
     if filmed is not None:
         said.append(f"● film {filmed:.0f} s")
-    said.append(cursor_words(desk))
-    speed = speed_words(session.clock.speed)
+    speed, rate = speed_words(session.clock.speed), f"{frames:.0f} fps"
     if session.playing and session.clock.behind:
         speed += f", really {steps * session.scenario.dt:.1f}×"
-    said += [speed, f"{steps:.0f} steps/s", f"{frames:.0f} fps"]
+    rest = [cursor_words(desk), speed, f"{steps:.0f} steps/s"]
+    said += [rate, *rest] if frames < _SLOW else [*rest, rate]  # the first thing to know if it is low
     return [each for each in said if each]
 
 
@@ -57,7 +58,8 @@ def cursor_words(desk: Desk) -> str:
         return ""
     x, y = desk.cursor
     words = f"({x:.2f}, {y:.2f}) m"
-    known = desk.costs.known.get(desk.lane.number)
+    lane = desk.session.lanes[min(desk.cursor_pane, len(desk.session.lanes) - 1)]
+    known = desk.costs.known.get(lane.number)
     if known is None:
         return words
     result = known.result
@@ -66,7 +68,7 @@ def cursor_words(desk: Desk) -> str:
     if square[site] > (1.5 * known.lattice().spacing) ** 2:
         return f"{words}: not free"
     owner = int(result.owner[site])
-    numbers = desk.session.circumstances(desk.lane).numbers
+    numbers = desk.session.circumstances(lane).numbers
     if not 0 <= owner < len(numbers):
         return f"{words}: no robot can come"
     distance = float(result.distances[site])

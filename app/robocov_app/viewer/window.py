@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.errors import RobocovError
+from robocov.errors import ParameterError, RobocovError
 from robocov.files.atomic import written
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Command, Commands
-from robocov_app.toolkit.dialogs import Dialogs
+from robocov_app.toolkit.dialogs import Answer, Choice, Dialogs, Option, Question, file_choice
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.overlay import draw_message
@@ -38,6 +38,7 @@ from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, draw_status, facts
+from robocov_app.viewer.suggestions import suggestion
 
 if TYPE_CHECKING:
     from robocov_app.viewer.presenter import Desk
@@ -247,8 +248,8 @@ class Window:
         self.arena.draw(self.screen)
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
-        said = facts(desk, self._rate, self._steps_rate, filmed)
-        draw_status(self.screen, layout, theme, said, self.hint)
+        line = facts(desk, self._rate, self._steps_rate, filmed)
+        draw_status(self.screen, layout, theme, line, self.hint)
         if layout.panel[2] and self.tour is not None and self._lesson_shown:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
@@ -256,7 +257,12 @@ class Window:
         if self.tour is not None and self._lesson_shown and not layout.panel[2]:
             words = " ".join([self.tour.text, *self.tour.asks])
             draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
-        draw_message(self.screen, desk, layout.arena, theme, layout.scale)
+        said = desk.message
+        if not said and not self._patient and not self._lesson_shown:
+            said = suggestion(desk)
+        draw_message(
+            self.screen, said, layout.arena, theme, layout.scale, bool(desk.message) and desk.trouble
+        )
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
@@ -354,6 +360,8 @@ class Window:
                 ),
             ),
             Command("tour", "The lesson, or just play", "Help", self._start_tour, ("f2",)),
+            Command("open:file", "Open a session or a map", "Keep", self._open_file, ("ctrl+o",)),
+            Command("branches", "List of branches", "Time", self._list_branches, ("ctrl+b",)),
             Command("quit", "Quit", "Help", self._quit, ("ctrl+q",)),
         ]
 
@@ -386,6 +394,43 @@ class Window:
 
         ghost = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
         self.dialogs.ask(palette(self.commands, ghost, told))
+
+    def _open_file(self) -> None:
+        recent = [path for name in self.desk.recent if (path := Path(name)).exists()]
+        endings = (SUFFIX, ".json")
+        title = "Open a session or a map"
+        self.dialogs.ask(
+            file_choice(title, self.desk.folder, self.desk.open_file, endings=endings, recent=recent)
+        )
+
+    def _list_branches(self) -> None:
+        desk, session = self.desk, self.desk.session
+        session.stow()  # the curve of the present with those of the others
+
+        def lines(typed: str) -> list[Option]:
+            found = []
+            for k, each in enumerate(session.branches, 1):
+                text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
+                if typed.casefold() in text.casefold():
+                    found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
+            return found
+
+        def enter(typed: str, option: Option | None) -> None:
+            if option is None or not isinstance(option.value, int):
+                raise ParameterError(f"branch: {typed!r}, but one of the list was wanted")
+            desk.enter(option.value)
+
+        hint = "↑ ↓ choose · Enter goes there · Esc closes"
+        self.dialogs.ask(Choice("Branches", lines, enter, "type to find one", hint))
+
+    def offer_lesson(self) -> None:
+        """Ask who is here for the first time whether to begin with the lesson."""
+        words = (
+            "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
+            "and what helps, in a few minutes; it is also there later, by F2."
+        )
+        answers = [Answer("Lesson 1", self._start_tour), Answer("Just let me play", key="escape")]
+        self.dialogs.ask(Question("Welcome to robocov", words, answers))
 
     def _toggle_help(self) -> None:
         self.help = not self.help
@@ -457,11 +502,7 @@ class Window:
             self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.DROPFILE:
             path = Path(event.file)
-            self.desk.attempt(
-                lambda: (
-                    self.desk.open_session(path) if path.suffix == SUFFIX else self.desk.open_map(str(path))
-                )
-            )
+            self.desk.attempt(lambda: self.desk.open_file(path))
         elif event.type == pygame.KEYDOWN and self._asked() and event.unicode in "1234" and event.unicode:
             assert self.tour is not None
             self.tour.reply(int(event.unicode))

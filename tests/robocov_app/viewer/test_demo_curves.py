@@ -35,9 +35,10 @@ def test_an_empty_curve():
     assert len(curve.between(0.0, 1.0)) == 0
 
 
-def test_what_comes_late_is_left_out():
-    curve = drawn((0.0, 3.0), (1.0, 2.0), (0.5, 9.0))
-    assert curve.time.tolist() == [0.0, 1.0]
+def test_what_comes_late_finds_its_place():
+    """Whoever looks back asks for the cost of a moment that was passed over."""
+    curve = drawn((0.0, 3.0), (1.0, 2.0), (0.5, 2.6))
+    assert curve.time.tolist() == [0.0, 0.5, 1.0] and curve.at(0.5) == 2.6
 
 
 def test_the_newest_of_one_time_counts():

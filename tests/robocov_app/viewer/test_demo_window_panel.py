@@ -294,7 +294,7 @@ def test_pages_that_were_turned_to_before_look_as_they_did(tmp_path: Path) -> No
         pictures = {}
         for tab in TABS * 2:
             driver.window.panel.show_tab(tab)
-            driver.frames(3, 0.3)
+            driver.frames(9)
             if tab in pictures:
                 assert driver.same(pictures[tab]), tab
             pictures[tab] = driver.picture()

@@ -190,6 +190,13 @@ def test_arrivals(distance, verdict):
     assert moment([[4, 4]], goals=[[4, 4 + distance]]).verdict == verdict
 
 
+def test_who_is_pushed_has_not_arrived():
+    """It hardly moves, and has swayed enough not to be setting off."""
+    path = np.array([[4.0, 4.0], [4.0, 4.03], [4.0, 4.0]])
+    report = moment([[4, 4]], goals=[[4.1, 4]], wind=[[0.5, 0]], recent=path)
+    assert report.verdict == "10 cm from its goal, not at rest: a force of 0.50 N east acts on it"
+
+
 def test_arrived_at_what_is_inside_an_obstacle():
     report = moment([[3.85, 5]], goals=[[4.1, 5]], environment=ROOMS)
     assert report.verdict == "arrived: at rest 25 cm from its goal, which is inside an obstacle"

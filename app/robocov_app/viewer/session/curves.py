@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -59,18 +60,20 @@ class Curve:
         return self._time[-1] if self._time else -np.inf
 
     def add(self, time: float, value: float) -> None:
-        """Append a sample; one that is earlier than the last is left out, one of its time replaces it."""
-        if time < self.last_time - 1e-9 or not np.isfinite([time, value]).all():
+        """Take a sample at any time; one of the same time is replaced."""
+        if not np.isfinite([time, value]).all():
             return
-        if time <= self.last_time + 1e-9:
-            self._value[-1] = value
+        k = bisect_left(self._time, time - 1e-9)
+        if k < len(self._time) and self._time[k] <= time + 1e-9:
+            self._value[k] = value
             return
         if len(self._time) >= MOST_SAMPLES:
             half = MOST_SAMPLES // 2
             self._time[:half] = self._time[:half:2]
             self._value[:half] = self._value[:half:2]
-        self._time.append(time)
-        self._value.append(value)
+            k = bisect_left(self._time, time)
+        self._time.insert(k, time)
+        self._value.insert(k, value)
 
     def outline(self, most: int) -> list[list[float]]:
         """Return times and values of some samples, the last among them, with few digits."""

@@ -94,6 +94,16 @@ class Branch(NamedTuple):
     end: int
     words: str
 
+    def told(self, dt: float) -> str:
+        """Return when it ends and, where that is known, each pane's mean distance then."""
+        ends = {
+            pane: curve.at(self.end * dt)
+            for (pane, what), curve in self.node.curves.items()
+            if what == "distance"
+        }
+        known = [f"{self.node.controllers[pane].label} {value:.3f} m" for pane, value in sorted(ends.items())]
+        return " · ".join([f"{self.end * dt:.1f} s", *known])
+
 
 class Document:
     """Nodes in the order in which they came to be; the first begins with a scenario."""

@@ -1,0 +1,223 @@
+"""The first minutes: the offer of the lesson, suggestions, numbers that match, files and branches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+from driven_window import MIDDLE, opened
+from touched_run import HALL, RAPF, begun
+
+from robocov.mapfile import save_map
+from robocov_app.render.canvas import Canvas
+from robocov_app.toolkit.dialogs import Choice, Question
+from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
+from robocov_app.viewer import opening
+from robocov_app.viewer.opening import Opening, display
+from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.settings import Settings
+from robocov_app.viewer.status import cursor_words, facts
+from robocov_app.viewer.suggestions import suggestion
+
+FOUR = (RAPF, Law("rpf"), Law("lloyd"), Law("geodesic-lloyd"))
+
+
+@pytest.fixture
+def words(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Everything that is written on canvases from now on."""
+    written: list[str] = []
+    text = Canvas.text
+
+    def noted(canvas: Canvas, words: str, *args: object, **kwargs: object) -> float:
+        written.append(words)
+        return text(canvas, words, *args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Canvas, "text", noted)
+    return written
+
+
+def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, words: list[str]) -> None:
+    with opened(tmp_path, RAPF, Law("rpf")) as driver:
+        session = driver.session
+        driver.frames(2)
+        driver.window._ask_costs = lambda: None  # type: ignore[method-assign]  # no answer comes any more
+        for _ in range(90):
+            session.step()
+        words.clear()
+        driver.settle()
+        for lane in session.lanes:
+            value = f"{lane.curve.value[-1]:.3f}"
+            assert session.end - lane.curve.last_time > 1.0
+            caption = f"mean distance {value} m at {lane.curve.last_time:.1f} s"
+            assert caption in words and any(value in each and each != caption for each in words)
+
+
+def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, Law("rpf")) as driver:
+        other = driver.session.lanes[1]
+        other.simulation = other.simulation.changed(positions=other.simulation.positions + [0.3, 0.0])
+        driver.desk.costs.forget()
+        said = []
+        for pane in (0, 1):
+            driver.move(*driver.pixel(MIDDLE, pane))
+            driver.frames(2)
+            assert driver.desk.active == 0
+            said.append(cursor_words(driver.desk))
+        assert said[0] != said[1]
+        before = driver.desk.cursor
+        driver.desk.open_map("square")
+        driver.frames(2)
+        assert driver.desk.cursor != before  # the same pixel is another place there
+        assert driver.desk.cursor == driver.window.arena.to_world(driver.at, 1)
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])
+def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size: tuple[int, int]) -> None:
+    with opened(tmp_path, *FOUR, size=size) as driver:
+        boxes = driver.window.layout.panes
+        driver.frames(2)
+        words.clear()
+        driver.settle()
+        for lane in driver.session.lanes:
+            value = f"{lane.curve.at(0.0):.3f} m"
+            assert any(value in each for each in words), (size, boxes)
+        columns = len({left for left, *_ in boxes})
+        assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
+
+
+def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.move(*driver.pixel(MIDDLE))
+        slow, fast = facts(driver.desk, 9.0, 60.0, None), facts(driver.desk, 60.0, 60.0, None)
+        assert slow.index("9 fps") < slow.index(cursor_words(driver.desk))
+        assert fast.index("60 fps") > fast.index(cursor_words(driver.desk))
+
+
+def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        desk, session = driver.desk, driver.session
+        assert suggestion(desk) == ""
+        session.settled = True
+        assert suggestion(desk).startswith(
+            "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
+        )
+        before = driver.picture()
+        driver.window._patient = False
+        driver.settle()
+        assert not driver.same(before)
+        session.fail_robot(2)
+        assert suggestion(desk) == ""  # something is going on again
+        session.settled = True
+        assert "fail" not in suggestion(desk)  # that is known now
+        session.look_at(0.0)
+        driver.window.do("suggestions")
+        session.look_at(session.end)
+        assert suggestion(desk) == ""
+
+
+def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Opening:
+    """Return how a window opens that somebody would watch, on a display that nobody sees."""
+    monkeypatch.setenv(FOLDER, str(folder))
+    monkeypatch.setattr(opening, "display", lambda headless: display(headless=True))
+    return Opening(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
+
+
+def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for chosen, lesson in (("return", True), ("escape", False)):
+        folder = tmp_path / chosen
+        with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
+            assert isinstance(window.dialogs.asked, Question)
+            assert [answer.text for answer in window.dialogs.asked.answers] == [
+                "Lesson 1",
+                "Just let me play",
+            ]
+            window.frame(0.0)
+            key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
+            window.frame(0.0)
+            assert window.dialogs.asked is None and (window.tour is not None) is lesson
+        with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
+            assert window.dialogs.asked is None
+
+
+def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
+        assert window.dialogs.asked is None
+
+
+def test_a_scale_takes_the_window_that_it_needs_or_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(opening, "fitting", lambda size: (min(size[0], 1500), min(size[1], 1000)))
+    with opened_for_a_person(monkeypatch, tmp_path, scale=1.5).window() as window:
+        assert window.layout.scale == 1.5 and window.screen.get_size() == (1350, 900)
+    with opened_for_a_person(monkeypatch, tmp_path, scale=2.0).window() as window:
+        assert window.layout.scale == 1.625
+        assert window.desk.message == "scale 2 needs a window of 1800 × 1200: 1.625 it is"
+
+
+def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        desk = driver.desk
+        save_map(HALL, tmp_path / "other.json")
+        desk.save_session(tmp_path / "first.robocov")
+        desk.save_session(tmp_path / "second.robocov")
+        (tmp_path / "notes.txt").touch()
+        driver.key("ctrl+o")
+        asked = driver.window.dialogs.asked
+        assert isinstance(asked, Choice)
+        offered = [each.text for each in asked.options("")]
+        assert offered[:2] == [str(tmp_path / "second.robocov"), str(tmp_path / "first.robocov")]
+        assert offered[2:] == ["first.robocov", "other.json", "second.robocov"]
+        driver.type("oth")
+        driver.key("return")
+        assert not driver.window.dialogs.open and desk.map_name == str(tmp_path / "other.json")
+        driver.key("ctrl+o")
+        driver.key("down")
+        driver.key("return")
+        assert desk.workspace.path == tmp_path / "first.robocov"
+        assert desk.recent[0] == str(tmp_path / "first.robocov")
+        driver.key("ctrl+o")
+        driver.type("nothing.robocov")
+        driver.key("return")  # an error stays in the dialog, with what was typed
+        asked = driver.window.dialogs.asked
+        assert isinstance(asked, Choice) and "nothing.robocov" in asked.trouble
+        assert asked.text == "nothing.robocov"
+
+
+def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
+        window.desk.save_session(tmp_path / "mine.robocov")
+        window.desk.suggests = False
+    settings, _ = loaded(Settings, settings_file())
+    assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
+    with opened_for_a_person(monkeypatch, tmp_path).window() as window:
+        assert window.desk.recent == [str(tmp_path / "mine.robocov")] and not window.desk.suggests
+
+
+def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        desk, session = driver.desk, driver.session
+        session.playing = True
+        driver.frames(20)
+        session.fail_robot(2)
+        driver.frames(20)
+        failed = session.head
+        desk.look_at(0.2)
+        session.fail_robot(3)
+        driver.frames(20)
+        driver.key("ctrl+b")
+        asked = driver.window.dialogs.asked
+        assert isinstance(asked, Choice)
+        lines = asked.options("")
+        assert [line.text for line in lines][-1].endswith("robot 3 failed  (here)")
+        assert all("RAPF" in line.aside and " m" in line.aside for line in lines)
+        ends = np.array([lane.curve.at(session.end) for lane in session.lanes])
+        assert lines[-1].aside == f"{session.end:.1f} s · RAPF {ends[0]:.3f} m"
+        driver.type("robot 2")
+        driver.key("return")
+        assert session.head is failed
