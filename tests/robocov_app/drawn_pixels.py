@@ -3,12 +3,17 @@
 import numpy as np
 import shapely
 
-from robocov_app.render.picture import Painter
+from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.theme import LIGHT
 
 SIZE = (640, 480)
 ONE = np.array([[4.0, 4.0]])
 TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
+
+
+def layer_named(name, layers=None):
+    """Return a layer by its name."""
+    return next(layer for layer in layers or standard_layers() if layer.name == name)
 
 
 def drawn(scene, *names, size=SIZE, theme=LIGHT, layers=None):

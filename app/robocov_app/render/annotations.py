@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
 
 from robocov_app.render.camera import Camera, length_label, round_length
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.fonts import shortened, text_width
-from robocov_app.render.layers import Layer, LegendEntry
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Theme, robot_hues
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 MARGIN = 14.0
 EDGE = MARGIN + 2.0
@@ -28,19 +24,8 @@ _GAP = 18.0
 """Pixels at scale 1."""
 
 
-class ScaleBar(Layer):
-    """A bar of a round length in metres."""
-
-    name = "scale_bar"
-    title = "Scale bar"
-    in_world = False
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        draw_bar(canvas)
-
-
-def draw_bar(canvas: Canvas) -> None:
-    """Draw the bar at the foot of a canvas, with its length."""
+def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
+    """Draw a bar of a round length at the foot of a canvas, with its length."""
     length = bar_length(canvas)
     pixels = length * canvas.camera.zoom
     left = EDGE * canvas.scale
@@ -48,9 +33,8 @@ def draw_bar(canvas: Canvas) -> None:
     tick, width = 4.0 * canvas.scale, canvas.width(1.5)
     ink = canvas.theme.ink
     for x in (left, left + pixels):
-        box = pygame.Rect(round(x - width / 2), round(y - tick), width, round(2 * tick))
-        canvas.surface.fill(ink, box)
-    canvas.surface.fill(ink, pygame.Rect(round(left), round(y - width / 2), round(pixels), width))
+        canvas.surface.fill(ink, (round(x - width / 2), round(y - tick), width, round(2 * tick)))
+    canvas.surface.fill(ink, (round(left), round(y - width / 2), round(pixels), width))
     canvas.text(length_label(length), (left + pixels + 8 * canvas.scale, y), bold=True)
 
 
@@ -60,58 +44,40 @@ def bar_length(canvas: Canvas) -> float:
     return round_length(room / canvas.camera.zoom)
 
 
-class Caption(Layer):
-    """The controller's name and the cost above the arena, where several pictures stand side by side."""
-
-    name = "caption"
-    title = "Caption"
-    in_world = False
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
-        y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
-        size = 1.15 * canvas.theme.text
-        brief = scene.cost.replace("mean distance by φ ", "").replace("mean distance ", "")
-        costs = [scene.cost, brief, brief.partition(",")[0]]  # the number stays where the words have no room
-        gap = 12 * canvas.scale
-        room = right - left - gap - canvas.text_width(costs[-1])
-        name = shortened(scene.label, canvas.text_size(size), room, bold=True)
-        left += canvas.text(name, (left, y), size=size, bold=True) + gap
-        cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
-        canvas.text(cost, (right, y), anchor="right")
+def draw_caption(canvas: Canvas, scene: Scene) -> None:
+    """Draw the controller's name and the cost above the arena, where several pictures stand side by side."""
+    left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
+    y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
+    size = 1.15 * canvas.theme.text
+    brief = scene.cost.replace("mean distance by φ ", "").replace("mean distance ", "")
+    costs = [scene.cost, brief, brief.partition(",")[0]]  # the number stays where the words have no room
+    gap = 12 * canvas.scale
+    room = right - left - gap - canvas.text_width(costs[-1])
+    name = shortened(scene.label, canvas.text_size(size), room, bold=True)
+    left += canvas.text(name, (left, y), size=size, bold=True) + gap
+    cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
+    canvas.text(cost, (right, y), anchor="right")
 
 
-class Status(Layer):
-    """Controller, time and cost in the strip below the arena.
+def draw_brief_status(canvas: Canvas, scene: Scene) -> None:
+    """Draw the status line without what a caption says: the controller and the cost."""
+    draw_status(canvas, replace(scene, label="", cost=""))
 
-    `brief`: leave out what a `Caption` says: the controller and the cost.
-    """
 
-    name = "status"
-    title = "Status line"
-    in_world = False
-
-    def __init__(self, brief: bool = False) -> None:
-        self.brief = brief
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if self.brief:
-            scene = replace(scene, label="", cost="")
-        bar = bar_length(canvas)
-        taken = (
-            (EDGE + 8 + 16) * canvas.scale
-            + bar * canvas.camera.zoom
-            + canvas.text_width(length_label(bar), bold=True)
-        )
-        right = canvas.surface.get_width() - EDGE * canvas.scale
-        y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
-        size = canvas.text_size(canvas.theme.text)
-        name = shortened(scene.label, size, right - taken, bold=True)
-        room = right - taken - canvas.text_width(name, bold=True)
-        text = fitting_status(scene, size, room)
-        canvas.text(text, (right, y), anchor="right")
-        left = right - canvas.text_width(text) if text else right
-        canvas.text(name, (left, y), anchor="right", bold=True)
+def draw_status(canvas: Canvas, scene: Scene) -> None:
+    """Draw controller, time and cost in the strip below the arena."""
+    bar = bar_length(canvas)
+    taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
+    taken += canvas.text_width(length_label(bar), bold=True)
+    right = canvas.surface.get_width() - EDGE * canvas.scale
+    y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
+    size = canvas.text_size(canvas.theme.text)
+    name = shortened(scene.label, size, right - taken, bold=True)
+    room = right - taken - canvas.text_width(name, bold=True)
+    text = fitting_status(scene, size, room)
+    canvas.text(text, (right, y), anchor="right")
+    left = right - canvas.text_width(text) if text else right
+    canvas.text(name, (left, y), anchor="right", bold=True)
 
 
 def fitting_status(scene: Scene, size: int, room: float) -> str:
@@ -124,25 +90,19 @@ def fitting_status(scene: Scene, size: int, room: float) -> str:
     return shortened(lead + "   ·   ".join(facts), size, room) if facts else ""
 
 
-class Legend(Layer):
-    """Glyphs, drawn as the layers draw them, with words; only of the layers that are shown."""
-
-    name = "legend"
-    title = "Legend"
-    in_world = False
+class LegendStrip:
+    """Glyphs, drawn as the layers draw them, with words; kept until one changes."""
 
     def __init__(self) -> None:
-        self.entries: list[LegendEntry] = []
-        self._strip: pygame.Surface | None = None
-        self._key: object = None
+        self._kept: tuple[object, pygame.Surface] | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        width = canvas.surface.get_width()
-        words = tuple(entry.key() for entry in self.entries)
+        """Draw the canvas's legend at the top."""
+        width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
-        if self._strip is None or key != self._key:
-            self._strip, self._key = legend_strip(self.entries, canvas), key
-        canvas.surface.blit(self._strip, (0, 0))
+        if self._kept is None or key != self._kept[0]:
+            self._kept = key, legend_strip(canvas.legend, canvas)
+        canvas.surface.blit(self._kept[1], (0, 0))
 
 
 def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:
@@ -169,10 +129,7 @@ def legend_picture(
     scale: float,
     shown: frozenset[str] = frozenset(),
 ) -> NDArray[np.uint8]:
-    """Return these entries as an RGB picture of a width, (height, width, 3), 0 to 255.
-
-    Names of layers in `shown` are those that the pictures below show.
-    """
+    """Return entries as an RGB picture of a width, (height, width, 3), for pictures of the layers `shown`."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
     canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), shown)
     strip = legend_strip(entries, canvas)

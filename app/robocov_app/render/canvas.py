@@ -16,6 +16,7 @@ from robocov.arrays import Array, IntArray
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, text_width
+from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme
 
 FAR = 20000.0
@@ -66,11 +67,11 @@ def clipped_segment(
     return (x1 + dx * first, y1 + dy * first), (x1 + dx * last, y1 + dy * last)
 
 
-Pixel: TypeAlias = Sequence[float]
-"""x to the right and y down from the surface's corner."""
-
 Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
 """Gives the sprite for a shift in quarters of a pixel."""
+
+Glyph: TypeAlias = Callable[["Canvas", float, float], None]
+"""Draws a sign around a pixel, within 22 x 14 px at scale 1."""
 
 
 def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
@@ -79,12 +80,26 @@ def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
     return red, green, blue, round(255 * alpha)
 
 
+@dataclass(frozen=True)
+class LegendEntry:
+    """A line of the legend; `style` differs where the same words stand beside another glyph."""
+
+    text: str
+    draw: Glyph
+    style: str = ""
+
+    def key(self) -> tuple[str, str]:
+        """Return what an entry has in common with those that say and show the same."""
+        return self.text, self.style
+
+
 @dataclass(frozen=True, eq=False)
 class Canvas:
     """Where layers draw.
 
     `scale` multiplies widths and text sizes of the theme (2 on a screen of twice the density), `hues` are the
-    indices of the robots' colours, (n,), and `shown` the names of all layers that are drawn.
+    indices of the robots' colours, (n,), `shown` the names of all layers that are drawn, and `legend` is what
+    explains them.
     """
 
     surface: pygame.Surface
@@ -93,6 +108,7 @@ class Canvas:
     scale: float
     hues: IntArray
     shown: frozenset[str] = frozenset()
+    legend: Sequence[LegendEntry] = ()
 
     def width(self, pixels: float) -> int:
         """Return a stroke's width of `pixels` at scale 1: whole pixels, at least one."""
@@ -123,12 +139,8 @@ class Canvas:
                     self.outline(corners[begin:end], edge, self.width(1.0))
                 begin = end
             return
-        surface, points, draw, width = (
-            self.surface,
-            np.rint(corners).tolist(),
-            pygame.draw.polygon,
-            self.width(1.0),
-        )
+        surface, points, width = self.surface, np.rint(corners).tolist(), self.width(1.0)
+        draw = pygame.draw.polygon
         for end, fill in zip(ends, fills, strict=True):
             if end - begin > 2:
                 ring = points[begin:end]
@@ -199,7 +211,7 @@ class Canvas:
         """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         length = float(np.hypot(*(b - a)))
-        if length < 1.0 or self._far_off(start):
+        if length < 1.0 or ((a <= -500.0) | (a >= np.add(self.surface.get_size(), 500.0))).any():
             return
         along = (b - a) / length
         across = np.array([-along[1], along[0]])
@@ -234,9 +246,8 @@ class Canvas:
         self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None
     ) -> list[tuple[pygame.Surface, tuple[int, int]]]:
         """Return the pictures of sprites that are to be put at (n, 2) px, and their corners."""
-        near = np.flatnonzero(
-            ((centers > -500) & (centers < np.add(self.surface.get_size(), 500))).all(axis=1)
-        )
+        far = np.add(self.surface.get_size(), 500)
+        near = np.flatnonzero(((centers > -500) & (centers < far)).all(axis=1))
         # as for lines, whole numbers are the middles of pixels
         quarters = np.rint((centers[near] + 0.5) * sprites.FINE).astype(int)
         places, shifts = np.divmod(quarters, sprites.FINE)
@@ -253,11 +264,6 @@ class Canvas:
             picture, half = known[row]
             pictures.append((picture, (x - half, y - half)))
         return pictures
-
-    def _far_off(self, pixel: Pixel) -> bool:
-        """Whether what is small and drawn at `pixel` cannot be seen."""
-        width, height = self.surface.get_size()
-        return not (-500 < pixel[0] < width + 500 and -500 < pixel[1] < height + 500)
 
     def text(
         self,

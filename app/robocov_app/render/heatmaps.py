@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +14,10 @@ from robocov.arrays import Array, IntArray
 from robocov.density import Density
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import length_label
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import colours, density_words, parts
 from robocov_app.render.distance_field import Field, levels, palette, strength, ticks
-from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, Theme, mix
 
@@ -25,22 +25,21 @@ _DOTS = 60_000
 """On a surface the density is looked at in at most about so many places; between them it is interpolated."""
 
 
-class DensityShading(Layer):
-    """How much each place counts, where not all count the same; distances, in colours too, hide it."""
+def draw_density(canvas: Canvas, scene: Scene) -> None:
+    """Draw how much each place counts, where not all count the same; distances, in colours too, hide it."""
+    density = scene.environment.density
+    if (
+        density is not None
+        and not density.uniform
+        and not (scene.field is not None and "distances" in canvas.shown)
+    ):
+        draw_shading(canvas, density, scene.environment.region.vertices)
 
-    name = "density"
-    title = "Density φ"
-    static = True
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        density = scene.environment.density
-        hidden = scene.field is not None and "distances" in canvas.shown
-        if density is not None and not density.uniform and not hidden:
-            draw_shading(canvas, density, scene.environment.region.vertices)
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        words = density_words(scene.environment)
-        return [density_entry(words)] if words else []
+def density_legend(scene: Scene) -> list[LegendEntry]:
+    """Return the entry of the density with its range."""
+    words = density_words(scene.environment)
+    return [density_entry(words)] if words else []
 
 
 def density_entry(words: str) -> LegendEntry:
@@ -122,16 +121,19 @@ _HATCH = 5
 """Pixels of the coarse picture from one slanted line to the next."""
 
 
-class _Picture(Layer):
-    """A layer that is a picture of a field, kept until the field or the view changes."""
+class FieldPicture:
+    """A picture of a field that is kept until the field or the view changes.
 
-    default = False
+    `draw_picture` gives the picture of the pixels at (w,) x and (h,) y, m.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface]) -> None:
+        self.draw_picture = draw_picture
         self._kept: tuple[object, pygame.Surface] | None = None
         self._field: Field | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw the picture within the region."""
         field = scene.field
         left, top, width, height = _seen(canvas, scene)
         if field is None or width <= 0 or height <= 0:
@@ -142,111 +144,89 @@ class _Picture(Layer):
             across = np.column_stack([left + np.arange(width), np.full(width, top)])
             down = np.column_stack([np.full(height, left), top + np.arange(height)])
             x, y = canvas.camera.to_world(across)[:, 0], canvas.camera.to_world(down)[:, 1]
-            self._field, self._kept = field, (key, self.picture(canvas, scene, field, x, y))
+            self._field, self._kept = field, (key, self.draw_picture(canvas, scene, field, x, y))
         canvas.surface.blit(self._kept[1], (left, top))
         _cut_to_region(canvas, scene)
 
-    @abstractmethod
-    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
-        """Return the picture of the pixels at (w,) x and (h,) y, m."""
+
+def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
+    """Return how far every place is from the nearest robot, around obstacles, as colours."""
+    # smooth as it is, every second pixel will do
+    coarse = levels(field, _thinned(x), _thinned(y), scene.field_limit, _HATCH)
+    small = _paletted(coarse, palette(canvas.theme)).convert(canvas.surface)
+    large = pygame.transform.smoothscale(small, (2 * small.get_width(), 2 * small.get_height()))
+    return large.subsurface((0, 0, len(x), len(y)))
 
 
-class Distances(_Picture):
-    """How far every place is from the nearest robot, around obstacles, as colours."""
+def distances_legend(scene: Scene) -> list[LegendEntry]:
+    """Return the entries of the colours, and of where no robot can come."""
 
-    name = "distances"
-    title = "Distance map"
+    def glyph(canvas: Canvas, x: float, y: float) -> None:
+        wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
+        strip = np.broadcast_to(canvas.theme.heat_table(wide), (high, wide, 3))
+        canvas.surface.blit(_coloured(strip), (round(x - wide / 2), round(y - high / 2)))
 
-    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
-        # smooth as it is, every second pixel will do
-        coarse = levels(field, _thinned(x), _thinned(y), scene.field_limit, _HATCH)
-        small = _paletted(coarse, palette(canvas.theme)).convert(canvas.surface)
-        large = pygame.transform.smoothscale(small, (2 * small.get_width(), 2 * small.get_height()))
-        return large.subsurface((0, 0, len(x), len(y)))
+    def closed(canvas: Canvas, x: float, y: float) -> None:
+        canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        def glyph(canvas: Canvas, x: float, y: float) -> None:
-            wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
-            strip = np.broadcast_to(canvas.theme.heat_table(wide), (high, wide, 3))
-            canvas.surface.blit(_coloured(strip), (round(x - wide / 2), round(y - high / 2)))
-
-        def closed(canvas: Canvas, x: float, y: float) -> None:
-            canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
-
-        if scene.field is None:
-            return []
-        entries = [LegendEntry("distance to the nearest robot", glyph)]
-        if (scene.field.result.owner < 0).any():
-            entries.append(LegendEntry("no robot can come", closed))
-        return entries
+    entries = [LegendEntry("distance to the nearest robot", glyph)]
+    if scene.field is not None and (scene.field.result.owner < 0).any():
+        entries.append(LegendEntry("no robot can come", closed))
+    return entries
 
 
-class GeodesicCells(_Picture):
-    """Which robot is nearest, around obstacles: the cells that the coverage cost really sums over."""
-
-    name = "geodesic_cells"
-    title = "Geodesic cells"
-
-    def picture(self, canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
-        theme, zoom, width = canvas.theme, canvas.camera.zoom, _BORDER * canvas.scale
-        within = (0.5 * width + 1.0) / zoom
-        if "distances" in canvas.shown:
-            borders = field.borders(x, y, within)
-            lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
-            lines.fill((*_border_colour(theme), 0))
-            alpha = np.rint(255.0 * strength(borders, zoom, width))
-            pygame.surfarray.pixels_alpha(lines)[borders.column, borders.row] = alpha
-            # what is empty is passed over
-            lines.set_alpha(255, pygame.RLEACCEL)
-            return lines
-        # nobody, number -1, is the last
-        fills = np.array(
-            [*(theme.cell(hue) for hue in range(len(theme.robots))), theme.unreached], dtype=np.uint8
-        )
-        numbers = np.append(canvas.hues, len(fills) - 1).astype(np.uint8)
-        owners, borders = field.cells(x, y, within)
-        cells = _paletted(numbers.take(owners, mode="wrap"), fills).convert(canvas.surface)
-        pixels = pygame.surfarray.pixels3d(cells)
-        at, part = (borders.column, borders.row), strength(borders, zoom, width)[:, None]
-        pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(_border_colour(theme)))
-        del pixels  # which keeps the surface locked
-        return cells
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        def glyph(canvas: Canvas, x: float, y: float) -> None:
-            half = 8 * canvas.scale
-            canvas.line((x - half, y), (x + half, y), _border_colour(canvas.theme), canvas.width(_BORDER))
-
-        return [LegendEntry("geodesic cell border", glyph)] if scene.field is not None else []
+def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
+    """Return which robot is nearest, around obstacles: the cells that the coverage cost really sums over."""
+    theme, zoom, width = canvas.theme, canvas.camera.zoom, _BORDER * canvas.scale
+    within = (0.5 * width + 1.0) / zoom
+    if "distances" in canvas.shown:
+        borders = field.borders(x, y, within)
+        lines = pygame.Surface((len(x), len(y)), pygame.SRCALPHA, 32)
+        lines.fill((*border_colour(theme), 0))
+        alpha = np.rint(255.0 * strength(borders, zoom, width))
+        pygame.surfarray.pixels_alpha(lines)[borders.column, borders.row] = alpha
+        # what is empty is passed over
+        lines.set_alpha(255, pygame.RLEACCEL)
+        return lines
+    # nobody, number -1, is the last
+    tints = [*(theme.cell(hue) for hue in range(len(theme.robots))), theme.unreached]
+    numbers = np.append(canvas.hues, len(tints) - 1).astype(np.uint8)
+    owners, borders = field.cells(x, y, within)
+    fills = np.array(tints, dtype=np.uint8)
+    cells = _paletted(numbers.take(owners, mode="wrap"), fills).convert(canvas.surface)
+    pixels = pygame.surfarray.pixels3d(cells)
+    at, part = (borders.column, borders.row), strength(borders, zoom, width)[:, None]
+    pixels[at] = np.rint((1.0 - part) * pixels[at] + part * np.array(border_colour(theme)))
+    del pixels  # which keeps the surface locked
+    return cells
 
 
-class ColourBar(Layer):
-    """The scale of the colours of `Distances`, at the right."""
+def _border_glyph(canvas: Canvas, x: float, y: float) -> None:
+    half = 8 * canvas.scale
+    canvas.line((x - half, y), (x + half, y), border_colour(canvas.theme), canvas.width(_BORDER))
 
-    name = "colour_bar"
-    title = "Colour scale"
-    in_world = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.field is None or "distances" not in canvas.shown:
-            return
-        scale, theme = canvas.scale, canvas.theme
-        _, top, _, height = canvas.camera.view
-        room = canvas.surface.get_height() - STRIP * scale - top
-        high = max(round(min(0.72 * min(height, room), 300 * scale)), 2)
-        wide = round(_BAR * scale)
-        left = round(canvas.surface.get_width() - bar_room(canvas, scene) + _BESIDE * scale)
-        upper = round(top + (min(height, room) - high) / 2)
-        colours = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
-        canvas.surface.blit(_coloured(colours), (left, upper))
-        pygame.draw.rect(canvas.surface, theme.faint, (left, upper, wide, high), canvas.width(1.0))
-        for mark, text in _marks(scene):
-            y = upper + high * (1.0 - mark / scene.field_limit)
-            tick = pygame.Rect(
-                left + wide, round(y - 0.5 * canvas.width(1.0)), round(4 * scale), canvas.width(1.0)
-            )
-            canvas.surface.fill(theme.faint, tick)
-            canvas.text(text, (left + wide + _BESIDE * scale, y), size=theme.small_text)
+geodesic_legend = says("geodesic cell border", _border_glyph)
+
+
+def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:
+    """Draw the scale of the colours of distances at the right."""
+    if "distances" not in canvas.shown:
+        return
+    scale, theme, width = canvas.scale, canvas.theme, canvas.width(1.0)
+    _, top, _, height = canvas.camera.view
+    room = canvas.surface.get_height() - STRIP * scale - top
+    high = max(round(min(0.72 * min(height, room), 300 * scale)), 2)
+    wide = round(_BAR * scale)
+    left = round(canvas.surface.get_width() - bar_room(canvas, scene) + _BESIDE * scale)
+    upper = round(top + (min(height, room) - high) / 2)
+    colours = np.broadcast_to(theme.heat_table(high)[::-1, None], (high, wide, 3))
+    canvas.surface.blit(_coloured(colours), (left, upper))
+    pygame.draw.rect(canvas.surface, theme.faint, (left, upper, wide, high), width)
+    for mark, text in _marks(scene):
+        y = upper + high * (1.0 - mark / scene.field_limit)
+        canvas.surface.fill(theme.faint, (left + wide, round(y - 0.5 * width), round(4 * scale), width))
+        canvas.text(text, (left + wide + _BESIDE * scale, y), size=theme.small_text)
 
 
 def bar_room(canvas: Canvas, scene: Scene) -> float:
@@ -298,7 +278,8 @@ def _thinned(places: Array) -> Array:
     return np.asarray(places[::2] + 0.5 * step)
 
 
-def _border_colour(theme: Theme) -> Colour:
+def border_colour(theme: Theme) -> Colour:
+    """Return the colour of the borders of geodesic cells."""
     return mix(theme.ink, theme.background, 0.1)
 
 

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pygame
-import shapely
 
 from robocov.arrays import Array
 from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
-from robocov_app.render.canvas import FAR, Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
-from robocov_app.render.layers import Layer, LegendEntry, drawn_radii
+from robocov_app.render.canvas import (
+    Canvas,
+    LegendEntry,
+    bounded,
+    clipped_polygon,
+    clipped_segment,
+    premultiplied,
+)
+from robocov_app.render.layers import draw_blocked, draw_boundary, says
+from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
 
@@ -80,103 +89,77 @@ _HIT = 1.5
 
 def _dots(canvas: Canvas, centers: Array, radius: float, colour: Colour) -> None:
     """Draw a dot at each of (n, 2) px; thousands at once, and one only where several are the same."""
-    width, height = canvas.surface.get_size()
-    seen = ((centers > -50.0) & (centers < (width + 50.0, height + 50.0))).all(axis=1)
-    # as `Canvas.stamp` does it
-    quarters = np.unique(np.rint((centers[seen] + 0.5) * sprites.FINE).astype(int), axis=0)
-    places = []
-    for x, y in quarters.tolist():
-        picture = sprites.dot(radius, colour, (x % sprites.FINE, y % sprites.FINE))
-        half = picture.get_width() // 2
-        places.append((picture, (x // sprites.FINE - half, y // sprites.FINE - half)))
-    canvas.surface.fblits(places, pygame.BLEND_PREMULTIPLIED)
+    different = np.unique(np.rint((centers + 0.5) * sprites.FINE), axis=0) / sprites.FINE - 0.5
+    canvas.stamps([partial(sprites.dot, radius, colour)], different)
 
 
-class RayScan(Layer):
-    """What a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
-
-    name = "scan"
-    title = "Ray scan"
-    default = False
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if not scene.scans:
-            return
-        camera, colour = canvas.camera, canvas.theme.final
-        scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
-        corners = bounded(np.concatenate([ends for _, ends in scans]))
-        low, high = (
-            np.floor(corners.min(axis=0)).astype(int) - 2,
-            np.ceil(corners.max(axis=0)).astype(int) + 3,
-        )
-        box = pygame.Rect(low.tolist(), (high - low).tolist()).clip(canvas.surface.get_clip())
-        if not box.width or not box.height:
-            return
-        large = pygame.Surface((box.width * _FINE, box.height * _FINE), pygame.SRCALPHA, 32)
-        # drawing replaces what is there: where scans overlap nothing gets darker
-        corner = np.array(box.topleft) - 0.5
-        fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
-        for _, ends in fine:
-            for ring in clipped_polygon(ends):
-                pygame.draw.polygon(large, premultiplied(colour, 0.11), np.rint(ring).tolist())
-        for place, ends in fine:
-            self._rays(large, place, ends, canvas)
-        for _, ends in fine:
-            for ring in clipped_polygon(ends):
-                pygame.draw.lines(large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
-        picture = pygame.transform.smoothscale(large, box.size)
-        canvas.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-        _dots(canvas, np.concatenate([self._hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
-
-    @staticmethod
-    def _rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
-        """Draw hair lines, each from where it is far enough from those beside it."""
-        along = ends - place
-        length = np.hypot(along[:, 0], along[:, 1])
-        ray = np.arange(len(ends))
-        begin = np.full(len(ends), _RAY_GAP * len(ends) / (2 * np.pi))
-        for every in (2, 4, 8):
-            begin[ray % every == 0] /= 2
-        begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
-        shown = length > begin + _FINE
-        first = place + along[shown] * (begin[shown] / length[shown])[:, None]
-        colour = premultiplied(canvas.theme.final, 0.3)
-        width = max(1, round(0.5 * canvas.scale * _FINE))
-        lines = np.hstack([first, ends[shown]])
-        near = bool(np.abs(lines).max(initial=0.0) <= FAR)
-        for x1, y1, x2, y2 in lines.tolist():
-            if near:
-                pygame.draw.line(large, colour, (x1, y1), (x2, y2), width)
-            elif (line := clipped_segment(x1, y1, x2, y2)) is not None:
-                pygame.draw.line(large, colour, *line, width)
-
-    @staticmethod
-    def _hits(place: Array, ends: Array) -> Array:
-        """Return the ends of the rays that met something: those shorter than the longest."""
-        length = np.hypot(*(ends - place).T)
-        return np.asarray(ends[length < length.max() * (1.0 - 1e-6)])
-
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        def glyph(canvas: Canvas, x: float, y: float) -> None:
-            colour, size = canvas.theme.final, 8 * canvas.scale
-            angle = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
-            ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.15 * size * np.sin(angle)])
-            for end in ends.tolist():
-                canvas.line((x - size, y), end, mix(canvas.theme.background, colour, 0.55))
-            _dots(canvas, ends, _HIT * canvas.scale, colour)
-
-        return [LegendEntry("ray scan", glyph)] if scene.scans else []
+def draw_scans(canvas: Canvas, scene: Scene) -> None:
+    """Draw what a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
+    camera, colour = canvas.camera, canvas.theme.final
+    scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
+    corners = bounded(np.concatenate([ends for _, ends in scans]))
+    low = np.floor(corners.min(axis=0)).astype(int) - 2
+    high = np.ceil(corners.max(axis=0)).astype(int) + 3
+    box = pygame.Rect(low.tolist(), (high - low).tolist()).clip(canvas.surface.get_clip())
+    if not box.width or not box.height:
+        return
+    large = pygame.Surface((box.width * _FINE, box.height * _FINE), pygame.SRCALPHA, 32)
+    # drawing replaces what is there: where scans overlap nothing gets darker
+    corner = np.array(box.topleft) - 0.5
+    fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
+    outlines = [ring for _, ends in fine for ring in clipped_polygon(ends)]
+    for ring in outlines:
+        pygame.draw.polygon(large, premultiplied(colour, 0.11), np.rint(ring).tolist())
+    for place, ends in fine:
+        _draw_rays(large, place, ends, canvas)
+    for ring in outlines:
+        pygame.draw.lines(large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
+    picture = pygame.transform.smoothscale(large, box.size)
+    canvas.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+    _dots(canvas, np.concatenate([_hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
 
 
-class SensedObstacles(Layer):
+def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
+    """Draw hair lines, each from where it is far enough from those beside it."""
+    along = ends - place
+    length = np.hypot(along[:, 0], along[:, 1])
+    ray = np.arange(len(ends))
+    begin = np.full(len(ends), _RAY_GAP * len(ends) / (2 * np.pi))
+    for every in (2, 4, 8):
+        begin[ray % every == 0] /= 2
+    begin = np.maximum(begin, 12.0) * canvas.scale * _FINE
+    shown = length > begin + _FINE
+    first = place + along[shown] * (begin[shown] / length[shown])[:, None]
+    colour = premultiplied(canvas.theme.final, 0.3)
+    width = max(1, round(0.5 * canvas.scale * _FINE))
+    for line in np.hstack([first, ends[shown]]).tolist():
+        if (seen := clipped_segment(*line)) is not None:
+            pygame.draw.line(large, colour, *seen, width)
+
+
+def _hits(place: Array, ends: Array) -> Array:
+    """Return the ends of the rays that met something: those shorter than the longest."""
+    length = np.hypot(*(ends - place).T)
+    return np.asarray(ends[length < length.max() * (1.0 - 1e-6)])
+
+
+def _scan_glyph(canvas: Canvas, x: float, y: float) -> None:
+    colour, size = canvas.theme.final, 8 * canvas.scale
+    angle = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+    ends = np.column_stack([x - size + 2 * size * np.cos(angle), y + 1.15 * size * np.sin(angle)])
+    for end in ends.tolist():
+        canvas.line((x - size, y), end, mix(canvas.theme.background, colour, 0.55))
+    _dots(canvas, ends, _HIT * canvas.scale, colour)
+
+
+scans_legend = says("ray scan", _scan_glyph)
+
+
+class SensedObstacles:
     """What the robots know of the obstacles, beside the truth: points that were sensed; the rest pales.
 
     Of the robot that is asked about, where there is one, else of all; its discovered map if it makes one.
     """
-
-    name = "sensed"
-    title = "Known obstacles"
-    default = False
 
     def __init__(self) -> None:
         self._page: pygame.Surface | None = None
@@ -186,17 +169,17 @@ class SensedObstacles(Layer):
         self._last: list[float] = []
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.sensed is None or scene.snapshot is None:
-            return
-        points, robots = scene.sensed.until(scene.snapshot.time)
+        """Draw the page of the pale truth and the points, and a discovered map over it."""
+        assert scene.sensed is not None
+        points, robots = scene.sensed.until(scene.now.time)
         asked = None if scene.selected is None else scene.number(scene.selected)
         page, begin = self._page_for(canvas, scene, points, asked)
         if begin < len(points):
             fresh = points[begin:]
             if asked is not None:
                 fresh = fresh[robots[begin:] == asked]
-            own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
-            _dots(own, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, self._colour(canvas))
+            colour = canvas.theme.forces["repulsion_obstacle"]
+            _dots(replace(canvas, surface=page), canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
             self._last = points[-1].tolist()
         self._drawn = len(points)
         canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
@@ -208,9 +191,8 @@ class SensedObstacles(Layer):
         self, canvas: Canvas, scene: Scene, points: Array, asked: int | None
     ) -> tuple[pygame.Surface, int]:
         """Return the page of the pale truth and the first points, and how many of them it has."""
-        size = canvas.surface.get_size()
-        clip = tuple(canvas.surface.get_clip())
-        key = canvas.camera, canvas.theme.name, canvas.scale, size, clip, canvas.shown, asked
+        size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
+        key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
         # objects rather than their ids, which others may get when these are gone
         known = self._of[0] is scene.environment and self._of[1] is scene.sensed
         grown = self._drawn <= len(points) and (
@@ -218,53 +200,18 @@ class SensedObstacles(Layer):
         )
         if self._page is None or not (known and grown) or self._key != key:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
-            self._page.set_clip(canvas.surface.get_clip())
-            own = Canvas(self._page, canvas.camera, canvas.theme, canvas.scale, canvas.hues, canvas.shown)
+            self._page.set_clip(clip)
             if "obstacles" in canvas.shown:
-                self._pale(own, scene)
+                _draw_pale(replace(canvas, surface=self._page), scene)
             self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), 0
         return self._page, self._drawn
 
-    @staticmethod
-    def _pale(canvas: Canvas, scene: Scene) -> None:
-        """Draw all obstacles once more, as hardly more than their outlines."""
-        theme = canvas.theme
-        fill, edge = _pale_colours(canvas)
-        rings = []
-        parts = scene.environment.blocked.geoms
-        # courtyards before what stands in them
-        for part in sorted(parts, key=lambda part: -shapely.Polygon(part.exterior).area):
-            outer = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
-            canvas.polygon(outer, (*fill, 255))
-            rings.append(outer)
-            for hole in part.interiors:
-                inner = canvas.camera.to_pixels(np.asarray(hole.coords)[:-1])
-                canvas.polygon(inner, (0, 0, 0, 0))
-                rings.append(inner)
-        for corners in rings:
-            canvas.outline(corners, edge, canvas.width(theme.line))
-        if "boundary" in canvas.shown:  # what of it was covered
-            corners = canvas.camera.to_pixels(scene.environment.region.vertices)
-            canvas.outline(corners, theme.boundary, canvas.width(theme.boundary_line))
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        if scene.sensed is None or scene.snapshot is None:
-            return []
-
-        def glyph(canvas: Canvas, x: float, y: float) -> None:
-            half, top = 8 * canvas.scale, y - 2 * canvas.scale
-            fill, edge = _pale_colours(canvas)
-            box = pygame.Rect(round(x - half), round(top), round(2 * half), round(6 * canvas.scale))
-            pygame.draw.rect(canvas.surface, fill, box)
-            pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
-            dots = np.column_stack([x + half * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
-            _dots(canvas, dots, _DOT * canvas.scale, self._colour(canvas))
-
-        return [LegendEntry(self.title.lower(), glyph)]
-
-    @staticmethod
-    def _colour(canvas: Canvas) -> Colour:
-        return canvas.theme.forces["repulsion_obstacle"]
+def _draw_pale(canvas: Canvas, scene: Scene) -> None:
+    """Draw all obstacles once more, as hardly more than their outlines."""
+    draw_blocked(canvas, scene.environment, *_pale_colours(canvas))
+    if "boundary" in canvas.shown:  # what of it was covered
+        draw_boundary(canvas, scene)
 
 
 def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:
@@ -273,72 +220,77 @@ def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:
     return mix(theme.background, theme.obstacle, _PALE), mix(theme.background, theme.obstacle_edge, 0.6)
 
 
-class CursorPath(Layer):
-    """The shortest path from the cursor to its nearest robot, with its length."""
+def _sensed_glyph(canvas: Canvas, x: float, y: float) -> None:
+    half, top = 8 * canvas.scale, y - 2 * canvas.scale
+    fill, edge = _pale_colours(canvas)
+    box = pygame.Rect(round(x - half), round(top), round(2 * half), round(6 * canvas.scale))
+    pygame.draw.rect(canvas.surface, fill, box)
+    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
+    dots = np.column_stack([x + half * np.array([-0.9, -0.3, 0.3, 0.9]), np.full(4, top)])
+    _dots(canvas, dots, _DOT * canvas.scale, canvas.theme.forces["repulsion_obstacle"])
 
-    name = "path"
-    title = "Path from the cursor"
-    default = False
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        if scene.path is None or len(scene.path) < 2:
-            return
-        corners = canvas.camera.to_pixels(scene.path)
-        theme = canvas.theme
-        # the light around it parts it from whatever it crosses
-        canvas.outline(corners, theme.background, canvas.width(4.5), closed=False)
-        canvas.outline(corners, theme.final, canvas.width(2.0), closed=False)
-        x, y = corners[0].tolist()
-        self._begin(canvas, x, y)
-        length = float(np.hypot(*np.diff(scene.path, axis=0).T).sum())
-        words = f"{length:.2f} m" if length < 100 else f"{length:.0f} m"
-        box = self._tag(canvas, scene, corners, canvas.text_width(words, bold=True))
-        round_corners = round(4 * canvas.scale)
-        pygame.draw.rect(canvas.surface, theme.background, box, border_radius=round_corners)
-        edge = mix(theme.background, theme.final, 0.5)
-        pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0), border_radius=round_corners)
-        canvas.text(words, box.center, colour=theme.final, bold=True, anchor="middle")
+sensed_legend = says("known obstacles", _sensed_glyph)
 
-    @staticmethod
-    def _tag(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.Rect:
-        """Return the box of the tag: beside the cursor, where it hides least of path and robots."""
-        view, scale = canvas.surface.get_clip(), canvas.scale
-        box = pygame.Rect(0, 0, wide + round(12 * scale), round(20 * scale))
-        x, y = corners[0].tolist()
-        radii = drawn_radii(canvas, scene)
-        centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist() if scene.snapshot else []
-        path = bounded(corners).tolist()
-        best: tuple[int, pygame.Rect] | None = None
-        # not below at the right first: the arrow of the cursor is there
-        for side, up in ((1, -1), (-1, -1), (-1, 1), (1, 1)):
-            away = 14 if (side, up) == (1, 1) else 6
-            box.center = (
-                round(x + side * (box.width / 2 + away * scale)),
-                round(y + up * (box.height / 2 + away * scale)),
-            )
-            placed = box.clamp(view)
-            hidden = 4 * (placed != box)
-            hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in pairwise(path))
-            for (robot_x, robot_y), radius in zip(centers, radii, strict=True):
-                gap_x = max(placed.left - robot_x, 0.0, robot_x - placed.right)
-                gap_y = max(placed.top - robot_y, 0.0, robot_y - placed.bottom)
-                hidden += np.hypot(gap_x, gap_y) < radius
-            if best is None or hidden < best[0]:
-                best = hidden, placed
-        assert best is not None
-        return best[1]
 
-    @staticmethod
-    def _begin(canvas: Canvas, x: float, y: float) -> None:
-        theme, scale = canvas.theme, canvas.scale
-        canvas.stamp(lambda shift: sprites.dot(5.0 * scale, theme.background, shift), (x, y))
-        canvas.stamp(lambda shift: sprites.dot(3.6 * scale, theme.final, shift), (x, y))
+def draw_path(canvas: Canvas, scene: Scene) -> None:
+    """Draw the shortest path from the cursor to its nearest robot, with its length."""
+    assert scene.path is not None
+    if len(scene.path) < 2:
+        return
+    corners = canvas.camera.to_pixels(scene.path)
+    theme = canvas.theme
+    # the light around it parts it from whatever it crosses
+    canvas.outline(corners, theme.background, canvas.width(4.5), closed=False)
+    canvas.outline(corners, theme.final, canvas.width(2.0), closed=False)
+    _draw_path_begin(canvas, *corners[0].tolist())
+    length = float(np.hypot(*np.diff(scene.path, axis=0).T).sum())
+    words = f"{length:.2f} m" if length < 100 else f"{length:.0f} m"
+    box = _tag_box(canvas, scene, corners, canvas.text_width(words, bold=True))
+    radius = round(4 * canvas.scale)
+    pygame.draw.rect(canvas.surface, theme.background, box, border_radius=radius)
+    edge = mix(theme.background, theme.final, 0.5)
+    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0), border_radius=radius)
+    canvas.text(words, box.center, colour=theme.final, bold=True, anchor="middle")
 
-    def legend(self, scene: Scene) -> list[LegendEntry]:
-        def glyph(canvas: Canvas, x: float, y: float) -> None:
-            half = 9 * canvas.scale
-            canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
-            self._begin(canvas, x - half + 2 * canvas.scale, y)
 
-        drawn = scene.path is not None and len(scene.path) > 1
-        return [LegendEntry("shortest path to the nearest robot", glyph)] if drawn else []
+def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.Rect:
+    """Return the box of the tag: beside the cursor, where it hides least of path and robots."""
+    view, scale = canvas.surface.get_clip(), canvas.scale
+    box = pygame.Rect(0, 0, wide + round(12 * scale), round(20 * scale))
+    x, y = corners[0].tolist()
+    radii = drawn_radii(canvas, scene)
+    centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist() if scene.snapshot else []
+    path = bounded(corners).tolist()
+    places = []
+    # not below at the right first: the arrow of the cursor is there
+    for side, up in ((1, -1), (-1, -1), (-1, 1), (1, 1)):
+        away = 14 if (side, up) == (1, 1) else 6
+        box.centerx = round(x + side * (box.width / 2 + away * scale))
+        box.centery = round(y + up * (box.height / 2 + away * scale))
+        placed = box.clamp(view)
+        hidden = 4 * (placed != box)
+        hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in pairwise(path))
+        for (robot_x, robot_y), radius in zip(centers, radii, strict=True):
+            gap_x = max(placed.left - robot_x, 0.0, robot_x - placed.right)
+            gap_y = max(placed.top - robot_y, 0.0, robot_y - placed.bottom)
+            hidden += np.hypot(gap_x, gap_y) < radius
+        places.append((hidden, placed))
+    return min(places, key=lambda each: each[0])[1]
+
+
+def _draw_path_begin(canvas: Canvas, x: float, y: float) -> None:
+    canvas.stamp(partial(sprites.dot, 5.0 * canvas.scale, canvas.theme.background), (x, y))
+    canvas.stamp(partial(sprites.dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
+
+
+def path_legend(scene: Scene) -> list[LegendEntry]:
+    """Return the entry of the path, where it is one."""
+
+    def glyph(canvas: Canvas, x: float, y: float) -> None:
+        half = 9 * canvas.scale
+        canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
+        _draw_path_begin(canvas, x - half + 2 * canvas.scale, y)
+
+    drawn = scene.path is not None and len(scene.path) > 1
+    return [LegendEntry("shortest path to the nearest robot", glyph)] if drawn else []

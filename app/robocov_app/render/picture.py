@@ -2,79 +2,93 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 from numpy.typing import NDArray
 
+from robocov.arrays import IntArray
+from robocov.environment import Environment
 from robocov.errors import ParameterError, unknown_name
+from robocov_app.render import forces, heatmaps, knowledge, layers, marks
 from robocov_app.render.annotations import (
     LEGEND_ROW,
     MARGIN,
     STRIP,
-    Caption,
-    Legend,
-    ScaleBar,
-    Status,
+    LegendStrip,
+    draw_brief_status,
+    draw_caption,
+    draw_scale_bar,
+    draw_status,
     legend_rows,
 )
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.forces import ForceTerm, Links, ObstaclePoints, Ranges, Velocities
-from robocov_app.render.heatmaps import ColourBar, DensityShading, Distances, GeodesicCells, bar_room
-from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
-from robocov_app.render.layers import Boundary, Cells, Grid, Layer, LegendEntry, Obstacles, Robots, Starts
-from robocov_app.render.marks import Centroids, Failed, Goals, Selection
+from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.forces import force_layer, range_layer
+from robocov_app.render.heatmaps import FieldPicture, bar_room
+from robocov_app.render.knowledge import SensedObstacles
+from robocov_app.render.layers import Layer
+from robocov_app.render.marks import Starts
+from robocov_app.render.scene import Scene
 from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from robocov.arrays import IntArray
-    from robocov.environment import Environment
-    from robocov_app.render.scene import Scene
+_extra = partial(Layer, default=False)
+_fixed = partial(Layer, static=True)
+_strip = partial(Layer, in_world=False)
 
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
-    """Return one of each layer, from the lowest to the topmost.
+    """Return one of each layer, from the lowest to the topmost; they keep pages of their own.
 
     `trails`: colours of the trajectories, see `Trajectories`.
     """
+    distances, geodesic = FieldPicture(heatmaps.draw_distances), FieldPicture(heatmaps.draw_geodesic_cells)
+    trajectories, snapshot = Trajectories(trails), ("snapshot",)
     return [
-        Distances(),
-        GeodesicCells(),
-        Cells(),
-        Grid(),
-        DensityShading(),
-        Obstacles(),
-        Boundary(),
-        SensedObstacles(),
-        RayScan(),
-        Ranges("sensing"),
-        Ranges("communication"),
-        Links(),
-        Trajectories(trails),
-        Starts(),
-        ObstaclePoints(),
-        Goals(),
-        Centroids(),
-        Velocities(),
-        ForceTerm("attraction"),
-        ForceTerm("repulsion_robots"),
-        ForceTerm("repulsion_obstacle"),
-        ForceTerm("viscosity"),
-        ForceTerm("resultant"),
-        CursorPath(),
-        Failed(),
-        Selection(),
-        Robots(),
-        ColourBar(),
-        Legend(),
-        ScaleBar(),
-        Status(),
+        _extra("distances", "Distance map", distances.draw, ("field",), heatmaps.distances_legend),
+        _extra("geodesic_cells", "Geodesic cells", geodesic.draw, ("field",), heatmaps.geodesic_legend),
+        Layer("cells", "Voronoi cells", layers.draw_cells, ("cells",), layers.cells_legend),
+        _fixed("grid", "Grid", layers.draw_grid),
+        _fixed("density", "Density φ", heatmaps.draw_density, (), heatmaps.density_legend),
+        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), layers.obstacles_legend),
+        _fixed("boundary", "Boundary", layers.draw_boundary),
+        _extra(
+            "sensed",
+            "Known obstacles",
+            SensedObstacles().draw,
+            ("sensed", "snapshot"),
+            knowledge.sensed_legend,
+        ),
+        _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),
+        range_layer("sensing", "Sensing range"),
+        range_layer("communication", "Communication range"),
+        _extra("links", "Neighbours", forces.draw_links, snapshot, forces.links_legend),
+        Layer("trajectories", "Trajectories", trajectories.draw, ("trail",), trajectories.legend),
+        Layer("starts", "Starts", Starts().draw, ("starts",), marks.starts_legend),
+        _extra(
+            "obstacle_points", "Nearest obstacle points", forces.draw_points, snapshot, forces.points_legend
+        ),
+        _extra("goals", "Goals", marks.draw_goals, snapshot, marks.goals_legend),
+        Layer("centroids", "Centroids", marks.draw_centroids, snapshot, marks.centroids_legend),
+        _extra("velocities", "Velocities", forces.draw_velocities, snapshot, forces.velocities_legend),
+        force_layer("attraction", "Attraction", "full"),
+        force_layer("repulsion_robots", "Repulsion from robots", "open"),
+        force_layer("repulsion_obstacle", "Repulsion from obstacle", "dot"),
+        force_layer("viscosity", "Viscosity", "bar"),
+        force_layer("resultant", "Resultant force", "full"),
+        _extra("path", "Path from the cursor", knowledge.draw_path, ("path",), knowledge.path_legend),
+        Layer("failed", "Failed robots", marks.draw_failed, ("failed",), marks.failed_legend),
+        Layer("selection", "Selection", marks.draw_selection, ("snapshot", "selected"), marks.belief_legend),
+        Layer("robots", "Robots", marks.draw_robots, snapshot, marks.robots_legend),
+        _strip("colour_bar", "Colour scale", heatmaps.draw_colour_bar, ("field",)),
+        _strip("legend", "Legend", LegendStrip().draw),
+        _strip("scale_bar", "Scale bar", draw_scale_bar),
+        _strip("status", "Status line", draw_status),
     ]
 
 
@@ -93,8 +107,11 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
 
 def pane_layers(trails: str = "robots") -> list[Layer]:
     """Return the layers of one picture among several: a caption in place of the legend, which they share."""
-    layers = [layer for layer in standard_layers(trails) if not isinstance(layer, Legend | Status)]
-    return [*layers, Caption(), Status(brief=True)]
+    return [
+        *(layer for layer in standard_layers(trails) if layer.name not in ("legend", "status")),
+        _strip("caption", "Caption", draw_caption),
+        _strip("status", "Status line", draw_brief_status),
+    ]
 
 
 def scale_for(size: tuple[int, int]) -> float:
@@ -188,35 +205,29 @@ class Painter:
 
     def legend_entries(self, scene: Scene) -> list[LegendEntry]:
         """Return the legend's entries for what is drawn of `scene`."""
-        return [entry for layer in self._shown() for entry in layer.legend(scene)]
+        return [entry for layer in self._shown() if layer.has(scene) for entry in layer.legend(scene)]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw `scene` on the whole of `surface`, which has this painter's size."""
         if surface.get_size() != self.size:
             self.resize(surface.get_size(), self.scale)
         self._hues = _hues(scene, self._hues)
-        entries = self.legend_entries(scene)
-        shown = frozenset(self.visible)
-        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
-        rows = 0
-        for layer in self._shown():
-            if isinstance(layer, Legend):
-                layer.entries = entries
-                rows = len(legend_rows(canvas, entries))
-            elif isinstance(layer, Caption):
-                rows = 1
+        entries, shown = self.legend_entries(scene), frozenset(self.visible)
+        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
+        names = {layer.name for layer in self._shown()}
+        rows = 1 if "caption" in names else len(legend_rows(canvas, entries)) if "legend" in names else 0
         self._place_view(*self._steady(rows, bar_room(canvas, scene)))
-        canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown)
+        canvas = replace(canvas, camera=self.camera)
         surface.fill(self.theme.background)
         for static, group in groupby(self._shown(), key=lambda layer: layer.static):
-            layers = list(group)
             if static:
-                page = self._page(canvas, scene, layers)
+                page = self._page(canvas, scene, list(group))
                 surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
                 continue
-            for layer in layers:
-                surface.set_clip(self._clip() if layer.in_world else None)
-                layer.draw(canvas, scene)
+            for layer in group:
+                if layer.has(scene):
+                    surface.set_clip(self._clip() if layer.in_world else None)
+                    layer.draw(canvas, scene)
         surface.set_clip(None)
 
     def frame(self, scene: Scene) -> NDArray[np.uint8]:
@@ -231,12 +242,12 @@ class Painter:
     def _shown(self) -> list[Layer]:
         return [layer for layer in self.layers if layer.name in self.visible]
 
-    def _place_view(self, legend_rows_count: int, beside: float = 0.0) -> None:
+    def _place_view(self, rows: int, beside: float = 0.0) -> None:
         """Give the world what the strips above and below, and `beside` pixels at the right, leave."""
         width, height = self.size
         top = MARGIN * self.scale
-        if legend_rows_count:
-            top = (6 + LEGEND_ROW * legend_rows_count + 6) * self.scale
+        if rows:
+            top = (6 + LEGEND_ROW * rows + 6) * self.scale
         below = bool({"scale_bar", "status"} & self.visible)
         bottom = (STRIP if below else MARGIN) * self.scale
         view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
@@ -275,9 +286,10 @@ class Painter:
         if kept is None or kept[0] != key or kept[2] is not scene.environment:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(self._clip())
-            own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues, canvas.shown)
+            own = replace(canvas, surface=page)
             for layer in layers:
-                layer.draw(own, scene)
+                if layer.has(scene):
+                    layer.draw(own, scene)
             self._pages = {names: (key, page, scene.environment)}
             return page
         return kept[1]

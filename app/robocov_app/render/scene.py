@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from typing import Any, NamedTuple
@@ -44,9 +45,8 @@ class Sensed:
     """A growing set of points, each with its robot and the time when it was sensed first."""
 
     def __init__(self) -> None:
+        self._times, self._robots = np.empty(256), np.empty(256, dtype=np.intp)
         self._points = np.empty((256, 2))
-        self._times = np.empty(256)
-        self._robots = np.empty(256, dtype=np.intp)
         self._known: set[tuple[int, int, int]] = set()
         self._count = 0
 
@@ -73,10 +73,9 @@ class Sensed:
 
     def copy(self) -> Sensed:
         """Return a set of its own with the same points."""
-        twin = Sensed()
+        twin = copy(self)
         twin._points, twin._times = self._points.copy(), self._times.copy()
-        twin._robots = self._robots.copy()
-        twin._known, twin._count = set(self._known), self._count
+        twin._robots, twin._known = self._robots.copy(), set(self._known)
         return twin
 
     def cut(self, time: float) -> None:
@@ -137,6 +136,7 @@ class Scene:
     starts: Array | None = None  # (n, 2) m
     trail: Array | None = None  # (k, n, 2) m, the positions so far, oldest first
     trail_time: Array | None = None  # (k,) s, for trajectories that fade
+    trail_fade: float | None = None  # s, so much of the trail is shown, fading into the past
     cells: Sequence[Array] | None = None  # (m, 2) m each, the outlines of Voronoi cells
     centroids: Array | None = None  # (n, 2) m
     adjacency: IntArray | None = None  # (m, 2), pairs of cells that share an edge
@@ -165,25 +165,13 @@ class Scene:
         return robot + 1 if self.numbers is None else self.numbers[robot]
 
     @property
-    def has_goals(self) -> bool:
-        """Whether the controller draws robots to goals, as RAPF does and RPF does not."""
-        return self.snapshot is not None and self.snapshot.decision.goals is not None
+    def now(self) -> Snapshot:
+        """The snapshot of a scene that has one."""
+        assert self.snapshot is not None
+        return self.snapshot
 
     @classmethod
-    def of(
-        cls,
-        environment: Environment,
-        team: Team,
-        snapshot: Snapshot,
-        *,
-        starts: Array | None = None,
-        trail: Array | None = None,
-        trail_time: Array | None = None,
-        label: str = "",
-        cost: str = "",
-        field: Field | None = None,
-        field_limit: float = 1.0,
-    ) -> Scene:
+    def of(cls, environment: Environment, team: Team, snapshot: Snapshot, **more: Any) -> Scene:
         """Return the scene of `snapshot` with all robots' Voronoi cells, and obstacles where they are then.
 
         The cells that the law used are taken where they are these: not where communication is limited, or
@@ -203,24 +191,9 @@ class Scene:
                 cells = weighted_partition(where, team.max_speed, environment.region, density=density)
             else:
                 cells = partition(where, environment.region, density=density)
-        outlines, owners = cells.outlines
-        return cls(
-            environment,
-            team,
-            snapshot,
-            starts,
-            trail,
-            trail_time,
-            outlines,
-            cells.centroid,
-            cells.adjacency,
-            label,
-            cost,
-            field,
-            field_limit,
-            cell_owners=owners,
-            moving=moving,
-        )
+        more["cells"], more["cell_owners"] = cells.outlines
+        more |= {"centroids": cells.centroid, "adjacency": cells.adjacency, "moving": moving}
+        return cls(environment, team, snapshot, **more)
 
 
 def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
@@ -232,35 +205,23 @@ def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | N
     environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team
     starts, trail = record.positions[0], record.positions[: row + 1]
-    more: dict[str, Any] = {}
+    more: dict[str, Any] = {"label": record.label, "cost": cost}
     if snapshot.working is not None:
         rows = np.flatnonzero(snapshot.working)
         failed = np.flatnonzero(record.present[row] & ~record.working[row]).tolist()
-        more = {
-            "numbers": tuple((rows + 1).tolist()),
-            "failed": {robot + 1: tuple(snapshot.positions[robot].tolist()) for robot in failed},
-        }
+        more["numbers"] = tuple((rows + 1).tolist())
+        more["failed"] = {robot + 1: tuple(snapshot.positions[robot].tolist()) for robot in failed}
         if not len(rows):
-            moving = moving_obstacles(environment, time)
-            return Scene(environment.at(time), team, moving=moving, label=record.label, cost=cost, **more)
+            return Scene(environment.at(time), team, moving=moving_obstacles(environment, time), **more)
         snapshot, team = snapshot_of(snapshot, rows), team[rows]
         began = np.argmax(record.present, axis=0)
         starts = record.positions[began, np.arange(len(began))][rows]
         # before it joins, a robot has no trail
         trail = np.where(record.present[: row + 1, rows, None], trail[:, rows], starts)
-    scene = Scene.of(
-        environment,
-        team,
-        snapshot,
-        starts=starts,
-        trail=trail,
-        trail_time=record.time[: row + 1],
-        label=record.label,
-        cost=cost,
-        field=None if fields is None else fields.at(snapshot.positions, snapshot.time),
-        field_limit=1.0 if fields is None else fields.limit,
-    )
-    return replace(scene, **more) if more else scene
+    if fields is not None:
+        more |= {"field": fields.at(snapshot.positions, snapshot.time), "field_limit": fields.limit}
+    more |= {"starts": starts, "trail": trail, "trail_time": record.time[: row + 1]}
+    return Scene.of(environment, team, snapshot, **more)
 
 
 def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
@@ -274,23 +235,21 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
     if not seen.neighbours.complete:
         ranges = None if seen.neighbours.ranges is None else seen.neighbours.ranges[rows]
         neighbours = Neighbours.of_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
-    return Snapshot(
-        replace(
-            seen,
-            positions=seen.positions[rows],
-            velocities=seen.velocities[rows],
-            neighbours=neighbours,
-            obstacle_points=seen.obstacle_points[rows],
-            max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
-            scans=None,
-            reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
-            report_ages=None if seen.report_ages is None else seen.report_ages[kept],
-        ),
-        replace(
-            decision,
-            forces=decision.forces[rows],
-            goals=None if decision.goals is None else decision.goals[rows],
-            terms={name: term[rows] for name, term in decision.terms.items()},
-        ),
-        None if snapshot.truth is None else snapshot.truth[rows],
+    seen = replace(
+        seen,
+        positions=seen.positions[rows],
+        velocities=seen.velocities[rows],
+        neighbours=neighbours,
+        obstacle_points=seen.obstacle_points[rows],
+        max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
+        scans=None,
+        reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
+        report_ages=None if seen.report_ages is None else seen.report_ages[kept],
     )
+    decision = replace(
+        decision,
+        forces=decision.forces[rows],
+        goals=None if decision.goals is None else decision.goals[rows],
+        terms={name: term[rows] for name, term in decision.terms.items()},
+    )
+    return Snapshot(seen, decision, None if snapshot.truth is None else snapshot.truth[rows])

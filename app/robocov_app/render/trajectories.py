@@ -8,8 +8,7 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array, IntArray
-from robocov_app.render.canvas import Canvas, bounded, premultiplied
-from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
 from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch
@@ -34,19 +33,14 @@ _FADE_FINE = 2
 """They are drawn so many times larger, and shrunk."""
 
 
-class Trajectories(Layer):
+class Trajectories:
     """Where the robots went; nothing where a row has nan.
 
-    `colours`: each in its robot's colour (large teams: all in a quiet red), or all red. `fade`, s: show the
-    last so many seconds only, fading into the past; needs `Scene.trail_time`.
+    `colours`: each in its robot's colour (large teams: all in a quiet red), or all red ("paper").
     """
 
-    name = "trajectories"
-    title = "Trajectories"
-
-    def __init__(self, colours: str = "robots", fade: float | None = None) -> None:
+    def __init__(self, colours: str = "robots") -> None:
         self.colours = colours
-        self.fade = fade
         self._page: pygame.Surface | None = None
         self._key: object = None
         self._drawn = 0
@@ -56,12 +50,13 @@ class Trajectories(Layer):
         self._colours: tuple[object, list[Colour]] | None = None
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
+        """Draw old sections from the page, and what is new over it."""
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
         colours = self._of_robots(canvas)
         width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
-        page, continues = self._page_for(canvas, trail, scene.trail_time, colours, width)
+        page, continues = self._page_for(canvas, scene, trail, colours, width)
         self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
         self._finish_sections(page, colours, width, together=not continues)
@@ -130,32 +125,23 @@ class Trajectories(Layer):
         return Sketch(box) if box is not None else None
 
     def _page_for(
-        self, canvas: Canvas, trail: Array, time: Array | None, colours: list[Colour], width: float
+        self, canvas: Canvas, scene: Scene, trail: Array, colours: list[Colour], width: float
     ) -> tuple[pygame.Surface, bool]:
         """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
-        size = canvas.surface.get_size()
-        fading = time if self.fade else None
-        step = None
-        if self.fade and time is not None:
-            step = self.fade, int(np.floor(time[-1] / self.fade * FADE_STEPS))
-        key = (
-            canvas.camera,
-            canvas.theme.name,
-            canvas.scale,
-            size,
-            tuple(canvas.surface.get_clip()),
-            tuple(colours),
-            trail.shape[1],
-            step,
-        )
+        size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
+        fade, time, step = scene.trail_fade, scene.trail_time, None
+        if fade and time is not None:
+            step = fade, int(np.floor(time[-1] / fade * FADE_STEPS))
+        view = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip)
+        key = *view, tuple(colours), trail.shape[1], step
         continues = key == self._key and self._drawn > 0 and self._found(trail)
         if self._page is None or not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
-            self._page.set_clip(canvas.surface.get_clip())
+            self._page.set_clip(clip)
             self._key, self._drawn = key, 0
             self._ended.clear()
-            if fading is not None:
-                self._fade_onto(self._page, canvas, trail, fading, colours, width)
+            if fade and time is not None:
+                _fade_onto(self._page, canvas, trail, time, fade, colours, width)
                 self._drawn, continues = len(trail), True
             row = trail[self._drawn - 1 if self._drawn else 0]
             self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
@@ -170,50 +156,6 @@ class Trajectories(Layer):
             self._drawn = int(rows[-1]) + 1
         return len(rows) > 0
 
-    def _fade_onto(
-        self,
-        page: pygame.Surface,
-        canvas: Canvas,
-        trail: Array,
-        time: Array,
-        colours: list[Colour],
-        width: float,
-    ) -> None:
-        """Draw the last seconds, ever more transparent into the past."""
-        fade = self.fade or np.inf
-        begin = int(np.searchsorted(time, time[-1] - fade))
-        points = bounded(canvas.camera.to_pixels(trail[begin:]))
-        box = _box_of(points, 5.0 + width, page)
-        if box is None:
-            return
-        shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
-        shade = np.minimum(shade, FADE_STEPS).astype(int)  # rounding may say one more
-        rows = _corners(points, shade, FADE_PIECE * canvas.scale)
-        points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
-        shade = shade[rows]
-        large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
-        wide = max(1, round(width * _FADE_FINE))
-        pens = np.full((len(colours), 2), np.nan)
-        edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
-        # the older ones first: where paths cross, the newer ones are on top
-        for first, last in pairwise(edges):
-            # slowly at first: what is half forgotten can still be followed
-            part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
-            shades = {colour: premultiplied(colour, part) for colour in set(colours)}
-            paths = points[first : last + 1]
-            moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
-            gone = np.isnan(paths).any(axis=(0, 2)).tolist()
-            pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
-            for robot in np.flatnonzero(moves).tolist():
-                colour = shades[colours[robot]]
-                if pen[robot][0] == pen[robot][0]:  # not nan
-                    lines[robot][0] = pen[robot]
-                for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
-                    _stroke(large, run, colour, wide)
-            pens[moves] = paths[-1, moves]
-        picture = pygame.transform.smoothscale(large, box.size)
-        page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-
     def _of_robots(self, canvas: Canvas) -> list[Colour]:
         theme, n = canvas.theme, len(canvas.hues)
         if self.colours == "paper":
@@ -226,6 +168,8 @@ class Trajectories(Layer):
         return self._colours[1]
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
+        """Return the entry of trajectories."""
+
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             angle = np.linspace(-np.pi, np.pi, 24)
             wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
@@ -235,7 +179,51 @@ class Trajectories(Layer):
                 sketch.path(wave.tolist(), self._of_robots(canvas)[0], width)
                 sketch.onto(canvas.surface)
 
-        return [LegendEntry("trajectory", glyph, self.colours)] if scene.trail is not None else []
+        return [LegendEntry("trajectory", glyph, self.colours)]
+
+
+def _fade_onto(
+    page: pygame.Surface,
+    canvas: Canvas,
+    trail: Array,
+    time: Array,
+    fade: float,
+    colours: list[Colour],
+    width: float,
+) -> None:
+    """Draw the last seconds, ever more transparent into the past."""
+    begin = int(np.searchsorted(time, time[-1] - fade))
+    points = bounded(canvas.camera.to_pixels(trail[begin:]))
+    box = _box_of(points, 5.0 + width, page)
+    if box is None:
+        return
+    shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
+    shade = np.minimum(shade, FADE_STEPS).astype(int)  # rounding may say one more
+    rows = _corners(points, shade, FADE_PIECE * canvas.scale)
+    points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
+    shade = shade[rows]
+    large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
+    wide = max(1, round(width * _FADE_FINE))
+    pens = np.full((len(colours), 2), np.nan)
+    edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
+    # the older ones first: where paths cross, the newer ones are on top
+    for first, last in pairwise(edges):
+        # slowly at first: what is half forgotten can still be followed
+        part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
+        shades = {colour: premultiplied(colour, part) for colour in set(colours)}
+        paths = points[first : last + 1]
+        moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
+        gone = np.isnan(paths).any(axis=(0, 2)).tolist()
+        pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
+        for robot in np.flatnonzero(moves).tolist():
+            colour = shades[colours[robot]]
+            if pen[robot][0] == pen[robot][0]:  # not nan
+                lines[robot][0] = pen[robot]
+            for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
+                _stroke(large, run, colour, wide)
+        pens[moves] = paths[-1, moves]
+    picture = pygame.transform.smoothscale(large, box.size)
+    page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _box_of(points: Array, margin: float, page: pygame.Surface) -> pygame.Rect | None:

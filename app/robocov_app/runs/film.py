@@ -16,9 +16,10 @@ from robocov.errors import ParameterError, shown
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
+from robocov_app.render.canvas import LegendEntry
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.distance_field import Fields, round_limit
-from robocov_app.render.layers import Layer, LegendEntry
+from robocov_app.render.layers import Layer
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.picture import Painter, checked_layers, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import record_scene

@@ -10,17 +10,16 @@ import numpy as np
 import pygame
 
 from robocov_app.render import sprites
-from robocov_app.render.annotations import Status, legend_rows, legend_strip
+from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.distance_field import round_limit
-from robocov_app.render.layers import LegendEntry, drawn_radii
 from robocov_app.render.layout import united
+from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import mix, robot_hues
-from robocov_app.render.trajectories import Trajectories
 from robocov_app.viewer.overlays import tag
 from robocov_app.viewer.presenter import FADE
 from robocov_app.viewer.session.curves import TIME, compared
@@ -77,7 +76,7 @@ class Arena:
         for _, _, width, height in layout.panes:
             layers = standard_layers()
             if several:  # they share the time, which stands in the window's own status line
-                layers = [layer for layer in pane_layers() if not isinstance(layer, Status)]
+                layers = [layer for layer in pane_layers() if layer.name != "status"]
             painter = Painter(self.desk.session.environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.within(painter.camera.view)
@@ -178,11 +177,7 @@ class Arena:
         for pane, (lane, box) in enumerate(zip(session.lanes, self.layout.panes, strict=False)):
             painter = self._painters[pane]
             painter.visible = set(self.desk.shown)
-            for layer in painter.layers:
-                if isinstance(layer, Trajectories):
-                    layer.fade = FADE if self.desk.fade else None
-                if layer.name == "caption":
-                    painter.visible.add("caption")
+            painter.visible |= {"caption"} & {layer.name for layer in painter.layers}
             scene = self._scene(lane, painter)
             self._scenes.append(scene)
             surface = screen.subsurface(pygame.Rect(box))
@@ -207,20 +202,18 @@ class Arena:
         selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
         cost = self._caption_cost(lane)
         starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
-        scene = Scene.of(
+        return Scene.of(
             circumstances.environment,
             team,
             snapshot,
             starts=starts,
             trail=trail if len(trail) else None,
             trail_time=times,
+            trail_fade=FADE if desk.fade else None,
             label=circumstances.law.label,
             cost=cost,
             field=field,
             field_limit=self._limit,
-        )
-        return replace(
-            scene,
             numbers=circumstances.numbers,
             failed=circumstances.failed,
             failed_radii={number: circumstances.limits.radius_of(number) for number in circumstances.failed},

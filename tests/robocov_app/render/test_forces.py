@@ -2,14 +2,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, TWO, changed, drawn, nearest
+from drawn_pixels import ONE, TWO, changed, drawn, layer_named, nearest
 from drawn_run import explained
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from written_words import check_glyph, glyphs
 
 from robocov.robots import Team
-from robocov_app.render.forces import ForceTerm
 from robocov_app.render.theme import DARK, LIGHT
 
 
@@ -92,7 +91,7 @@ def test_viscosity_has_its_colour_and_its_words(theme):
     start = painter.camera.to_pixels(ONE)[0] + np.array([14.0 * painter.scale, 0.0])
     assert nearest(frame, start, theme.forces["viscosity"]) < 25
     assert painter.legend(scene) == ["viscosity"]
-    (picture,) = glyphs(ForceTerm("viscosity"), scene, theme)
+    (picture,) = glyphs(layer_named("force_viscosity"), scene, theme)
     check_glyph(picture, theme, theme.forces["viscosity"])
 
 

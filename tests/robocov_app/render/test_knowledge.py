@@ -4,14 +4,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, nearest
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, layer_named, nearest
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
 from robocov.environment import Environment, PolygonObstacle, UniformStart
 from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
-from robocov_app.render.knowledge import CursorPath, RayScan, SensedObstacles
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Sensed
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
@@ -221,7 +220,7 @@ class TestSensedObstacles:
 
         monkeypatch.setattr(knowledge, "_dots", watched)
         sensed = Sensed()
-        layer = SensedObstacles()
+        layer = layer_named("sensed")
         painter = Painter(ROOMS, SIZE, layers=[layer])
         painter.show({"sensed"})
         record = run_of(ROOMS, 4)
@@ -230,14 +229,14 @@ class TestSensedObstacles:
             if row in (0, 5):
                 sensed.add(0.1 * row, (1, 2), SEEN[:2] + 0.1 * row)
             painter.frame(replace(scene_of(record, row), sensed=sensed))
-            pages.add(id(layer._page))
+            pages.add(id(layer.draw.__self__._page))
         assert counts == [2, 2]
         assert len(pages) == 1
 
     def test_without_knowledge_there_is_nothing(self):
         scene = scene_of(run_of(ROOMS, 4))
         assert len(changed(scene, "sensed")[0]) == 0
-        assert SensedObstacles().legend(scene) == []
+        assert not layer_named("sensed").has(scene)
 
 
 WAY = np.array([[1.0, 1.0], [4.0, 2.0], [6.0, 6.0]])
@@ -346,10 +345,10 @@ class TestCursorPath:
 @THEMES
 def test_glyphs_of_the_legend(theme):
     for layer, scene, colour in (
-        (RayScan(), scanned(scan()), theme.final),
-        (SensedObstacles(), knowing(), theme.forces["repulsion_obstacle"]),
-        (CursorPath(), pathed(), theme.final),
+        ("scan", scanned(scan()), theme.final),
+        ("sensed", knowing(), theme.forces["repulsion_obstacle"]),
+        ("path", pathed(), theme.final),
     ):
-        pictures = glyphs(layer, scene, theme)
+        pictures = glyphs(layer_named(layer), scene, theme)
         assert len(pictures) == 1
         check_glyph(pictures[0], theme, colour)

@@ -13,11 +13,10 @@ from robocov.observation import Snapshot
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.layers import drawn_radii
+from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.scene import Scene, moving_obstacles
 from robocov_app.render.theme import DARK, LIGHT, readable_on, robot_hues
-from robocov_app.render.trajectories import Trajectories
 
 
 def test_every_layer_has_a_name_of_its_own_and_words():
@@ -365,7 +364,7 @@ class TestTrajectories:
     def test_run_along_the_positions(self, colours):
         record = run_of(SQUARE, 4)
         frame, painter = drawn(
-            scene_of(record), "trajectories", layers=[Trajectories(colours)], size=(800, 800)
+            scene_of(record), "trajectories", layers=standard_layers(colours), size=(800, 800)
         )
         for robot in range(4):
             colour = LIGHT.trajectory if colours == "paper" else LIGHT.robots[robot]
@@ -404,7 +403,7 @@ class TestTrajectories:
 
     def test_fading_forgets_the_past(self):
         record = run_of(SQUARE, 1, steps=80)
-        frame, painter = drawn(scene_of(record), "trajectories", layers=[Trajectories(fade=1.0)])
+        frame, painter = drawn(replace(scene_of(record), trail_fade=1.0), "trajectories")
         old, new = painter.camera.to_pixels(record.positions[[20, 78], 0])
         assert nearest(frame, old, LIGHT.background, reach=2) == 0
         assert (frame[int(old[1]) - 2 : int(old[1]) + 3, int(old[0]) - 2 : int(old[0]) + 3] == 255).all()

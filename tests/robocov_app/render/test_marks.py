@@ -2,12 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, nearest
+from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, layer_named, nearest
 from drawn_run import SQUARE, explained
 from written_words import check_glyph, glyphs, places
 
 from robocov.robots import Team
-from robocov_app.render.marks import Failed
 from robocov_app.render.picture import Painter
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
@@ -124,7 +123,7 @@ class TestFailed:
 
     @THEMES
     def test_its_glyph_in_the_legend(self, theme):
-        (picture,) = glyphs(Failed(), broken({3: (4.0, 5.0)}), theme)
+        (picture,) = glyphs(layer_named("failed"), broken({3: (4.0, 5.0)}), theme)
         check_glyph(picture, theme, theme.ink)
         check_glyph(picture, theme, mix(theme.background, theme.ink, 0.3))
 

@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
 from robocov_app.render import fonts
-from robocov_app.render.layers import Obstacles
 from robocov_app.render.picture import Painter, scale_for, standard_layers
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.render.trajectories import Trajectories
 
 
 @pytest.mark.parametrize("size", [(640, 480), (641, 399), (1920, 1080)])
@@ -117,12 +115,12 @@ def test_what_is_magnified_is_still_true(factor, x, y):
 
 def test_the_legend_follows_the_colours_of_the_trajectories():
     scene = scene_of(run_of(ROOMS, 6))
-    layers = standard_layers()
-    painter = Painter(ROOMS, (640, 480), layers=layers)
-    painter.show({"legend", "trajectories"})
-    top = painter.frame(scene)[:20]
-    next(layer for layer in layers if isinstance(layer, Trajectories)).colours = "paper"
-    assert (painter.frame(scene)[:20] != top).any()
+    tops = []
+    for colours in ("robots", "paper"):
+        painter = Painter(ROOMS, (640, 480), layers=standard_layers(colours))
+        painter.show({"legend", "trajectories"})
+        tops.append(painter.frame(scene)[:20].copy())
+    assert (tops[0] != tops[1]).any()
 
 
 def test_a_picture_in_a_part_of_a_window_leaves_the_rest_alone():
@@ -147,12 +145,14 @@ def test_a_surface_of_another_size_is_filled():
     assert painter.frame(scene).shape == (500, 800, 3)
 
 
-def test_what_does_not_change_is_drawn_once(monkeypatch):
+def test_what_does_not_change_is_drawn_once():
     calls = []
-    draw = Obstacles.draw
-    monkeypatch.setattr(Obstacles, "draw", lambda self, *given: (calls.append(1), draw(self, *given)))
+    layers = standard_layers()
+    at = [layer.name for layer in layers].index("obstacles")
+    draw = layers[at].draw
+    layers[at] = replace(layers[at], draw=lambda *given: (calls.append(1), draw(*given)))
     record = run_of(ROOMS, 6)
-    painter = Painter(ROOMS, (640, 480))
+    painter = Painter(ROOMS, (640, 480), layers=layers)
     for row in range(10):
         painter.frame(scene_of(record, row))
     assert len(calls) == 1

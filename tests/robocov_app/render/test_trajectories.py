@@ -4,12 +4,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from drawn_pixels import SIZE, distance, drawn, nearest
+from drawn_pixels import SIZE, distance, drawn, layer_named, nearest
 from drawn_run import SQUARE, explained, run_of, scene_of
 
 from robocov_app.render.picture import Painter
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.render.trajectories import FADE_STEPS, Trajectories
+from robocov_app.render.trajectories import FADE_STEPS
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 MOSTLY_LIGHT = pytest.mark.parametrize(
@@ -44,13 +44,19 @@ def walked(trail, time=None, **more):
     return replace(explained(known), trail=trail, trail_time=time, **more)
 
 
+class FadingPainter(Painter):
+    fade = None
+
+    def draw(self, surface, scene):
+        super().draw(surface, replace(scene, trail_fade=self.fade))
+
+
 def painter_of(fade=None, theme=LIGHT, size=SIZE, also=()):
-    """Return a painter of trajectories, and their layer."""
-    painter = Painter(SQUARE, size, theme)
+    """Return a painter of trajectories, and what draws them."""
+    painter = FadingPainter(SQUARE, size, theme)
     painter.show({"trajectories", *also})
-    layer = next(layer for layer in painter.layers if isinstance(layer, Trajectories))
-    layer.fade = fade
-    return painter, layer
+    painter.fade = fade
+    return painter, layer_named("trajectories", painter.layers).draw.__self__
 
 
 def frame_of(painter, *scene, **more):
@@ -278,14 +284,14 @@ class TestFading:
     @pytest.mark.slow
     def test_rows_as_old_as_it_goes_are_no_trouble(self):
         """Rounding may find them a little older."""
-        painter, layer = painter_of(0.3)
+        painter, _ = painter_of(0.3)
         trail = straight(40)
         older = 0
         for rate in (7.0, 10.0, 30.0):
             time = np.arange(40) / rate
             for count in range(5, 40):
-                layer.fade = 3 / rate
-                older += (time[count - 1] - time[count - 4]) / layer.fade > 1.0
+                painter.fade = 3 / rate
+                older += (time[count - 1] - time[count - 4]) / painter.fade > 1.0
                 frame = frame_of(painter, trail[:count], time[:count])
                 assert (ink(frame) > 0).any()
         assert older > 0
@@ -319,15 +325,15 @@ class TestFading:
 
     def test_it_may_be_switched_on_and_off(self):
         trail = walks(90)
-        painter, layer = painter_of()
+        painter, _ = painter_of()
         stays = frame_of(painter, trail)
-        layer.fade = 1.5
+        painter.fade = 1.5
         fades = frame_of(painter, trail)
         assert (fades == frame_of(painter_of(1.5)[0], trail)).all()
-        layer.fade = None
+        painter.fade = None
         assert (frame_of(painter, trail) == stays).all()
         assert (ink(fades) > 0).sum() < 0.7 * (ink(stays) > 0).sum()
-        layer.fade = 1.5
+        painter.fade = 1.5
         scene = replace(walked(trail), trail_time=None)  # it cannot, without times
         assert (painter.frame(scene) == stays).all()
 

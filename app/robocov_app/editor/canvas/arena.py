@@ -38,8 +38,8 @@ from robocov_app.editor.tools.handles import KNOB, frame_of, handles
 from robocov_app.editor.tools.select import Moving
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
-from robocov_app.render.layers import READABLE
 from robocov_app.render.layout import fitted_radii
+from robocov_app.render.marks import READABLE
 from robocov_app.render.theme import mix
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ from robocov_app.editor.canvas.drawn_rings import outline_of
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.tools.tool import length_words
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas, bounded
-from robocov_app.render.layers import LegendEntry
+from robocov_app.render.canvas import Canvas, LegendEntry, bounded
 from robocov_app.render.theme import mix
 from robocov_app.viewer.overlays import tag
 

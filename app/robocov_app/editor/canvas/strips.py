@@ -14,7 +14,7 @@ from robocov_app.render.annotations import (
     LEGEND_ROW,
     STRIP,
     bar_length,
-    draw_bar,
+    draw_scale_bar,
     legend_rows,
     legend_strip,
 )
@@ -25,8 +25,7 @@ from robocov_app.render.heatmaps import density_entry
 if TYPE_CHECKING:
     from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.team import Team
-    from robocov_app.render.canvas import Canvas
-    from robocov_app.render.layers import LegendEntry
+    from robocov_app.render.canvas import Canvas, LegendEntry
     from robocov_app.viewer.layout import Box
 
 
@@ -94,7 +93,7 @@ class Strips:
         high = round(STRIP * canvas.scale)
         foot = screen.subsurface(pygame.Rect(left, top + height - high, width, high))
         own = replace(canvas, surface=foot)
-        draw_bar(own)
+        draw_scale_bar(own)
         taken = (EDGE + 90) * canvas.scale + bar_length(own) * canvas.camera.zoom
         size = canvas.text_size(canvas.theme.text)
         words = shortened(map_words(self._desk), size, width - taken - EDGE * canvas.scale)
