@@ -164,7 +164,7 @@ def environment_html(environment: Environment) -> str:
 
 def environment_png(environment: Environment) -> bytes:
     """Return a map's page."""
-    from robocov_app.figures.page import figure_png
+    from robocov_app.figures.files import figure_png
     from robocov_app.figures.runs import plot_environment as plot
 
     return figure_png(plot(environment))
@@ -200,7 +200,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
-    from robocov_app.figures.page import figure_png
+    from robocov_app.figures.files import figure_png
     from robocov_app.figures.runs import plot_trajectories
 
     return figure_png(plot_trajectories(record))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from robocov_app.bench.measure import Row
-from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, plain_style, save_figure, tone
+from robocov_app.figures.files import plain_style, save_figure
+from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, tone
 from robocov_app.render.theme import LIGHT, Theme
 
 if TYPE_CHECKING:

@@ -70,7 +70,7 @@ def command(options: Arguments) -> int | None:
     for name in THREADS:
         os.environ.setdefault(name, "1")
     if options.plot is not None:
-        from robocov_app.figures.page import check_figure_path
+        from robocov_app.figures.files import check_figure_path
 
         check_figure_path(options.plot)
     parts = tuple(PARTS) if options.part == "all" else (options.part,)

@@ -55,7 +55,7 @@ def command(options: Arguments) -> None:
     if options.sites is not None:
         writable(options.sites)
     if options.plot is not None:
-        from robocov_app.figures.page import check_figure_path
+        from robocov_app.figures.files import check_figure_path
 
         check_figure_path(options.plot)
     environment = load_map(options.map)

@@ -103,8 +103,8 @@ def command(options: Arguments) -> None:
                 rows.append(_row(path, made[-1]))
                 update(number + 1)
     if options.plot is not None:
+        from robocov_app.figures.files import save_figure
         from robocov_app.figures.map_sheet import plot_maps
-        from robocov_app.figures.page import save_figure
 
         save_figure(plot_maps(made, options.theme), options.plot)
     if options.out is not None:
@@ -126,7 +126,7 @@ def _check(options: Arguments) -> None:
     if options.side != _SIDE and options.width is not None:
         raise InputError(f"--side: {options.side:g}, but --width and --height say how large the map is")
     if options.plot is not None:
-        from robocov_app.figures.page import check_figure_path
+        from robocov_app.figures.files import check_figure_path
 
         check_figure_path(options.plot)
     _check_out(options.out, folder=bool(options.count or options.study), overwrite=options.overwrite)

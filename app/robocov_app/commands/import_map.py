@@ -13,7 +13,7 @@ import tyro
 from robocov.errors import InputError, one_line
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.figures.page import check_figure_path
+from robocov_app.figures.files import check_figure_path
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map
 from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress

@@ -49,7 +49,7 @@ def command(options: Arguments) -> None:
     from robocov_app.terminal.output import write_csv
 
     if options.plot is not None:
-        from robocov_app.figures.page import check_figure_path
+        from robocov_app.figures.files import check_figure_path
 
         check_figure_path(options.plot)
     from robocov.metrics.run_metrics import COLUMNS
@@ -66,8 +66,8 @@ def command(options: Arguments) -> None:
             measured.append(run)
             answers.append(answer_of(saved, run))
     if options.plot is not None:
+        from robocov_app.figures.files import save_figure
         from robocov_app.figures.metrics import plot_metrics
-        from robocov_app.figures.page import save_figure
 
         save_figure(
             plot_metrics(measured, options.theme, title=f"Metrics  ·  {options.folder.name}"), options.plot

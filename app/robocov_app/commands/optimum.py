@@ -129,7 +129,7 @@ def _check(options: Arguments) -> None:
     if options.positions is not None:
         require_fresh(options.positions, "another name", overwrite=options.overwrite)
     if options.plot is not None:
-        from robocov_app.figures.page import check_figure_path
+        from robocov_app.figures.files import check_figure_path
 
         check_figure_path(options.plot)
 

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch, Polygon
+from matplotlib.path import Path as Outline
+from matplotlib.ticker import MaxNLocator
 
 from robocov.arrays import Array, BoolArray
+from robocov.environment import Environment
+from robocov.record import Record
 from robocov_app.figures.page import tone
 from robocov_app.render.density import density_words, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
-    from robocov.environment import Environment
-    from robocov.record import Record
 
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
 """Radius of a robot where it has room and in the densest crowd, and least size of its number, in points."""
@@ -38,17 +40,21 @@ _DOTS = 400
 
 def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
     """Prepare axes that somebody else laid out: equal scales, ticks in metres."""
-    from matplotlib.ticker import MaxNLocator
-
     low_x, low_y, high_x, high_y = environment.region.bounds
-    axes.set_aspect("equal")
-    axes.set_xlim(low_x, high_x)
-    axes.set_ylim(low_y, high_y)
+    axes.set(aspect="equal", xlim=(low_x, high_x), ylim=(low_y, high_y), xlabel="x (m)", ylabel="y (m)")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
     axes.set_facecolor(tone(theme.background))
+
+
+def _static_style(theme: Theme) -> dict[str, Any]:
+    """Return the look of obstacles."""
+    return {"facecolor": tone(theme.obstacle), "edgecolor": tone(theme.obstacle_edge), "linewidth": 0.8}
+
+
+def _path_style(theme: Theme) -> dict[str, Any]:
+    """Return the look of the path of an obstacle that moves."""
+    return {"color": tone(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 
 def draw_map(
@@ -58,44 +64,21 @@ def draw_map(
 
     Where places do not count all the same, how much they count is a shading below; without `density` not.
     """
-    from matplotlib.patches import PathPatch, Polygon
-    from matplotlib.path import Path as Outline
-
     if density:
         _draw_density(axes, environment, theme)
     for part in environment.at(time).blocked.geoms:
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
-        axes.add_patch(
-            PathPatch(
-                outline,
-                facecolor=tone(theme.obstacle),
-                edgecolor=tone(theme.obstacle_edge),
-                linewidth=0.8,
-                zorder=2,
-            )
-        )
+        axes.add_patch(PathPatch(outline, zorder=2, **_static_style(theme)))
     for obstacle in moving_obstacles(environment, time):
         _draw_motion(axes, environment, obstacle, theme)
-    axes.add_patch(
-        Polygon(
-            environment.region.vertices,
-            closed=True,
-            fill=False,
-            edgecolor=tone(theme.boundary),
-            linewidth=1.6,
-            joinstyle="miter",
-            clip_on=False,
-            zorder=3,
-        )
-    )
+    rim: Any = {"edgecolor": tone(theme.boundary), "linewidth": 1.6, "joinstyle": "miter"}
+    vertices = environment.region.vertices
+    axes.add_patch(Polygon(vertices, closed=True, fill=False, clip_on=False, zorder=3, **rim))
 
 
 def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
     """Draw the path of a moving obstacle, its shape in a colour of its own, and an arrow where it heads."""
-    from matplotlib.patches import Polygon
-
-    region = Polygon(environment.region.vertices, transform=axes.transData)
     shape = Polygon(
         np.asarray(obstacle.polygon.exterior.coords),
         facecolor=tone(theme.moving_obstacle) if not obstacle.polygon.interiors else "none",
@@ -104,24 +87,23 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
         zorder=2.1,
     )
     axes.add_patch(shape)
-    shape.set_clip_path(region)
-    ink = tone(theme.ink)
-    axes.plot(*obstacle.path.T, color=ink, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2.2)
+    shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
+    axes.plot(*obstacle.path.T, zorder=2.2, **_path_style(theme))
     half = 0.5 * _ARROW * obstacle.heading
     origin, one = _in_points(axes, np.eye(2)[::-1])
     half /= abs(float(one[0] - origin[0]))
-    axes.annotate(
-        "",
-        xy=(obstacle.middle + half).tolist(),
-        xytext=(obstacle.middle - half).tolist(),
-        arrowprops={"arrowstyle": "-|>", "color": ink, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0},
-        zorder=2.3,
-    )
+    arrow: Any = {
+        "arrowstyle": "-|>",
+        "color": tone(theme.ink),
+        "linewidth": 1.4,
+        "shrinkA": 0.0,
+        "shrinkB": 0.0,
+    }
+    begin, end = (obstacle.middle - half).tolist(), (obstacle.middle + half).tolist()
+    axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
 
 
 def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
-    from matplotlib.image import AxesImage
-    from matplotlib.patches import Polygon
 
     if environment.density is None or environment.density.uniform:
         return
@@ -131,9 +113,8 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
     x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
     y = low_y + (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     # limits stay as they are, which imshow would change
-    image = AxesImage(
-        axes, extent=(low_x, high_x, low_y, high_y), origin="lower", interpolation="bilinear", zorder=1.5
-    )
+    extent = low_x, high_x, low_y, high_y
+    image = AxesImage(axes, extent=extent, origin="lower", interpolation="bilinear", zorder=1.5)
     image.set_data(shading(environment.density, environment.region.bounds, x, y, theme))
     axes.add_image(image)
     image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
@@ -141,8 +122,6 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
 
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     """Draw map, final cells, trajectories, starts, final positions and where robots head."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
     last, n = record.positions[-1], record.positions.shape[1]
     working, there = np.flatnonzero(record.working[-1]), np.flatnonzero(record.present[-1])
@@ -152,35 +131,28 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     paper = colours == "paper"
     tint = theme.paper_tint if paper else theme.tint
     each = zip(outlines, hues[working[owners]].tolist(), strict=True)
-    polygons = [(cell, hue) for cell, hue in each if len(cell) > 2]
+    polygons = [
+        (cell, tone(mix(theme.background, theme.robots[hue], tint))) for cell, hue in each if len(cell) > 2
+    ]
+    style: Any = {"edgecolors": tone(theme.cell_edge), "linewidths": 0.8, "zorder": 1}
+    fills = [fill for _, fill in polygons]
     axes.add_collection(
-        PolyCollection(
-            [cell for cell, _ in polygons],
-            facecolors=[tone(mix(theme.background, theme.robots[hue], tint)) for _, hue in polygons],
-            edgecolors=tone(theme.cell_edge),
-            linewidths=0.8,
-            zorder=1,
-        ),
-        autolim=False,
+        PolyCollection([cell for cell, _ in polygons], facecolors=fills, **style), autolim=False
     )
-    crowd = line_crowding(n)
-    lines = LineCollection(
-        [record.positions[record.present[:, robot], robot] for robot in range(n)],
-        colors=[tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)],
-        linewidths=1.6 * crowd,
-        capstyle="round",
-        joinstyle="round",
-        zorder=4,
+    ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
+    colour = [tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)]
+    style = {"capstyle": "round", "joinstyle": "round", "zorder": 4}
+    axes.add_collection(
+        LineCollection(ways, colors=colour, linewidths=1.6 * line_crowding(n), **style), autolim=False
     )
-    axes.add_collection(lines, autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
     axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
-    fills = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
+    robots = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = _failed(record)
-    fills = [wreck_colour(theme) if failed[robot] else fills[robot] for robot in there.tolist()]
-    drawn = draw_robots(axes, last[there], record.team.radius[there], fills, theme, (there + 1).tolist())
+    robots = [wreck_colour(theme) if failed[robot] else robots[robot] for robot in there.tolist()]
+    drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
         aims = record.goals[-1][working]
@@ -217,21 +189,11 @@ def draw_robots(
         clip_on=False,
     )
     numbers = range(1, len(places) + 1) if numbers is None else numbers
-    for robot, point, r, fill in zip(numbers, places, drawn, fills, strict=True):
-        digits = len(str(robot))
-        size = r * (1.25, 1.1, 0.85, 0.65)[min(digits, 4) - 1]
+    style: Any = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
+    for robot, (x, y), r, fill in zip(numbers, places.tolist(), drawn, fills, strict=True):
+        size = r * (1.25, 1.1, 0.85, 0.65)[min(len(str(robot)), 4) - 1]
         if size >= _SMALLEST_NUMBER:
-            axes.text(
-                float(point[0]),
-                float(point[1]),
-                str(robot),
-                fontsize=size,
-                fontweight="bold",
-                color=tone(readable_on(fill)),
-                ha="center",
-                va="center_baseline",
-                zorder=8,
-            )
+            axes.text(x, y, str(robot), fontsize=size, color=tone(readable_on(fill)), **style)
     return drawn
 
 
@@ -247,8 +209,8 @@ def _disc_points(axes: Axes, places: Array, radius: Array) -> list[float]:
     """Return each robot's radius in points: readable where there is room, in a crowd down to true size."""
     unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
     true = radius * float(unit[1, 0] - unit[0, 0])
-    radii = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC)
-    return [float(radius) for radius in radii]
+    drawn: list[float] = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC).tolist()
+    return drawn
 
 
 def _in_points(axes: Axes, places: Array) -> Array:
@@ -292,36 +254,14 @@ def label_of(handle: Artist) -> str:
 
 def map_handles(environment: Environment, theme: Theme, *, density: bool = True) -> list[Artist]:
     """Return the legend's entries for what `draw_map` draws."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     handles: list[Artist] = [Line2D([], [], color=tone(theme.boundary), linewidth=1.6, label="known region")]
     if not environment.blocked.is_empty:
-        handles.append(
-            Patch(
-                facecolor=tone(theme.obstacle),
-                edgecolor=tone(theme.obstacle_edge),
-                linewidth=0.8,
-                label="obstacle (unknown to robots)",
-            )
-        )
+        handles.append(Patch(label="obstacle (unknown to robots)", **_static_style(theme)))
     if environment.moves:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=tone(theme.ink),
-                linewidth=0.8,
-                linestyle=(0, (4, 3)),
-                marker="s",
-                markersize=7.0,
-                markerfacecolor=tone(theme.moving_obstacle),
-                markeredgecolor=tone(theme.obstacle_edge),
-                label="moving obstacle and its path",
-            )
-        )
-    words = density_words(environment) if density else ""
-    if words:
+        mark: Any = {"marker": "s", "markersize": 7.0, "markerfacecolor": tone(theme.moving_obstacle)}
+        mark["markeredgecolor"] = tone(theme.obstacle_edge)
+        handles.append(Line2D([], [], label="moving obstacle and its path", **mark, **_path_style(theme)))
+    if density and (words := density_words(environment)):
         colour = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=tone(colour), linewidth=0.0, label=words))
     return handles
@@ -329,16 +269,9 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
 
 def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
     """Return the legend's entry for a robot."""
-    from matplotlib.lines import Line2D
-
-    style: dict[str, Any] = {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": 8.0,
-        "markerfacecolor": tone(fill),
-        "markeredgecolor": tone(theme.robot_ring),
-    }
-    return Line2D([], [], label=label, **style)
+    style: Any = {"linestyle": "none", "marker": "o", "markersize": 8.0}
+    colours: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
+    return Line2D([], [], label=label, **style, **colours)
 
 
 def wreck_colour(theme: Theme) -> Colour:
@@ -353,8 +286,6 @@ def _failed(record: Record) -> BoolArray:
 
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
     """Return the legend's entries for what `draw_run` draws."""
-    from matplotlib.lines import Line2D
-
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
     aims: list[Artist] = []

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
 
+from robocov.arrays import IntArray
+from robocov.environment import Environment
 from robocov.errors import ParameterError
+from robocov.record import Record
+from robocov.robots import Team
 from robocov_app.figures.arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
-from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, draw_curves, end_label
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
+from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, TEXT, Box, Page, tone
 from robocov_app.figures.runs import plot_cost
 from robocov_app.render.density import cost_words, density_words, mean_words
-from robocov_app.render.distance_field import levels, palette, round_limit, strength, ticks
-from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from robocov.arrays import IntArray
-    from robocov.environment import Environment
-    from robocov.record import Record
-    from robocov.robots import Team
-    from robocov_app.figures.curves import Curve
-    from robocov_app.render.distance_field import Field
+from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
+from robocov_app.render.heatmaps import border_colour
+from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 _FINE = 2
 """Dots of a map's picture for each pixel of the page."""
@@ -82,6 +80,7 @@ class _Rooms(NamedTuple):
     """Height at which the scale of colours is."""
 
 
+@plain_style()
 def plot_coverage(
     curves: Sequence[Curve],
     moments: Sequence[Moment],
@@ -109,32 +108,29 @@ def plot_coverage(
     largest = [moment.field.largest for moment in moments]
     limit = round_limit(max([distance for distance in largest if np.isfinite(distance)], default=1.0))
     beside = len(moments) == 1 and aspect < 1.9
-    with plain_style():
-        handles = _handles(moments, theme)
-        page, rooms = _laid_out(theme, size, aspect, len(moments), bool(curves), beside, handles)
-        s = page.scale
-        bar_left = _draw_bar(page, limit, rooms)
-        free = page.size[0] if rooms.bar > 40 * s else bar_left
-        page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=free - 2 * page.margin)
-        if rooms.curves is not None:
-            weighed = any(density_words(moment.environment) for moment in moments)
-            _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
-        panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
-        for moment, (box, slot) in zip(moments, panels, strict=True):
-            axes = page.axes(box)
-            axes.set_xlim(low_x, high_x)
-            axes.set_ylim(low_y, high_y)
-            axes.set_axis_off()
-            _draw_moment(axes, moment, limit, theme, box, s)
-            page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
-            page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
-        (left, _, width, _), _ = panels[0]
-        right = max(box[0] + box[2] for box, _ in panels)
-        bottom = max(box[1] + box[3] for box, _ in panels)
-        page.footer(handles, left, right, bottom, width / (high_x - low_x), rooms.maps[0])
-        return page.figure
+    handles = _handles(moments, theme)
+    page, rooms = _laid_out(theme, size, aspect, len(moments), bool(curves), beside, handles)
+    s = page.scale
+    bar_left = _draw_bar(page, limit, rooms)
+    free = page.size[0] if rooms.bar > 40 * s else bar_left
+    page.title(title, 26, free - 2 * page.margin)
+    if rooms.curves is not None:
+        weighed = any(density_words(moment.environment) for moment in moments)
+        _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
+    panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
+    for moment, (box, slot) in zip(moments, panels, strict=True):
+        axes = page.map_axes(box, low_x, low_y, high_x, high_y)
+        _draw_moment(axes, moment, limit, theme, box, s)
+        page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
+        page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
+    (left, _, width, _), _ = panels[0]
+    right = max(box[0] + box[2] for box, _ in panels)
+    bottom = max(box[1] + box[3] for box, _ in panels)
+    page.footer(handles, left, right, bottom, width / (high_x - low_x), rooms.maps[0])
+    return page.figure
 
 
+@plain_style()
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
     """Plot the distance to the nearest robot on axes that somebody else laid out.
 
@@ -144,43 +140,35 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     theme = theme_named(theme)
     largest = moment.field.largest
     limit = round_limit(largest if np.isfinite(largest) else 1.0)
-    with plain_style():
-        ticks_in_metres(axes, moment.environment, theme)
-        axes.apply_aspect()
-        extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
-        # small axes may be saved large
-        fine = max(_LEAST[0] / extent.width, 1.0)
-        box = (0.0, 0.0, fine * extent.width, fine * extent.height)
-        _draw_moment(axes, moment, limit, theme, box, fine * scale)
-        axes.set_aspect("equal")
-        bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
-        bar.imshow(
-            theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit)
-        )
-        bar.set_xticks([])
-        bar.set_yticks(ticks(limit))
-        bar.yaxis.tick_right()
-        bar.yaxis.set_label_position("right")
-        bar.set_ylabel(f"{_BAR_LABEL} (m)")
+    ticks_in_metres(axes, moment.environment, theme)
+    axes.apply_aspect()
+    extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
+    # small axes may be saved large
+    fine = max(_LEAST[0] / extent.width, 1.0)
+    box = (0.0, 0.0, fine * extent.width, fine * extent.height)
+    _draw_moment(axes, moment, limit, theme, box, fine * scale)
+    axes.set_aspect("equal")
+    bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
+    bar.imshow(theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
+    bar.set_xticks([])
+    bar.set_yticks(ticks(limit))
+    bar.yaxis.tick_right()
+    bar.yaxis.set_label_position("right")
+    bar.set_ylabel(f"{_BAR_LABEL} (m)")
 
 
 def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
-    line = Line2D([], [], color=tone(_border_colour(theme)), linewidth=1.6, label="geodesic cell border")
+    line = Line2D([], [], color=tone(border_colour(theme)), linewidth=1.6, label="geodesic cell border")
     handles: list[Artist] = [robot_handle("robot", theme.final, theme), line]
     obstacles = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
     for handle in max(obstacles, key=len):
         handle.set_label("obstacle")
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
-        edge = tone(theme.obstacle_edge)
-        colour = tone(theme.unreached)
-        hatched = Patch(
-            facecolor=colour, edgecolor=edge, hatch="////", linewidth=0.0, label="no robot can come"
-        )
-        handles.append(hatched)
+        colour, edge = tone(theme.unreached), tone(theme.obstacle_edge)
+        closed: Any = {"hatch": "////", "linewidth": 0.0, "label": "no robot can come"}
+        handles.append(Patch(facecolor=colour, edgecolor=edge, **closed))
     return handles
 
 
@@ -271,8 +259,6 @@ def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> l
 
 def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
     """Draw the distances cut at the walls, the borders of the geodesic cells, the map and the robots."""
-    from matplotlib.patches import Polygon
-
     (low_x, high_x), (low_y, high_y) = axes.get_xlim(), axes.get_ylim()
     zoom = _FINE * box[2] / (high_x - low_x)
     columns, rows = max(round(_FINE * box[2]), 2), max(round(_FINE * box[3]), 2)
@@ -283,7 +269,7 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     borders = moment.field.borders(x, y, width / zoom)
     part = strength(borders, zoom, width)[:, None]
     place = borders.row, borders.column
-    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(_border_colour(theme)))
+    picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(border_colour(theme)))
     image = axes.imshow(
         picture, extent=(low_x, high_x, low_y, high_y), aspect="auto", interpolation="antialiased", zorder=0
     )
@@ -292,10 +278,6 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     draw_map(axes, moment.environment, theme, density=False)
     places = moment.field.result.positions
     draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
-
-
-def _border_colour(theme: Theme) -> tuple[int, int, int]:
-    return mix(theme.ink, theme.background, 0.1)
 
 
 def _draw_bar(page: Page, limit: float, rooms: _Rooms) -> float:

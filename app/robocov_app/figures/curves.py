@@ -2,105 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from collections.abc import Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from robocov.arrays import Array
-from robocov_app.figures.page import SMALL, TEXT, tone
-from robocov_app.render.theme import Colour, Theme
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from robocov_app.figures.page import TEXT, even_ticks, figure_of, quiet_axes, tone, value_limits
+from robocov_app.figures.styles import CurveStyle, styles_of
+from robocov_app.render.theme import Theme
 
 Curve: TypeAlias = tuple[str, str, Array, Array]
 """Label, controller's name, times (T,) s and mean distances (T,) m."""
 
-_KNOWN: dict[str, tuple[Any, str]] = {
-    "rapf": ("-", "o"),
-    "rpf": ((0, (5, 1.6)), "s"),
-    "lloyd": ((0, (1.6, 1.2)), "^"),
-}
-"""Dashes and end mark of the paper's controllers: the same in every picture."""
-
-VARIANTS: tuple[tuple[Any, str], ...] = (
-    ((0, (6, 1.6, 1.6, 1.6)), "D"),
-    ((0, (9, 2.5)), "v"),
-    ((0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), "P"),
-    ((0, (2.5, 2.5)), "*"),
-    ((0, (9, 1.4, 3, 1.4)), "X"),
-)
-"""Those of controllers that have none of their own, and of one controller's second, third, ... gains."""
-
-_LOOKS = (*_KNOWN.values(), *VARIANTS)
-
-MARKS = {
-    "o": "M0-5a5 5 0 1 0 .01 0z",
-    "s": "M-4.6-4.6h9.2v9.2h-9.2z",
-    "^": "M0-5.6 5.6 4.4H-5.6z",
-    "v": "M0 5.6 5.6-4.4H-5.6z",
-    "D": "M0-6 6 0 0 6-6 0z",
-    "P": "M-2-6h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
-    "*": "M0-6.6 1.8-2.1 6.6-1.8 2.9 1.3 4.1 6 0 3.4-4.1 6-2.9 1.3-6.6-1.8-1.8-2.1z",
-    "X": "M-5.6-3-3-5.6 0-2.6 3-5.6 5.6-3 2.6 0 5.6 3 3 5.6 0 2.6-3 5.6-5.6 3-2.6 0z",
-}
-"""The marks as SVG paths round the origin, 10 to 13 across."""
-
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"
 WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
-
-_FROM_ZERO = 0.4
-"""The axis begins at zero when the lowest value is below this part of the highest."""
-
-
-class CurveStyle(NamedTuple):
-    """How a controller's curves are told from others: never by a colour alone.
-
-    `name` is that of the colour: the controller's own, or ``other-0``, ``other-1``, ... for those of
-    `Theme.others`.
-    """
-
-    name: str
-    dashes: Any
-    mark: str
-
-    def colour(self, theme: Theme) -> Colour:
-        """Return the colour in a theme."""
-        kind, _, number = self.name.rpartition("-")
-        return theme.others[int(number)] if kind == "other" else theme.controller(self.name)
-
-
-def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
-    """Return a style for each controller; those that have none of their own get the others' in turn."""
-    names = list(dict.fromkeys(controllers))
-    return dict(zip(names, styles_of(names), strict=True))
-
-
-def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
-    """Return a style for each of several curves: another colour, dashes and mark for a controller's variants.
-
-    >>> [(style.name, style.mark) for style in styles_of(["rapf", "rapf", "mine"])]
-    [('rapf', 'o'), ('other-1', 'v'), ('other-0', 'D')]
-    """
-    spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
-    free = itertools.cycle(spare)
-    first = {
-        name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free)
-        for name in dict.fromkeys(controllers)
-    }
-    left, used = dict(first), set(first.values())
-    styles = []
-    for name in controllers:
-        style = left.pop(name, None)
-        if style is None:
-            own = [first[name]._replace(dashes=dashes, mark=mark) for dashes, mark in _LOOKS]
-            style = next((each for each in (*spare, *own) if each not in used), first[name])
-            used.add(style)
-        styles.append(style)
-    return styles
 
 
 def end_label(curve: Curve, unit: str = "m") -> str:
@@ -135,51 +53,53 @@ def draw_curves(
     lies around each curve, as quartiles around a median; a `weight` below 1 is for small pictures.
     """
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
-    looks = [(style.colour(theme), style.dashes, style.mark) for style in chosen]
-    around = [band for band in bands or () if band is not None]
-    _frame(axes, curves, theme, around, label)
-    for (_, _, time, _), (shade, _, _), band in zip(
-        curves, looks, bands or [None] * len(curves), strict=True
-    ):
+    around = list(bands or [None] * len(curves))
+    _frame(axes, curves, theme, [band for band in around if band is not None], label)
+    for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
-            axes.fill_between(time, *band, color=tone(shade), alpha=0.16, linewidth=0.0)
+            axes.fill_between(time, *band, color=tone(style.colour(theme)), alpha=0.16, linewidth=0.0)
     ends = []
-    for below, (curve, (shade, dashes, mark)) in enumerate(zip(curves, looks, strict=True)):
+    for below, (curve, style) in enumerate(zip(curves, chosen, strict=True)):
         _, _, time, values = curve
-        colour, above = tone(shade), min(len(curves) - 1 - below, 3)
+        colour, dashes, above = tone(style.colour(theme)), style.dashes, min(len(curves) - 1 - below, 3)
         width = weight * (2.2 + 0.9 * above)
         if not isinstance(dashes, str):
             dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])
         axes.plot(time, values, color=colour, linewidth=width, linestyle=dashes, dash_capstyle="butt")
         last = int(np.nonzero(np.isfinite(values))[0][-1])
         size = weight * (6.5 + 2.0 * above)
-        axes.plot(time[last], values[last], mark, color=colour, markersize=size, clip_on=False, zorder=5)
+        axes.plot(
+            time[last], values[last], style.mark, color=colour, markersize=size, clip_on=False, zorder=5
+        )
         ends.append((float(time[last]), float(values[last]), colour, end_label(curve, unit)))
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    line_height = 1.45 * TEXT * figure.dpi / 72
-    at = axes.transData.transform([(x, y) for x, y, _, _ in ends])
-    box = axes.get_window_extent()
-    heights = spread(at[:, 1], line_height, float(box.y0), float(box.y1))
-    for (x, y, colour, text), height in zip(ends, heights.tolist(), strict=True):
+    _draw_end_labels(axes, ends)
+
+
+def _draw_end_labels(
+    axes: Axes, ends: Sequence[tuple[float, float, tuple[float, float, float], str]]
+) -> None:
+    """Write the words of each end (x, y, colour, words) beside the axes, a line to what was moved."""
+    dpi, box = figure_of(axes).dpi, axes.get_window_extent()
+    point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72
+    places = axes.transData.transform([(x, y) for x, y, _, _ in ends])[:, 1]
+    heights = spread(places, line_height, float(box.y0), float(box.y1))
+    words: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "ha": "left"}
+    for (x, y, colour, text), place, height in zip(ends, places, heights, strict=True):
         fraction = (height - box.y0) / box.height
         axes.annotate(
             text,
             xy=(x, y),
-            xytext=(1.0, fraction),
+            xytext=(1.0 + 12 * point, fraction),
             textcoords=axes.transAxes,
             xycoords="data",
             annotation_clip=False,
-            fontsize=TEXT,
-            fontweight="bold",
             color=colour,
-            va="center",
-            ha="left",
-        ).set_position((1.0 + 12 * figure.dpi / 72 / box.width, fraction))
-        if abs(height - float(axes.transData.transform((x, y))[1])) > 0.3 * line_height:
+            **words,
+        )
+        if abs(height - place) > 0.3 * line_height:
             axes.plot(
-                [1.0 + 4 * figure.dpi / 72 / box.width, 1.0 + 10 * figure.dpi / 72 / box.width],
-                [float(axes.transAxes.inverted().transform(axes.transData.transform((x, y)))[1]), fraction],
+                [1.0 + 4 * point, 1.0 + 10 * point],
+                [(place - box.y0) / box.height, fraction],
                 transform=axes.transAxes,
                 color=colour,
                 linewidth=0.8,
@@ -191,32 +111,14 @@ def _frame(
     axes: Axes, curves: Sequence[Curve], theme: Theme, bands: Sequence[tuple[Array, Array]], label: str
 ) -> None:
     """Set limits, units and a quiet grid."""
-    from matplotlib.ticker import MaxNLocator
-
-    ink, faint = tone(theme.ink), tone(theme.faint)
     lines = [*(np.asarray(curve[3]) for curve in curves), *(edge for band in bands for edge in band)]
     values = np.concatenate([line[np.isfinite(line)] for line in lines])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    low, high = float(values.min()), float(values.max())
-    room = 0.08 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
-    axes.set_ylim(0.0 if low < _FROM_ZERO * high else low - room, high + room)
+    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
     axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
-    axes.set_facecolor(tone(theme.background))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel("time (s)", fontsize=TEXT, color=ink)
-    # level words are read more easily than words on their side
-    axes.set_ylabel(label, fontsize=TEXT, color=ink)
-    axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
-    axes.yaxis.set_label_coords(0.0, 1.03)
-    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
-    axes.spines["bottom"].set_color(faint)
-    axes.tick_params(colors=tone(theme.faint), labelcolor=ink, labelsize=SMALL, left=False)
+    even_ticks(axes.xaxis, 8)
+    even_ticks(axes.yaxis, 6)
+    quiet_axes(axes, theme, "time (s)", label, grid="y")
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array, BoolArray
-from robocov.controllers.gains import value_text
+from robocov.controllers.gains import Value, value_text
 from robocov.errors import ParameterError, shown
-from robocov_app.figures.curves import DISTANCE, CurveStyle, curve_styles
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.figures.curves import DISTANCE
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, Page, even_ticks, figure_of, quiet_axes, tone, value_limits
 from robocov_app.figures.rows import cut_to
-from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from robocov.controllers.gains import Value
-
-HEAT_LEVELS = 12
-"""Steps of the scale of colours of a grid."""
+from robocov_app.figures.styles import CurveStyle, curve_styles
+from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 MOST_LEVELS = 15
 """Different values of a gain up to which medians are drawn; more are a sample of a range."""
@@ -33,9 +30,6 @@ MOST_LETTERS = 28
 
 MOST_POINTS = 600
 """Points that are drawn of a controller; of more, every so many-th."""
-
-_HEAT_PART = 0.55
-"""Of the theme's scale, so much is used: on all of it the ink can be read."""
 
 _WIDE = 8.0
 """An axis is logarithmic when its highest value is so many times its lowest."""
@@ -50,6 +44,7 @@ class Dependence(NamedTuple):
     values: Array
 
 
+@plain_style()
 def plot_gains(
     dependences: Sequence[Dependence],
     gain: str,
@@ -81,18 +76,21 @@ def plot_gains(
         raise ParameterError("dependences: none were given, but at least one was wanted")
     known = curve_styles(each.controller for each in kept)
     looks = [known[each.controller] for each in kept] if styles is None else list(styles)
-    with plain_style():
-        axes = _page_axes(theme, size or (700, 480), title, scale)
-        gains = np.concatenate([each.gains for each in kept])
-        null = _gain_axis(axes, gains, words)
-        for each, look in zip(kept, looks, strict=True):
-            _draw_dependence(axes, each, look, null, theme, joined=not words)
-        _frame(axes, np.concatenate([each.values for each in kept]), gain, label, theme)
-        if len(kept) > 1:
-            axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(theme.ink), borderaxespad=0.2)
-        return cast("Figure", axes.get_figure(root=True))
+    axes = _page_axes(theme, size or (700, 480), title, scale)
+    gains = np.concatenate([each.gains for each in kept])
+    null = _gain_axis(axes, gains, words)
+    for each, look in zip(kept, looks, strict=True):
+        _draw_dependence(axes, each, look, null, theme, joined=not words)
+    values = np.concatenate([each.values for each in kept])
+    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
+    even_ticks(axes.yaxis, 6)
+    quiet_axes(axes, theme, gain, label, grid="y")
+    if len(kept) > 1:
+        axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(theme.ink), borderaxespad=0.2)
+    return figure_of(axes)
 
 
+@plain_style()
 def plot_gain_grid(
     first: Sequence[Value],
     second: Sequence[Value],
@@ -117,49 +115,28 @@ def plot_gain_grid(
             f"but ({len(second)}, {len(first)}) with at least one finite was wanted"
         )
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    colours = quiet_heat(theme)
+    colours = theme.quiet_heat
     decimals = _decimals(low, high)
-    with plain_style():
-        if axes is None:
-            axes = _page_axes(theme, size or (700, 480), title, scale)
-        from matplotlib.patches import Rectangle
-
-        for row, column in np.argwhere(np.isfinite(values)).tolist():
-            part = (values[row, column] - low) / (high - low) if high > low else 0.0
-            colour = tone(colours[round(part * (HEAT_LEVELS - 1))])
-            # a hair's breadth of the page between cells
-            axes.add_patch(
-                Rectangle((column - 0.48, row - 0.48), 0.96, 0.96, facecolor=colour, linewidth=0.0)
-            )
-            axes.text(
-                column,
-                row,
-                f"{values[row, column]:.{decimals}f}",
-                ha="center",
-                va="center",
-                fontsize=SMALL,
-                fontweight="bold" if values[row, column] == low else "normal",
-                color=tone(theme.ink),
-            )
-        axes.set_xlim(-0.5, len(first) - 0.5)
-        axes.set_ylim(-0.5, len(second) - 0.5)
-        axes.set_xticks(range(len(first)), [_gain_text(value) for value in first])
-        axes.set_yticks(range(len(second)), [_gain_text(value) for value in second])
-        _plain_axes(axes, theme)
-        axes.tick_params(length=0.0)
-        for side in axes.spines.values():
-            side.set_visible(False)
-        axes.set_xlabel(cut_to(gains[0], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
-        axes.set_ylabel(cut_to(gains[1], len, MOST_LETTERS), fontsize=TEXT, color=tone(theme.ink))
-        _level_words(axes)
-        return cast("Figure", axes.get_figure(root=True))
-
-
-def quiet_heat(theme: Theme) -> list[Colour]:
-    """Return the `HEAT_LEVELS` colours of a grid from low to high, all quiet enough for text in ink."""
-    table = theme.heat_table(200)
-    rows = [round(_HEAT_PART * 199 * k / (HEAT_LEVELS - 1)) for k in range(HEAT_LEVELS)]
-    return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
+    if axes is None:
+        axes = _page_axes(theme, size or (700, 480), title, scale)
+    for row, column in np.argwhere(np.isfinite(values)).tolist():
+        part = (values[row, column] - low) / (high - low) if high > low else 0.0
+        colour = tone(colours[round(part * (len(colours) - 1))])
+        # a hair's breadth of the page between cells
+        box = (column - 0.48, row - 0.48), 0.96, 0.96
+        axes.add_patch(Rectangle(*box, facecolor=colour, linewidth=0.0))
+        weight = "bold" if values[row, column] == low else "normal"
+        text = f"{values[row, column]:.{decimals}f}"
+        style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
+        axes.text(column, row, text, fontweight=weight, **style)
+    axes.set_xlim(-0.5, len(first) - 0.5)
+    axes.set_ylim(-0.5, len(second) - 0.5)
+    axes.set_xticks(range(len(first)), [_gain_text(value) for value in first])
+    axes.set_yticks(range(len(second)), [_gain_text(value) for value in second])
+    x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
+    quiet_axes(axes, theme, x, y)
+    axes.tick_params(length=0.0)
+    return figure_of(axes)
 
 
 def _decimals(low: float, high: float) -> int:
@@ -172,15 +149,13 @@ def _page_axes(theme: Theme, size: tuple[int, int], title: str, scale: float | N
     page = Page(size, theme, scale)
     s = page.scale
     if title:
-        page.text(title, page.margin, 20 * s, points=TITLE, bold=True, room=size[0] - 2 * page.margin)
+        page.title(title, 20)
     above = (66 if title else 34) * s
     return page.axes((52 * s, above, size[0] - 70 * s, size[1] - above - 50 * s))
 
 
 def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
     """Set the scale of the axis; return where null stands on it, None where there is no null."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
     if words:
         axes.set_xlim(-0.5, len(words) - 0.5)
         axes.set_xticks(range(len(words)), list(words))
@@ -210,8 +185,6 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
 
 
 def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
-    from matplotlib.ticker import LogLocator, MaxNLocator
-
     logarithmic = axes.get_xscale() == "log"
     locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
     return [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
@@ -237,35 +210,3 @@ def _draw_dependence(
     dashes = style.dashes if joined else "none"
     line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": each.label}
     axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)
-
-
-def _frame(axes: Axes, values: Array, gain: str, label: str, theme: Theme) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    ink = tone(theme.ink)
-    low, high = float(values.min()), float(values.max())
-    room = 0.08 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
-    axes.set_ylim(0.0 if 0.0 <= low < 0.4 * high else low - room, high + room)
-    axes.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_formatter("{x:g}")
-    _plain_axes(axes, theme)
-    axes.set_xlabel(gain, fontsize=TEXT, color=ink)
-    axes.set_ylabel(label, fontsize=TEXT, color=ink)
-    _level_words(axes)
-    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
-    axes.spines["bottom"].set_color(tone(theme.faint))
-
-
-def _plain_axes(axes: Axes, theme: Theme) -> None:
-    axes.set_facecolor(tone(theme.background))
-    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), labelsize=SMALL)
-    axes.tick_params(axis="y", left=False)
-
-
-def _level_words(axes: Axes) -> None:
-    """Level words are read more easily than words on their side."""
-    axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
-    axes.yaxis.set_label_coords(0.0, 1.03)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import ConnectionPatch, Polygon, Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from robocov.arrays import Array
 from robocov.locational import Distance, Sensing, value
 from robocov.locational.best_points import best_points
 from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, plain_style, tone
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
 """A cell without any symmetry, m."""
@@ -68,6 +69,7 @@ def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[f
     return rows
 
 
+@plain_style()
 def plot_heights(
     vertices: Sequence[tuple[float, float]] = PENTAGON,
     theme: Theme | str = LIGHT,
@@ -88,27 +90,26 @@ def plot_heights(
     path = best_at_heights(vertices, np.geomspace(_LOW * unit, _HIGH * unit, 240).tolist())
     marked = _apart(best_at_heights(vertices, [unit * n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
     median = best_points(cell, Distance())[0]
-    with plain_style():
-        page = Page(size or (1080, 440), theme, scale)
-        s, (wide, high) = page.scale, page.size
-        top, bottom = (84 if title else 44) * s, 46 * s
-        if title:
-            page.text(title, page.margin, 22 * s, points=TITLE, bold=True, room=wide - 2 * page.margin)
-        tall, begin = high - top - bottom, page.margin + 26 * s
-        room = wide - page.margin - begin
-        left, middle, right = (
-            page.axes((begin + part * room, top, share * room, tall))
-            for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
-        )
-        for part, words in ((0.0, "the cell (m)"), (0.37, "the frame in it (m)")):
-            page.text(words, begin + part * room, top - 16 * s)
-        page.text("from the optimum to the centroid (mm)", begin + 0.68 * room, top - 16 * s)
-        window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
-        _draw_cell(left, cell, window, theme)
-        _draw_path(middle, path, marked, median, window, theme)
-        _draw_rays(left, middle, window, theme)
-        _draw_distance(right, path, marked, theme)
-        return page.figure
+    page = Page(size or (1080, 440), theme, scale)
+    s, (wide, high) = page.scale, page.size
+    top, bottom = (84 if title else 44) * s, 46 * s
+    if title:
+        page.title(title, 22)
+    tall, begin = high - top - bottom, page.margin + 26 * s
+    room = wide - page.margin - begin
+    left, middle, right = (
+        page.axes((begin + part * room, top, share * room, tall))
+        for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
+    )
+    for part, words in ((0.0, "the cell (m)"), (0.37, "the frame in it (m)")):
+        page.text(words, begin + part * room, top - 16 * s)
+    page.text("from the optimum to the centroid (mm)", begin + 0.68 * room, top - 16 * s)
+    window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
+    _draw_cell(left, cell, window, theme)
+    _draw_path(middle, path, marked, median, window, theme)
+    _draw_rays(left, middle, window, theme)
+    _draw_distance(right, path, marked, theme)
+    return page.figure
 
 
 def _apart(rows: Sequence[AtHeight]) -> list[AtHeight]:
@@ -127,7 +128,7 @@ def _cell_of(vertices: Sequence[tuple[float, float]]) -> VoronoiPartition:
     return partition(region.centroid[None], region)
 
 
-def _window(points: Array, aspect: float) -> tuple[float, float, float, float]:
+def _window(points: Array, aspect: float) -> Box:
     """Return x, y, width and height of what is enlarged: all points, with room for words at the right."""
     low, high = points.min(axis=0), points.max(axis=0)
     width, height = (high - low) * (1.9, 1.3)
@@ -135,10 +136,7 @@ def _window(points: Array, aspect: float) -> tuple[float, float, float, float]:
     return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
 
 
-def _draw_cell(
-    axes: Axes, cell: VoronoiPartition, window: tuple[float, float, float, float], theme: Theme
-) -> None:
-    from matplotlib.patches import Polygon, Rectangle
+def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) -> None:
     from matplotlib.ticker import MaxNLocator
 
     ring = cell.polygons[0]
@@ -154,34 +152,19 @@ def _draw_cell(
         axis.set_major_locator(MaxNLocator(6, integer=True))
 
 
-def _draw_rays(left: Axes, middle: Axes, window: tuple[float, float, float, float], theme: Theme) -> None:
+def _draw_rays(left: Axes, middle: Axes, window: Box, theme: Theme) -> None:
     """Draw from the corners of the frame to those of what it holds."""
-    from matplotlib.patches import ConnectionPatch
-
     x, y, width, height = window
     for part in (0.0, 1.0):
-        ray = ConnectionPatch(
-            xyA=(x + width, y + part * height),
-            coordsA=left.transData,
-            xyB=(0.0, part),
-            coordsB=middle.transAxes,
-            color=tone(theme.faint),
-            linewidth=0.8,
-        )
-        left.figure.add_artist(ray)
+        begin: Any = {"xyA": (x + width, y + part * height), "coordsA": left.transData}
+        end: Any = {"xyB": (0.0, part), "coordsB": middle.transAxes}
+        left.figure.add_artist(ConnectionPatch(**begin, **end, color=tone(theme.faint), linewidth=0.8))
 
 
 def _draw_path(
-    axes: Axes,
-    path: Sequence[AtHeight],
-    marked: Sequence[AtHeight],
-    median: Array,
-    window: tuple[float, float, float, float],
-    theme: Theme,
+    axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], median: Array, window: Box, theme: Theme
 ) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    ink, line = tone(theme.ink), tone(theme.final)
+    line, faint = tone(theme.final), tone(theme.faint)
     axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
     for row in marked[1:-1]:
         axes.plot(row.x, row.y, "o", color=line, markersize=5.5, markeredgewidth=0.0, zorder=3)
@@ -191,29 +174,13 @@ def _draw_path(
     ]
     for row, _, look in ends:
         axes.plot(row.x, row.y, markersize=9.5, markeredgecolor=line, markeredgewidth=1.8, zorder=4, **look)
+    beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
     words = [(row, f"h = {row.height:g} m") for row in marked[1:-1]] + [(row, text) for row, text, _ in ends]
     for row, text in words:
-        axes.annotate(
-            text,
-            (row.x, row.y),
-            (11, -1),
-            textcoords="offset points",
-            va="center",
-            fontsize=SMALL,
-            color=ink,
-            zorder=5,
-        )
-    axes.plot(*median, "D", color=tone(theme.faint), markersize=6.0, zorder=3)
-    axes.annotate(
-        "median\n(f = r)",
-        (float(median[0]), float(median[1])),
-        (-9, 0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize=SMALL,
-        color=tone(theme.faint),
-    )
+        axes.annotate(text, (row.x, row.y), (11, -1), color=tone(theme.ink), zorder=5, **beside)
+    x, y = median.tolist()
+    axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
+    axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **beside)
     x, y, width, height = window
     axes.set_xlim(x, x + width)
     axes.set_ylim(y, y + height)
@@ -222,53 +189,40 @@ def _draw_path(
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(4, prune="both"))
     for side in axes.spines.values():
-        side.set_visible(True)
-        side.set_color(ink)
-        side.set_linewidth(1.2)
+        side.set(visible=True, color=tone(theme.ink), linewidth=1.2)
 
 
 def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], theme: Theme) -> None:
-    line = tone(theme.final)
+    line, highest = tone(theme.final), 1e3 * path[0].from_centroid
     inner = path[1:-1]
-    axes.axhline(1e3 * path[0].from_centroid, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
-    axes.plot(
-        [row.height for row in inner], [1e3 * row.from_centroid for row in inner], color=line, linewidth=2.4
+    axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    styles: tuple[Any, Any] = (
+        {"linewidth": 2.4},
+        {"marker": "o", "linestyle": "none", "markersize": 5.5, "markeredgewidth": 0.0},
     )
-    axes.plot(
-        [row.height for row in marked[1:-1]],
-        [1e3 * row.from_centroid for row in marked[1:-1]],
-        "o",
-        color=line,
-        markersize=5.5,
-        markeredgewidth=0.0,
-    )
+    for rows, style in zip((inner, marked[1:-1]), styles, strict=True):
+        millimetres = [1e3 * row.from_centroid for row in rows]
+        axes.plot([row.height for row in rows], millimetres, color=line, **style)
     axes.set_xscale("log")
     axes.set_xlim(inner[0].height, inner[-1].height)
-    axes.set_ylim(0.0, 1.12e3 * path[0].from_centroid)
-    _plain(axes, theme)
+    axes.set_ylim(0.0, 1.12 * highest)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
-    axes.set_axisbelow(True)
-    axes.spines["bottom"].set_visible(True)
-    axes.spines["bottom"].set_color(tone(theme.faint))
-    axes.set_xlabel("height h (m)", fontsize=TEXT, color=tone(theme.ink))
+    quiet_axes(axes, theme, "height h (m)", grid="y")
+    axes.tick_params(length=3.0, left=True)
+    axes.minorticks_off()
     worst = max(inner, key=lambda row: row.missed)
+    style = {"fontsize": SMALL, "color": tone(theme.ink), "ha": "left", "va": "bottom"}
     axes.annotate(
         f"A sensor over the centroid misses\nat most {100.0 * worst.missed:.2g} % of what it could\n"
         f"tell, at h = {worst.height:.2g} m.",
         (0.04, 0.07),
         xycoords="axes fraction",
-        ha="left",
-        va="bottom",
         bbox={"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0},
-        fontsize=SMALL,
-        color=tone(theme.ink),
+        **style,
     )
 
 
 def _plain(axes: Axes, theme: Theme) -> None:
-    axes.set_facecolor(tone(theme.background))
-    axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), labelsize=SMALL, length=3.0)
+    quiet_axes(axes, theme)
+    axes.tick_params(length=3.0, left=True)
     axes.minorticks_off()
-    for side in axes.spines.values():
-        side.set_visible(False)

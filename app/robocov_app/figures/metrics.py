@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from robocov.arrays import Array
 from robocov.errors import ParameterError
+from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.figures.curves import draw_curves, end_label
-from robocov_app.figures.page import TITLE, Page, plain_style
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import Page
 from robocov_app.render.theme import LIGHT, Theme, theme_named
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from matplotlib.figure import Figure
-
-    from robocov.arrays import Array
-    from robocov.metrics.run_metrics import RunMetrics
 
 
 class Measured(NamedTuple):
@@ -28,19 +25,21 @@ class Measured(NamedTuple):
     metrics: RunMetrics
 
 
-def _share(of: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
-    return lambda metrics: np.asarray(100.0 * of(metrics) / metrics.free_area)
+def share(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
+    """Return an area as a percentage of the free area."""
+    return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
 
 
 PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
-    ("sensed, in line of sight (% of the free area)", "%", _share(lambda each: each.sensed_area)),
-    ("in line of sight (% of the free area)", "%", _share(lambda each: each.visible_area)),
+    ("sensed, in line of sight (% of the free area)", "%", share(lambda each: each.sensed_area)),
+    ("in line of sight (% of the free area)", "%", share(lambda each: each.visible_area)),
     ("work |F v| (J)", "J", lambda each: each.work),
     ("way of a robot (m)", "m", lambda each: each.path_length),
 )
 """Label, unit and values of each panel."""
 
 
+@plain_style()
 def plot_metrics(
     runs: Sequence[Measured],
     theme: Theme | str = LIGHT,
@@ -54,17 +53,16 @@ def plot_metrics(
     if not runs:
         raise ParameterError("runs: none were given, but at least one was wanted")
     theme = theme_named(theme)
-    with plain_style():
-        page = Page(size, theme)
-        s = page.scale
-        page.text(title, page.margin, 26 * s, points=TITLE, bold=True, room=size[0] - 2 * page.margin)
-        width, height = size[0] / 2, (size[1] - 40 * s) / 2
-        for k, (label, unit, of) in enumerate(PANELS):
-            curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
-            longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-            row, column = divmod(k, 2)
-            left, top = column * width + 44 * s, 40 * s + row * height + 36 * s
-            right = min(24 * s + longest, 0.5 * width)
-            axes = page.axes((left, top, width - 44 * s - right, height - 84 * s))
-            draw_curves(axes, curves, theme, label=label, unit=unit, weight=0.8)
-        return page.figure
+    page = Page(size, theme)
+    s = page.scale
+    page.title(title, 26)
+    width, height = size[0] / 2, (size[1] - 40 * s) / 2
+    for k, (label, unit, of) in enumerate(PANELS):
+        curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
+        longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+        row, column = divmod(k, 2)
+        left, top = column * width + 44 * s, 40 * s + row * height + 36 * s
+        right = min(24 * s + longest, 0.5 * width)
+        axes = page.axes((left, top, width - 44 * s - right, height - 84 * s))
+        draw_curves(axes, curves, theme, label=label, unit=unit, weight=0.8)
+    return page.figure

@@ -2,92 +2,20 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Literal, TypeAlias
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias, cast
 
-from robocov.errors import OutputError, ParameterError, shown
-from robocov.files.atomic import writable, written
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.theme import Colour, Theme
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.legend import Legend
-
-
-_METADATA: dict[str, dict[str, str | None]] = {
-    "png": {"Software": None},
-    "svg": {"Date": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-"""What would differ from one time, or one version of matplotlib, to the next is left out."""
-
-_STYLE: Any = {
-    "savefig.bbox": None,
-    "svg.hashsalt": "robocov",
-    # outlines: an SVG cannot hold a font, and others than ours would not fit their places
-    "svg.fonttype": "path",
-    # the whole letters as TrueType: publishers refuse Type 3, and the words can be searched and copied
-    "pdf.fonttype": 42,
-}
-
-
-def figure_png(figure: Figure) -> bytes:
-    """Return a figure as PNG, of exactly the page's pixels."""
-    file = io.BytesIO()
-    _write(figure, file, "png")
-    return file.getvalue()
-
-
-def save_figure(figure: Figure, path: Path | str) -> None:
-    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all.
-
-    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts themselves, so
-    that both look the same everywhere. None holds a date: the same plot gives the same bytes. Raises
-    OutputError when the file cannot be written; ParameterError when the suffix is another.
-    """
-    path = Path(path)
-    kind = figure_kind(path)
-    with written(path) as part:
-        _write(figure, part, kind)
-
-
-def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
-    import matplotlib
-
-    with plain_style(), matplotlib.rc_context(_STYLE):
-        figure.savefig(
-            file, format=kind, dpi=figure.dpi, metadata=_METADATA[kind], facecolor=figure.get_facecolor()
-        )
-
-
-def check_figure_path(path: Path) -> None:
-    """Make sure, before any work is done, that a figure can be written there.
-
-    Raises OutputError when there is no such folder, or something else than a file in its place;
-    ParameterError when the suffix is neither PNG, SVG nor PDF.
-    """
-    figure_kind(path)
-    if not writable(path).parent.is_dir():
-        raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
-
-
-def figure_kind(path: Path) -> str:
-    """Return ``png``, ``svg`` or ``pdf``, by the suffix of a path.
-
-    Raises ParameterError when the suffix is another.
-    """
-    kind = path.suffix.lower().lstrip(".")
-    if kind not in _METADATA:
-        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png, .svg or .pdf was wanted")
-    return kind
-
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5
 """Text sizes in points."""
@@ -99,30 +27,57 @@ Place: TypeAlias = Literal["upper left", "upper center", "center right"]
 """Which part of a legend is where it is put."""
 
 
-@contextmanager
-def plain_style() -> Iterator[None]:
-    """Give a context in which matplotlib draws alike whatever style its user has set.
-
-    Names of maps and controllers are words: dollars in them are no formula, and letters that the font
-    has not are boxes and no reason for a warning.
-    """
-    import matplotlib.style
-
-    style: dict[str, Any] = {
-        "font.family": "DejaVu Sans",
-        "text.usetex": False,
-        "text.parse_math": False,
-        "axes.unicode_minus": True,
-    }
-    with matplotlib.style.context(["default", style]), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        yield
-
-
 def tone(colour: Colour) -> tuple[float, float, float]:
     """Return a colour as matplotlib wants it."""
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that axes are on."""
+    return cast("Figure", axes.get_figure(root=True))
+
+
+def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:
+    """Give axes the theme's colours, labels, a quiet grid, and no frame but the bottom below a grid."""
+    ink, faint = tone(theme.ink), tone(theme.faint)
+    axes.set_facecolor(tone(theme.background))
+    axes.tick_params(colors=faint, labelcolor=ink, labelsize=SMALL, left=False)
+    axes.set_xlabel(x, fontsize=TEXT, color=ink)
+    if y:  # level words are read more easily than words on their side
+        axes.set_ylabel(y, fontsize=TEXT, color=ink)
+        axes.yaxis.label.set(rotation=0, ha="left", va="bottom")
+        axes.yaxis.set_label_coords(0.0, 1.03)
+    for side, spine in axes.spines.items():
+        spine.set_visible(bool(grid) and side == "bottom")
+        spine.set_color(faint)
+    if grid:
+        axes.grid(axis=grid, color=tone(theme.grid), linewidth=0.8, alpha=0.7)
+        axes.set_axisbelow(True)
+
+
+def value_limits(low: float, high: float, *, room: float = 0.08, origin: float = 0.0) -> tuple[float, float]:
+    """Return the ends of an axis for values: from `origin` where they come near it, with some room."""
+    more = room * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
+    near = 0.0 <= low - origin < 0.4 * (high - origin)
+    return (origin if near else low - more), high + more
+
+
+def even_ticks(axis: Any, most: int) -> None:
+    """Mark 1, 2, 5 times a power of ten on an axis, at most so many of them."""
+    axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
+    axis.set_major_formatter("{x:g}")
+
+
+class PageAxes(Axes):
+    """Axes of a page, for which a notebook shows the page: without pyplot it would show no figure."""
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, Any]]:
+        """Return the page as PNG, how wide it is to be shown, and its words for who cannot see it."""
+        page = figure_of(self)
+        words = [text.get_text() for text in page.texts if text.get_text()]
+        # a dot of the page at 100 dots an inch is a pixel of the screen
+        return figure_png(page), {"width": round(page.bbox.width * 100 / page.dpi), "alt": "; ".join(words)}
 
 
 class Page:
@@ -132,9 +87,6 @@ class Page:
     """
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
         self.size = size
         self.theme = theme
         fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
@@ -142,7 +94,7 @@ class Page:
         dpi = 100.0 * self.scale
         # the pixels are counted by truncation: a hair more keeps 899.9999 at 900
         inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
-        self.figure: Figure = Figure(figsize=inches, dpi=dpi, facecolor=tone(theme.background))
+        self.figure = Figure(figsize=inches, dpi=dpi, facecolor=tone(theme.background))
         FigureCanvasAgg(self.figure)
 
     @property
@@ -150,17 +102,33 @@ class Page:
         """Pixels that stay free at the edges."""
         return 18.0 * self.scale
 
+    @property
+    def room(self) -> float:
+        """Pixels between the margins."""
+        return self.size[0] - 2 * self.margin
+
     def at(self, x: float, y: float) -> tuple[float, float]:
         """Return a pixel as fractions of the figure, which hold for every resolution."""
         return x / self.size[0], 1.0 - y / self.size[1]
 
     def axes(self, box: Box) -> Axes:
         """Return axes that fill `box`; a notebook shows the page for them."""
-        from robocov_app.figures.page_axes import PageAxes
-
         left, top, width, height = box
         x, y = self.at(left, top + height)
         return self.figure.add_axes((x, y, width / self.size[0], height / self.size[1]), axes_class=PageAxes)
+
+    def map_axes(self, box: Box, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
+        """Return axes without ticks that show a part of the world, m, in a box of its shape."""
+        axes = self.axes(box)
+        axes.set_xlim(low_x, high_x)
+        axes.set_ylim(low_y, high_y)
+        axes.set_axis_off()
+        return axes
+
+    def title(self, text: str, y: float, room: float | None = None) -> None:
+        """Write the title at the left margin, at so many pixels at scale 1 from the top."""
+        room = self.room if room is None else room
+        self.text(text, self.margin, y * self.scale, points=TITLE, bold=True, room=room)
 
     def panels(
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
@@ -201,15 +169,13 @@ class Page:
         align: str = "left",
     ) -> None:
         """Write one line, its middle at height `y`; with `room` it is cut to so many pixels."""
-        written = self.figure.text(
-            *self.at(x, y),
-            text,
-            fontsize=points,
-            fontweight="bold" if bold else "normal",
-            color=tone(colour or self.theme.ink),
-            ha=align,
-            va="center",
-        )
+        style: Any = {
+            "fontsize": points,
+            "fontweight": "bold" if bold else "normal",
+            "ha": align,
+            "va": "center",
+        }
+        written = self.figure.text(*self.at(x, y), text, color=tone(colour or self.theme.ink), **style)
         # the same words are up to a pixel wider in one place than in another
         while room is not None and len(text) > 1 and self.width_of(written) > room + 1:
             text = text[:-1]
@@ -250,17 +216,15 @@ class Page:
         """
         begin = self.margin if begin is None else begin
         columns, width, _ = self._legend_extent(handles, begin)
-        middle = bottom + 24 * self.scale
+        middle, end = bottom + 24 * self.scale, self.size[0] - self.margin
         if columns == len(handles) and width <= self._beside_bar(begin):
-            end = self.size[0] - self.margin
             start = min(left, end - width - (end - begin - self._beside_bar(begin)))
             taken = self._scale_bar(max(start, begin), middle, zoom)
             x = min(max(right, taken + 24 * self.scale + width), end)
             self._legend(handles, columns, "center right", (x, middle))
         else:
             self._scale_bar(left, bottom + 20 * self.scale, zoom)
-            centre = (begin + self.size[0] - self.margin) / 2
-            self._legend(handles, columns, "upper center", (centre, bottom + 38 * self.scale))
+            self._legend(handles, columns, "upper center", ((begin + end) / 2, bottom + 38 * self.scale))
 
     @property
     def _longest_bar(self) -> float:
@@ -272,8 +236,6 @@ class Page:
 
     def _scale_bar(self, left: float, y: float, zoom: float) -> float:
         """Draw a bar of a round length; return where its words end."""
-        from matplotlib.lines import Line2D
-
         length = round_length(self._longest_bar / zoom)
         tick, right = 4 * self.scale, left + length * zoom
         for (x1, y1), (x2, y2) in (

@@ -6,22 +6,16 @@ They take plain numbers. What a result depends on (gains, team sizes) is in `rob
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
-from robocov_app.figures.curves import (
-    DISTANCE,
-    Curve,
-    CurveStyle,
-    curve_styles,
-    draw_curves,
-    end_label,
-    styles_of,
-)
-from robocov_app.figures.page import TITLE, Page, plain_style, tone
+from robocov_app.figures.curves import DISTANCE, Curve, draw_curves, end_label
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import Page, even_ticks, figure_of, tone, value_limits
 from robocov_app.figures.rows import (
     cut_to,
     draw_box,
@@ -32,15 +26,10 @@ from robocov_app.figures.rows import (
     ratio_limits,
     row_frame,
     rows_page,
-    value_limits,
 )
+from robocov_app.figures.statistics import Interval
+from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.render.theme import LIGHT, Theme, theme_named
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from robocov_app.figures.statistics import Interval
-
 
 _REACH = 1.5
 """So much farther than its pairs an axis of ratios goes for their intervals."""
@@ -78,6 +67,7 @@ class Pairs(NamedTuple):
     interval: Interval
 
 
+@plain_style()
 def plot_cost_bands(
     bands: Sequence[Band],
     theme: Theme | str = LIGHT,
@@ -118,23 +108,22 @@ def plot_cost_bands(
         (low, high) if len(band.values) > 1 else None
         for band, (low, _, high) in zip(bands, quarters, strict=True)
     ]
-    with plain_style():
-        page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
-        s = page.scale
-        most = 0.5 * page.size[0] - 30 * s
-        curves = [_fitting(curve, page, unit, most) for curve in curves]
-        right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-        left, top = 44 * s, (72 if title else 44) * s
-        if title:
-            room = page.size[0] - 2 * page.margin
-            page.text(title, page.margin, 22 * s, points=TITLE, bold=True, room=room)
-        axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
-        # lines as in a picture of the usual size would fill a small one
-        weight = 1.0 if size is None or size[0] >= _USUAL * (scale or 1.0) else 0.7
-        draw_curves(axes, curves, theme, styles=looks, bands=around, label=label, unit=unit, weight=weight)
-        return cast("Figure", axes.get_figure(root=True))
+    page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
+    s = page.scale
+    most = 0.5 * page.size[0] - 30 * s
+    curves = [_fitting(curve, page, unit, most) for curve in curves]
+    right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    left, top = 44 * s, (72 if title else 44) * s
+    if title:
+        page.title(title, 22)
+    axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
+    # lines as in a picture of the usual size would fill a small one
+    weight = 1.0 if size is None or size[0] >= _USUAL * (scale or 1.0) else 0.7
+    draw_curves(axes, curves, theme, styles=looks, bands=around, label=label, unit=unit, weight=weight)
+    return figure_of(axes)
 
 
+@plain_style()
 def plot_final_costs(
     rows: Sequence[tuple[str, Sequence[Sample]]],
     theme: Theme | str = LIGHT,
@@ -159,26 +148,24 @@ def plot_final_costs(
     theme = theme_named(theme)
     places, heads, total = laid_rows([(name, len(group)) for name, group in rows])
     names = [sample.label for sample in samples]
-    with plain_style():
-        axes, names = rows_page(total, names, theme, size, title, scale)
-        looks = [
-            look
-            for _, group in rows
-            for look in (
-                styles_of([each.controller for each in group]) if styles is None else styles[: len(group)]
-            )
-        ]
-        for sample, place, look in zip(samples, places, looks, strict=True):
-            draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
-        values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
-        row_frame(axes, places, names, total, theme, label, looks)
-        value_limits(axes, values, origin)
-        for (name, _), head in zip(rows, heads, strict=True):
-            if name:
-                draw_heading(axes, name, head, theme)
-        return cast("Figure", axes.get_figure(root=True))
+    axes, names = rows_page(total, names, theme, size, title, scale)
+    looks: list[CurveStyle] = []
+    for _, group in rows:
+        looks += styles_of([each.controller for each in group]) if styles is None else styles[: len(group)]
+    for sample, place, look in zip(samples, places, looks, strict=True):
+        draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
+    row_frame(axes, places, names, total, theme, label, looks)
+    values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
+    low, high = float(values.min()), float(values.max())
+    axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
+    even_ticks(axes.xaxis, 6)
+    for (name, _), head in zip(rows, heads, strict=True):
+        if name:
+            draw_heading(axes, name, head, theme)
+    return figure_of(axes)
 
 
+@plain_style()
 def plot_paired(
     pairs: Sequence[Pairs],
     theme: Theme | str = LIGHT,
@@ -201,32 +188,24 @@ def plot_paired(
     theme = theme_named(theme)
     places, _, total = laid_rows([("", len(pairs))])
     names = [each.label for each in pairs]
-    with plain_style():
-        axes, names = rows_page(total, names, theme, size, title, scale)
-        known = curve_styles(each.controller for each in pairs)
-        looks = [known[each.controller] for each in pairs] if styles is None else styles
-        for each, look, place in zip(pairs, looks, places, strict=True):
-            colour = tone(look.colour(theme))
-            draw_points(axes, np.sort(each.ratios), place, colour, theme)
-            ratio = each.interval
-            if np.isfinite(ratio.low):
-                ends = [ratio.low, ratio.high]
-                axes.plot(
-                    ends,
-                    [place, place],
-                    color=tone(theme.ink),
-                    linewidth=2.4,
-                    solid_capstyle="butt",
-                    zorder=4,
-                )
-            draw_median(axes, ratio.estimate, place, theme)
-        row_frame(axes, places, names, total, theme, label)
-        ratios = np.concatenate([each.ratios for each in pairs])
-        ends = [end for each in pairs for end in (each.interval.low, each.interval.high) if np.isfinite(end)]
-        # an interval of two or three values may be endless: it leaves the axis then
-        ends = np.clip(ends, ratios.min() / _REACH, ratios.max() * _REACH).tolist()
-        ratio_limits(axes, np.concatenate([ratios, ends]), theme)
-        return cast("Figure", axes.get_figure(root=True))
+    axes, names = rows_page(total, names, theme, size, title, scale)
+    known = curve_styles(each.controller for each in pairs)
+    looks = [known[each.controller] for each in pairs] if styles is None else styles
+    for each, look, place in zip(pairs, looks, places, strict=True):
+        colour = tone(look.colour(theme))
+        draw_points(axes, np.sort(each.ratios), place, colour, theme)
+        ratio = each.interval
+        if np.isfinite(ratio.low):
+            line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
+            axes.plot([ratio.low, ratio.high], [place, place], color=tone(theme.ink), **line)
+        draw_median(axes, ratio.estimate, place, theme)
+    row_frame(axes, places, names, total, theme, label)
+    ratios = np.concatenate([each.ratios for each in pairs])
+    ends = [end for each in pairs for end in (each.interval.low, each.interval.high) if np.isfinite(end)]
+    # an interval of two or three values may be endless: it leaves the axis then
+    ends = np.clip(ends, ratios.min() / _REACH, ratios.max() * _REACH).tolist()
+    ratio_limits(axes, np.concatenate([ratios, ends]), theme)
+    return figure_of(axes)
 
 
 def quartiles(values: Array) -> tuple[Array, Array, Array]:

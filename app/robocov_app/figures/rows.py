@@ -6,18 +6,16 @@ Heights are in rows from the top. Names stand to the left, level; names of group
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from robocov.arrays import Array
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, tone
+from robocov_app.figures.page import TEXT, Page, figure_of, quiet_axes, tone
+from robocov_app.figures.styles import CurveStyle
 from robocov_app.render.theme import Theme
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from robocov_app.figures.curves import CurveStyle
 
 MOST_POINTS = 250
 """Points that are drawn of a sample; of more, so many that stand evenly among them by rank."""
@@ -33,9 +31,6 @@ _BESIDE = 13.0
 
 _HALF = 0.27
 """Half of the height of a box, in rows."""
-
-_FROM_ZERO = 0.4
-"""The axis begins at zero when the lowest value is below this part of the highest."""
 
 _RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0)
 """Where an axis of ratios may have its marks; and beyond, powers of ten."""
@@ -79,7 +74,7 @@ def rows_page(
         height = round(above + _ROW * s * total + below)
     page = Page((width, height), theme, s)
     if title:
-        page.text(title, page.margin, 20 * s, points=TITLE, bold=True, room=width - 2 * page.margin)
+        page.title(title, 20)
     return page.axes((left, above, width - left - 16 * s, height - above - below)), short
 
 
@@ -93,31 +88,14 @@ def row_frame(
     looks: Sequence[CurveStyle] = (),
 ) -> None:
     """Write the names beside the rows, with the marks of their styles, and what the values are."""
-    ink = tone(theme.ink)
-    axes.set_facecolor(tone(theme.background))
     axes.set_ylim(total, 0.0)
     axes.set_yticks(list(places), list(names))
-    axes.set_xlabel(label, fontsize=TEXT, color=ink)
-    axes.grid(axis="x", color=tone(theme.grid), linewidth=0.8, alpha=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
-    axes.spines["bottom"].set_color(tone(theme.faint))
-    axes.tick_params(colors=tone(theme.faint), labelcolor=ink, labelsize=SMALL)
-    axes.tick_params(axis="y", length=0.0, labelsize=TEXT, pad=_BESIDE)
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    aside = -0.5 * (_BESIDE + 3.0) * figure.dpi / 72 / axes.get_window_extent().width
+    quiet_axes(axes, theme, label, grid="x")
+    axes.tick_params(axis="y", left=True, length=0.0, labelsize=TEXT, pad=_BESIDE)
+    aside = -0.5 * (_BESIDE + 3.0) * figure_of(axes).dpi / 72 / axes.get_window_extent().width
+    style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
     for place, look in zip(places, looks, strict=False):
-        axes.plot(
-            aside,
-            place,
-            look.mark,
-            color=tone(look.colour(theme)),
-            markersize=5.5,
-            transform=axes.get_yaxis_transform(),
-            clip_on=False,
-        )
+        axes.plot(aside, place, look.mark, color=tone(look.colour(theme)), **style)
 
 
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
@@ -135,34 +113,12 @@ def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
 def draw_heading(axes: Axes, name: str, height: float, theme: Theme) -> None:
     """Write the name of a group at the left edge of the page."""
     box = axes.get_position()
-    axes.text(
-        -box.x0 / box.width + 0.01,
-        height,
-        name,
-        transform=axes.get_yaxis_transform(),
-        fontsize=TEXT,
-        fontweight="bold",
-        color=tone(theme.ink),
-        va="center",
-    )
-
-
-def value_limits(axes: Axes, values: Array, origin: float = 0.0) -> None:
-    """Give the axis room for all values, from `origin` where they come near it."""
-    from matplotlib.ticker import MaxNLocator
-
-    low, high = float(values.min()), float(values.max())
-    room = 0.06 * (high - low) if high > low else 0.1 * max(abs(high), 1e-3)
-    near = 0.0 <= low - origin < _FROM_ZERO * (high - origin)
-    axes.set_xlim(origin if near else low - room, high + room)
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_formatter("{x:g}")
+    style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": tone(theme.ink)}
+    axes.text(-box.x0 / box.width + 0.01, height, name, transform=axes.get_yaxis_transform(), **style)
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:
     """Give a logarithmic axis around 1 room for all ratios, and mark 1."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
     low, high = min(float(ratios.min()), 0.95), max(float(ratios.max()), 1.05)
     room = (high / low) ** 0.05
     axes.set_xscale("log")
@@ -210,17 +166,9 @@ def draw_points(
         values = values[np.rint(np.linspace(0, len(values) - 1, MOST_POINTS)).astype(int)]
     alone = len(values) < FEW
     aside = np.zeros(len(values)) if alone else (_scattered(len(values)) - 0.5) * 1.5 * _HALF
-    axes.plot(
-        values,
-        place + aside,
-        "o",
-        color=colour,
-        markersize=6.0 if alone else 3.6,
-        markeredgecolor=tone(theme.background),
-        markeredgewidth=0.4,
-        alpha=1.0 if alone else 0.65,
-        zorder=3.5,
-    )
+    look: Any = {"markersize": 6.0, "alpha": 1.0} if alone else {"markersize": 3.6, "alpha": 0.65}
+    rim: Any = {"markeredgecolor": tone(theme.background), "markeredgewidth": 0.4}
+    axes.plot(values, place + aside, "o", color=colour, zorder=3.5, **look, **rim)
 
 
 def draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:

@@ -1,35 +1,30 @@
-"""Publication plots: trajectories, cost curves and comparisons, as matplotlib figures.
-
-matplotlib is imported when a plot is made, never before; pyplot, which would want a display, never.
-"""
+"""Publication plots: trajectories, cost curves and comparisons, as matplotlib figures (never pyplot's)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from robocov.errors import ParameterError, shown
+from robocov.environment import Environment
+from robocov.errors import ParameterError, counted, shown
+from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, plain_style
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, figure_of
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from robocov.environment import Environment
-    from robocov.record import Record
 
 _SCALE = 1.3
 """Of texts and lines on a page of the usual width: its legend stands beside the scale bar."""
 
 
+@plain_style()
 def plot_environment(
     environment: Environment,
     axes: Axes | None = None,
@@ -38,22 +33,20 @@ def plot_environment(
 ) -> Figure:
     """Plot a map: its free space, its obstacles and the convex region that the robots know.
 
-    `axes`: where to draw; None makes a page of `size` px with a `title`.
+    `axes`: where to draw; None makes a page of `size` px with a title.
     """
-    theme = _theme(theme)
-    with plain_style():
-        if axes is not None:
-            ticks_in_metres(axes, environment, theme)
-            draw_map(axes, environment, theme)
-            return _figure_of(axes)
+    theme = theme_named(theme)
+    if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
-        page, axes = _map_page(
-            environment, theme, size, environment.name, facts, map_handles(environment, theme)
-        )
-        draw_map(axes, environment, theme)
-        return page.figure
+        handles = map_handles(environment, theme)
+        axes = _map_page(environment, theme, size, environment.name, facts, handles)
+    else:
+        ticks_in_metres(axes, environment, theme)
+    draw_map(axes, environment, theme)
+    return figure_of(axes)
 
 
+@plain_style()
 def plot_trajectories(
     record: Record,
     axes: Axes | None = None,
@@ -65,30 +58,24 @@ def plot_trajectories(
 ) -> Figure:
     """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
 
-    `axes`: where to draw; None makes a page of `size` px with a `title`. `colours`: those of the paper, or a
+    `axes`: where to draw; None makes a page of `size` px with a title. `colours`: those of the paper, or a
     hue for each robot. `mean_distance`, m, and `mean_time`, s (where robots are not equally fast), are those
     of the final positions, for the title.
     """
     _check_colours(colours)
-    theme = _theme(theme)
-    with plain_style():
-        if axes is not None:
-            ticks_in_metres(axes, record.environment, theme)
-            draw_run(axes, record, theme, colours)
-            return _figure_of(axes)
+    theme = theme_named(theme)
+    if axes is None:
         facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
-        page, axes = _map_page(
-            record.environment,
-            theme,
-            size,
-            _line(record.label, record.environment.name),
-            _line(*facts),
-            run_handles(record, theme, colours),
-        )
-        draw_run(axes, record, theme, colours)
-        return page.figure
+        title = _line(record.label, record.environment.name)
+        handles = run_handles(record, theme, colours)
+        axes = _map_page(record.environment, theme, size, title, _line(*facts), handles)
+    else:
+        ticks_in_metres(axes, record.environment, theme)
+    draw_run(axes, record, theme, colours)
+    return figure_of(axes)
 
 
+@plain_style()
 def plot_comparison(
     records: Sequence[Record],
     theme: Theme | str = LIGHT,
@@ -114,58 +101,52 @@ def plot_comparison(
         raise ParameterError(
             f"comparison: {len(records)} runs and {len(times)} mean times, but one time for each was wanted"
         )
-    theme = _theme(theme)
-    with plain_style():
-        bounds = np.array([record.environment.region.bounds for record in records])
-        limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
-        aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
-        shared, captions = _captions(records, costs, times)
-        entries = united((run_handles(record, theme, colours) for record in records), label_of)
-
-        scale = 1.5 if size is None else None
-        page = Page(size or (1600, 1000), theme, scale)
-        above, top = 54 * page.scale, 50 * page.scale if shared else 8 * page.scale
-        words = [
-            (page.text_width(record.label, points=TITLE, bold=True), page.text_width(text))
-            for record, text in zip(records, captions, strict=True)
-        ]
-        columns = columns_for(len(records), aspect, (page.size[0], page.size[1] - 2 * top), above)
-        fitting = (page.size[0] - page.margin) / (max(max(both) for both in words) + page.margin)
-        columns = max(min(columns, int(fitting)), 1)
-        slot = (page.size[0] - page.margin) / columns - page.margin
-        one_line = all(name + text + 16 * page.scale <= slot for name, text in words)
-        above = (30 if one_line else 54) * page.scale
-        if size is None:
-            rows = -(-len(records) // columns)
-            tall = top + rows * (above + slot / aspect + 14 * page.scale) + page.footer_height(entries)
-            page = Page((page.size[0], int(np.clip(tall, 320, 1800))), theme, scale)
-        wide = max((name + text + 16 * page.scale if one_line else max(name, text)) for name, text in words)
-        below = page.footer_height(entries)
-        panels = page.panels(len(records), columns, aspect, wide, above, top, below)
-        first, room = panels[0]
-        for record, text, (box, _) in zip(records, captions, panels, strict=True):
-            axes = page.axes(box)
-            axes.set_xlim(limits[0], limits[2])
-            axes.set_ylim(limits[1], limits[3])
-            axes.set_axis_off()
-            draw_run(axes, record, theme, colours)
-            left, edge, up = box[0], box[1], 16 * page.scale
-            if one_line:
-                page.text(record.label, left, edge - up, points=TITLE, bold=True)
-                right = left + max(box[2], min(room, wide))
-                page.text(text, right, edge - up, colour=theme.faint, align="right")
-            else:
-                page.text(record.label, left, edge - 38 * page.scale, points=TITLE, bold=True, room=room)
-                page.text(text, left, edge - up, colour=theme.faint, room=room)
-        if shared:
-            y = first[1] - above - 20 * page.scale
-            page.text(shared, first[0], y, points=HEADING, bold=True, room=page.size[0] - 2 * page.margin)
-        right = max(box[0] + max(box[2], room if one_line else 0.0) for box, _ in panels)
-        bottom = max(box[1] + box[3] for box, _ in panels)
-        page.footer(entries, first[0], right, bottom, first[2] / (limits[2] - limits[0]))
-        return page.figure
+    theme = theme_named(theme)
+    bounds = np.array([record.environment.region.bounds for record in records])
+    limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
+    aspect = (limits[2] - limits[0]) / (limits[3] - limits[1])
+    shared, captions = _captions(records, costs, times)
+    entries = united((run_handles(record, theme, colours) for record in records), label_of)
+    scale = 1.5 if size is None else None
+    page = Page(size or (1600, 1000), theme, scale)
+    s = page.scale
+    above, top = 54 * s, 50 * s if shared else 8 * s
+    words = [
+        (page.text_width(record.label, points=TITLE, bold=True), page.text_width(text))
+        for record, text in zip(records, captions, strict=True)
+    ]
+    columns = columns_for(len(records), aspect, (page.size[0], page.size[1] - 2 * top), above)
+    fitting = (page.size[0] - page.margin) / (max(max(both) for both in words) + page.margin)
+    columns = max(min(columns, int(fitting)), 1)
+    slot = (page.size[0] - page.margin) / columns - page.margin
+    one_line = all(name + text + 16 * s <= slot for name, text in words)
+    above = (30 if one_line else 54) * s
+    if size is None:
+        rows = -(-len(records) // columns)
+        tall = top + rows * (above + slot / aspect + 14 * s) + page.footer_height(entries)
+        page = Page((page.size[0], int(np.clip(tall, 320, 1800))), theme, scale)
+    wide = max((name + text + 16 * s if one_line else max(name, text)) for name, text in words)
+    panels = page.panels(len(records), columns, aspect, wide, above, top, page.footer_height(entries))
+    first, room = panels[0]
+    for record, text, (box, _) in zip(records, captions, panels, strict=True):
+        draw_run(page.map_axes(box, *limits), record, theme, colours)
+        left, edge, up = box[0], box[1], 16 * s
+        if one_line:
+            page.text(record.label, left, edge - up, points=TITLE, bold=True)
+            right = left + max(box[2], min(room, wide))
+            page.text(text, right, edge - up, colour=theme.faint, align="right")
+        else:
+            page.text(record.label, left, edge - 38 * s, points=TITLE, bold=True, room=room)
+            page.text(text, left, edge - up, colour=theme.faint, room=room)
+    if shared:
+        page.text(shared, first[0], first[1] - above - 20 * s, points=HEADING, bold=True, room=page.room)
+    right = max(box[0] + max(box[2], room if one_line else 0.0) for box, _ in panels)
+    bottom = max(box[1] + box[3] for box, _ in panels)
+    page.footer(entries, first[0], right, bottom, first[2] / (limits[2] - limits[0]))
+    return page.figure
 
 
+@plain_style()
 def plot_cost(
     curves: Sequence[Curve],
     axes: Axes | None = None,
@@ -187,30 +168,18 @@ def plot_cost(
                 f"curve {shown(label)}: {len(time)} times, {int(np.isfinite(values).sum())} finite values, "
                 f"but a value for each time and a finite one was wanted"
             )
-    theme = _theme(theme)
-    with plain_style():
-        size = size or (1000, 560)
+    theme = theme_named(theme)
+    if axes is None:
+        wide, high = size or (1000, 560)
         # few things are on it: they may be large
-        scale = float(np.clip(min(size[0] / 800, size[1] / 450), 0.8, 6.0))
-        page = Page(size, theme, scale) if axes is None else None
-        if axes is None:
-            assert page is not None
-            s = page.scale
-            longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
-            right = min(40 * s + longest, 0.45 * size[0])
-            box = (52 * s, 86 * s, size[0] - 52 * s - right, size[1] - 86 * s - 56 * s)
-            page.text(title, 52 * s, 30 * s, points=TITLE, bold=True, room=size[0] - 52 * s - page.margin)
-            axes = page.axes(box)
-        draw_curves(axes, curves, theme)
-        return _figure_of(axes)
-
-
-def _figure_of(axes: Axes) -> Figure:
-    return cast("Figure", axes.get_figure(root=True))
-
-
-def _theme(theme: Theme | str) -> Theme:
-    return theme_named(theme)
+        page = Page((wide, high), theme, float(np.clip(min(wide / 800, high / 450), 0.8, 6.0)))
+        s = page.scale
+        longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+        right = min(40 * s + longest, 0.45 * wide)
+        page.text(title, 52 * s, 30 * s, points=TITLE, bold=True, room=wide - 52 * s - page.margin)
+        axes = page.axes((52 * s, 86 * s, wide - 52 * s - right, high - 86 * s - 56 * s))
+    draw_curves(axes, curves, theme)
+    return figure_of(axes)
 
 
 def _check_colours(colours: str) -> None:
@@ -225,43 +194,37 @@ def _map_page(
     title: str,
     facts: str,
     handles: Sequence[Artist],
-) -> tuple[Page, Axes]:
-    """Return a page with titles, scale bar and legend, and the axes for one map in the room between."""
+) -> Axes:
+    """Return the axes for one map, on a page with titles, scale bar and legend around."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
+    page = Page(size or (1400, 1000), theme, None if size else _SCALE)
     if size is None:
-        page = Page((1400, 1000), theme, _SCALE)
         around = 58 * page.scale + page.footer_height(handles)
-        width = float(np.clip((1300 - around) * aspect + 2 * page.margin, 840, 1400))
-        height = float(np.clip((width - 2 * page.margin) / aspect + around, 300, 1300))
-        page = Page((int(width), int(height)), theme, _SCALE)
-    else:
-        page = Page(size, theme)
-    above, below = 58 * page.scale, page.footer_height(handles)
-    room_x, room_y = page.size[0] - 2 * page.margin, page.size[1] - above - below
-    width = min(room_x, room_y * aspect)
+        wide = float(np.clip((1300 - around) * aspect + 2 * page.margin, 840, 1400))
+        high = float(np.clip((wide - 2 * page.margin) / aspect + around, 300, 1300))
+        page = Page((int(wide), int(high)), theme, _SCALE)
+    above = 58 * page.scale
+    room_y = page.size[1] - above - page.footer_height(handles)
+    width = min(page.room, room_y * aspect)
     height = width / aspect
     left, top = (page.size[0] - width) / 2, above + (room_y - height) / 2
-    axes = page.axes((left, top, width, height))
-    axes.set_xlim(low_x, high_x)
-    axes.set_ylim(low_y, high_y)
-    axes.set_axis_off()
     _titles(page, (left, top, width, height), title, facts)
     page.footer(handles, left, left + width, top + height, width / (high_x - low_x))
-    return page, axes
+    return page.map_axes((left, top, width, height), low_x, low_y, high_x, high_y)
 
 
 def _titles(page: Page, box: Box, title: str, facts: str) -> None:
     """Write two lines above `box`; above a narrow map they may be wider than it."""
     left, top, width, _ = box
-    room = page.size[0] - 2 * page.margin
     for text, up, points, bold, colour in (
         (title, 38, TITLE, True, page.theme.ink),
         (facts, 16, TEXT, False, page.theme.faint),
     ):
-        wide = min(page.text_width(text, points=points, bold=bold), room)
+        wide = min(page.text_width(text, points=points, bold=bold), page.room)
         start = left if wide <= width else max(left + (width - wide) / 2, page.margin)
-        page.text(text, start, top - up * page.scale, points=points, bold=bold, colour=colour, room=room)
+        y = top - up * page.scale
+        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
 
 
 def _captions(
@@ -270,8 +233,7 @@ def _captions(
     """Return what is true of all runs, for the page's title, and of each, what is not."""
     same: list[str] = []
     own = [[_cost(each.environment, *known)] for each, *known in zip(records, costs, times, strict=True)]
-    for fact in (_map, _robots, _time):
-        found = [fact(record) for record in records]
+    for found in zip(*((each.environment.name, _robots(each), _time(each)) for each in records), strict=True):
         if len(set(found)) == 1:
             same.append(found[0])
         else:
@@ -284,13 +246,8 @@ def _line(*facts: str) -> str:
     return "  ·  ".join(fact for fact in facts if fact)
 
 
-def _map(record: Record) -> str:
-    return record.environment.name
-
-
 def _robots(record: Record) -> str:
-    n = len(record.team)
-    return f"{n} robot{'s' if n > 1 else ''}"
+    return counted(len(record.team), "robot")
 
 
 def _time(record: Record) -> str:

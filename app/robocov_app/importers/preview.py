@@ -9,17 +9,8 @@ import shapely
 from shapely import Polygon
 
 from robocov_app.figures.arena import draw_map, map_handles
-from robocov_app.figures.page import (
-    HEADING,
-    SMALL,
-    TITLE,
-    Box,
-    Page,
-    check_figure_path,
-    plain_style,
-    save_figure,
-    tone,
-)
+from robocov_app.figures.files import check_figure_path, plain_style, save_figure
+from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
 from robocov_app.importers.comparison import Comparison, compare
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named

@@ -66,6 +66,12 @@ def readable_on(colour: Colour) -> Colour:
 # far apart as tints of cells, where sand and olive would be one, and serve as map colours.
 _MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
 
+HEAT_LEVELS = 12
+"""Steps of the scale of colours of a grid of numbers."""
+
+_QUIET_PART = 0.55
+"""Of the scale of heat, so much is used for them: on all of it the ink can be read."""
+
 TRAIL_CONTRAST = 2.4
 """Least contrast of a robot's trajectory with its own cell."""
 
@@ -131,6 +137,13 @@ class Theme:
         place = np.linspace(0.0, len(anchors) - 1.0, count)
         columns = [np.interp(place, np.arange(len(anchors)), anchors[:, k]) for k in range(3)]
         return np.asarray(np.rint(np.column_stack(columns)), dtype=np.uint8)
+
+    @property
+    def quiet_heat(self) -> list[Colour]:
+        """The `HEAT_LEVELS` colours of a grid from low to high, all quiet enough for text in ink."""
+        table = self.heat_table(200)
+        rows = [round(_QUIET_PART * 199 * k / (HEAT_LEVELS - 1)) for k in range(HEAT_LEVELS)]
+        return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
 
     def controller(self, name: str) -> Colour:
         """Return the colour of a controller's curves and labels."""

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov_app.figures.arena import draw_run, label_of, run_handles
-from robocov_app.figures.curves import CurveStyle, curve_styles
+from robocov_app.figures.files import plain_style
 from robocov_app.figures.heights import plot_heights
-from robocov_app.figures.page import SMALL, TITLE, plain_style
+from robocov_app.figures.page import SMALL, TITLE
 from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_paired
+from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.render.layout import united
 from robocov_app.render.theme import Theme, theme_named
 from robocov_app.replication.beyond_plan import OURS

@@ -97,7 +97,8 @@ def gap_rows(outcomes: Outcomes) -> list[tuple[str, list[Sample]]]:
 
 def gains_figure(gains: Mapping[str, GainOutcomes], theme: Theme | str) -> Figure:
     """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
-    from robocov_app.figures.page import TITLE, Page, plain_style
+    from robocov_app.figures.files import plain_style
+    from robocov_app.figures.page import TITLE, Page
     from robocov_app.render.theme import theme_named
 
     look = theme_named(theme)

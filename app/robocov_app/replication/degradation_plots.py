@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robocov.errors import ParameterError
-from robocov_app.figures.curves import curve_styles
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, plain_style, tone
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, tone
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.sweep.study import UNITS
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from robocov_app.figures.curves import CurveStyle
+    from robocov_app.figures.styles import CurveStyle
     from robocov_app.replication.degradation import Degradation
 
 _TITLES = {

@@ -24,7 +24,8 @@ from robocov_app.figures.arena import (
     run_handles,
 )
 from robocov_app.figures.curves import draw_curves, end_label
-from robocov_app.figures.page import SMALL, TITLE, Page, plain_style, tone
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import SMALL, TITLE, Page, tone
 from robocov_app.render.layout import united
 from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named

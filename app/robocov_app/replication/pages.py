@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from robocov.errors import OutputError
-from robocov_app.figures.page import save_figure
+from robocov_app.figures.files import save_figure
 from robocov_app.replication.bars import interval_bar
 from robocov_app.replication.tables import settled_text
 from robocov_app.replication.verdicts import amount, described

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robocov import __version__
 from robocov.errors import ParameterError, counted
-from robocov_app.figures.curves import MARKS
+from robocov_app.figures.styles import MARKS
 from robocov_app.render.theme import theme_named
 from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
 from robocov_app.report.facts import (

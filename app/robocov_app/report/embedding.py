@@ -17,7 +17,7 @@ from robocov.arrays import Array
 from robocov.environment import Environment, Obstacle
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.figures.curves import MARKS, CurveStyle
+from robocov_app.figures.styles import MARKS, CurveStyle
 from robocov_app.render.density import shading
 from robocov_app.render.theme import DARK, LIGHT, mix
 from robocov_app.runs.saved import roster_of

@@ -13,8 +13,8 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
-from robocov_app.figures.curves import CurveStyle, curve_styles, styles_of
 from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
+from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Result
 from robocov_app.sweep.study import parameter_text
 

@@ -13,7 +13,6 @@ from robocov.arrays import Array, BoolArray
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
-from robocov_app.figures.curves import CurveStyle, curve_styles
 from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
 from robocov_app.figures.results import (
     Band,
@@ -24,6 +23,7 @@ from robocov_app.figures.results import (
     plot_paired,
     quartiles,
 )
+from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.report.embedding import ReplayRun, has_path
 from robocov_app.report.groups import (
     Comparison,

@@ -8,7 +8,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
-from robocov_app.figures.curves import styles_of
+from robocov_app.figures.styles import styles_of
 from robocov_app.report.embedding import BUDGET, ReplayRun, embedded, script_json
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.theme_css import theme_rules

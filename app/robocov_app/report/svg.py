@@ -11,7 +11,7 @@ import re
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from robocov_app.figures.page import plain_style
+from robocov_app.figures.files import plain_style
 from robocov_app.render.theme import LIGHT
 from robocov_app.report.theme_css import hex_code, named_colours
 

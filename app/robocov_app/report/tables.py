@@ -26,7 +26,7 @@ from robocov_app.report.results import RESTARTS
 
 if TYPE_CHECKING:
     from robocov.controllers.gains import Value
-    from robocov_app.figures.curves import CurveStyle
+    from robocov_app.figures.styles import CurveStyle
     from robocov_app.report.results import Entry, Result
 
 NOTHING = "–"

@@ -6,7 +6,6 @@ and dark. Names begin with ``--rc-``, so that they meet no others in a notebook.
 
 from __future__ import annotations
 
-from robocov_app.figures.gains import quiet_heat
 from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
 
 
@@ -48,7 +47,7 @@ def named_colours(theme: Theme) -> dict[str, Colour]:
             f"cell-{k}": mix(theme.background, colour, theme.paper_tint)
             for k, colour in enumerate(theme.robots)
         },
-        **{f"heat-{k}": colour for k, colour in enumerate(quiet_heat(theme))},
+        **{f"heat-{k}": colour for k, colour in enumerate(theme.quiet_heat)},
     }
 
 

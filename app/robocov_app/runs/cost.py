@@ -53,7 +53,7 @@ def draw_distances(
 ) -> None:
     """Draw a map of the distances to the nearest robot, under words on their mean."""
     from robocov_app.figures.coverage import Moment, plot_coverage
-    from robocov_app.figures.page import save_figure
+    from robocov_app.figures.files import save_figure
     from robocov_app.render.distance_field import Field, FieldLattice
 
     team, field = (

@@ -176,7 +176,7 @@ def time_curves(runs: Sequence[Run]) -> list[Curve]:
 
 def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
     """Draw each figure and write it as PNG and SVG under its name."""
-    from robocov_app.figures.page import save_figure
+    from robocov_app.figures.files import save_figure
 
     with progress("pictures", 2 * len(figures), quiet=quiet) as update:
         done = counting(update)

@@ -13,7 +13,7 @@ import pytest
 from drawn_run import HALL, ROOMS, run_of
 
 from robocov.errors import OutputError, ParameterError
-from robocov_app.figures.page import check_figure_path, save_figure
+from robocov_app.figures.files import check_figure_path, save_figure
 from robocov_app.figures.runs import plot_cost, plot_environment, plot_trajectories
 
 T = np.linspace(0.0, 60.0, 121)

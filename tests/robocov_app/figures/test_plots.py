@@ -22,7 +22,8 @@ from robocov.errors import ParameterError
 from robocov.robots import Team
 from robocov.voronoi import partition
 from robocov_app.figures.curves import end_label, spread
-from robocov_app.figures.page import save_figure, tone
+from robocov_app.figures.files import save_figure
+from robocov_app.figures.page import tone
 from robocov_app.figures.runs import plot_comparison, plot_cost, plot_environment, plot_trajectories
 from robocov_app.render.theme import DARK, LIGHT
 

@@ -8,7 +8,7 @@ from robocov.cost import CoverageCost
 from robocov.errors import ParameterError
 from robocov_app.figures.coverage import Moment, plot_coverage
 from robocov_app.figures.curves import DISTANCE, TIME
-from robocov_app.figures.page import save_figure
+from robocov_app.figures.files import save_figure
 from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, palette, round_limit
 from robocov_app.render.theme import DARK, LIGHT
 

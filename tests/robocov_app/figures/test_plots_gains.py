@@ -5,15 +5,13 @@ import pytest
 
 from robocov.errors import ParameterError
 from robocov_app.figures.gains import (
-    HEAT_LEVELS,
     MOST_LEVELS,
     MOST_POINTS,
     Dependence,
     plot_gain_grid,
     plot_gains,
-    quiet_heat,
 )
-from robocov_app.render.theme import DARK, LIGHT, contrast
+from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast
 
 GAINS = np.repeat([0.1, 0.3, 1.0, 3.0, np.nan], 4)
 VALUES = np.arange(20.0)
@@ -73,7 +71,7 @@ def test_numbers_of_a_grid_tell_small_differences() -> None:
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
 def test_ink_can_be_read_on_all_colours_of_a_grid(theme) -> None:
-    colours = quiet_heat(theme)
+    colours = theme.quiet_heat
     assert len(colours) == len(set(colours)) == HEAT_LEVELS
     assert min(contrast(theme.ink, colour) for colour in colours) >= 4.5
 

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov_app.figures.curves import curve_styles
 from robocov_app.figures.page import tone
 from robocov_app.figures.results import (
     Band,
@@ -20,6 +19,7 @@ from robocov_app.figures.results import (
     styles_of,
 )
 from robocov_app.figures.statistics import bootstrap
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import DARK, LIGHT
 
 RNG = np.random.default_rng(3)

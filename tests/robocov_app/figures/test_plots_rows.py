@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.figures.curves import curve_styles
-from robocov_app.figures.page import plain_style
-from robocov_app.figures.rows import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page, value_limits
+from robocov_app.figures.files import plain_style
+from robocov_app.figures.page import value_limits
+from robocov_app.figures.rows import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT
 
 STYLE = curve_styles(["rapf"])["rapf"]
@@ -65,19 +66,21 @@ def test_of_very_many_values_some_points_are_drawn() -> None:
     assert (drawn[0], drawn[-1]) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize(("values", "begin"), [((1.0, 9.0), 0.0), ((8.0, 9.0), 7.94), ((2.0, 2.0), 1.8)])
-def test_the_axis_begins_at_zero_where_values_come_near_it(values, begin) -> None:
-    axes = axes_of()
-    value_limits(axes, np.array(values))
-    low, high = axes.get_xlim()
+@pytest.mark.parametrize(
+    ("values", "origin", "begin"),
+    [
+        ((1.0, 9.0), 0.0, 0.0),
+        ((8.0, 9.0), 0.0, 7.94),
+        ((2.0, 2.0), 0.0, 1.8),
+        ((-0.1, 0.9), 0.0, -0.16),
+        ((1.01, 1.2), 1.0, 1.0),
+        ((0.98, 1.2), 1.0, 0.9668),
+        ((3.0, 4.0), 1.0, 2.94),
+    ],
+)
+def test_an_axis_begins_at_its_origin_where_values_come_near_it(values, origin, begin) -> None:
+    low, high = value_limits(*values, room=0.06, origin=origin)
     assert low == pytest.approx(begin) and low < values[0] + 1e-9 and high > values[1]
-
-
-@pytest.mark.parametrize(("values", "begin"), [((1.01, 1.2), 1.0), ((0.98, 1.2), 0.9668), ((3.0, 4.0), 2.94)])
-def test_the_axis_may_begin_elsewhere(values, begin) -> None:
-    axes = axes_of()
-    value_limits(axes, np.array(values), 1.0)
-    assert axes.get_xlim()[0] == pytest.approx(begin)
 
 
 @given(st.lists(st.floats(1e-3, 1e4), min_size=1, max_size=8))

@@ -10,7 +10,8 @@ from matplotlib.colors import to_rgb
 from robocov.errors import ParameterError
 from robocov.metrics import CostHistory
 from robocov.voronoi import partition
-from robocov_app.figures.page import save_figure, tone
+from robocov_app.figures.files import save_figure
+from robocov_app.figures.page import tone
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.replication.figures import NUMBERS, TEXTS, WIDE, Shown, draw_figure
 

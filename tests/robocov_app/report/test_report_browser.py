@@ -16,7 +16,7 @@ from reported_results import HOSTILE, entry, falling, walk, watched
 from robocov.conditions import Conditions
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.voronoi import partition
-from robocov_app.figures.curves import curve_styles
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.document import report
 from robocov_app.report.embedding import embedded_map, embedded_run

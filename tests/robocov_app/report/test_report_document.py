@@ -13,7 +13,7 @@ from reported_results import HOSTILE, Page, entry, result_of, watched
 
 from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
-from robocov_app.figures.curves import MARKS
+from robocov_app.figures.styles import MARKS
 from robocov_app.report.document import MOST_LETTERS, report
 from robocov_app.report.results import Damaged
 from robocov_app.runs.saved import Saved
@@ -236,6 +236,6 @@ def test_a_page_knows_its_own(tmp_path) -> None:
 
 
 def test_marks_are_those_of_the_plots() -> None:
-    from robocov_app.figures.curves import curve_styles
+    from robocov_app.figures.styles import curve_styles
 
     assert {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", *"abcde"]).values()} == MARKS.keys()

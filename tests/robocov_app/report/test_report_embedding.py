@@ -13,7 +13,7 @@ from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
-from robocov_app.figures.curves import curve_styles
+from robocov_app.figures.styles import curve_styles
 from robocov_app.report.embedding import (
     NONE,
     RATE,

@@ -5,8 +5,7 @@ import re
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.figures.gains import HEAT_LEVELS
-from robocov_app.render.theme import DARK, LIGHT, contrast, rgb
+from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast, rgb
 from robocov_app.report.theme_css import hex_code, named_colours, theme_rules, variables
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])

@@ -1,0 +1,94 @@
+"""Figures as files, PNG, SVG and PDF: the same plot gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from robocov.errors import OutputError, ParameterError, shown
+from robocov.files.atomic import writable, written
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_METADATA: dict[str, dict[str, str | None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""What would differ from one time, or one version of matplotlib, to the next is left out."""
+
+_STYLE: Any = {
+    "savefig.bbox": None,
+    "svg.hashsalt": "robocov",
+    # outlines: an SVG cannot hold a font, and others than ours would not fit their places
+    "svg.fonttype": "path",
+    # the whole letters as TrueType: publishers refuse Type 3, and the words can be searched and copied
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def plain_style() -> Iterator[None]:
+    """Give a context in which matplotlib draws alike whatever style its user has set.
+
+    Names of maps and controllers are words: dollars in them are no formula, and letters that the font
+    has not are boxes and no reason for a warning.
+    """
+    import matplotlib.style
+
+    style: Any = {"font.family": "DejaVu Sans", "text.usetex": False, "text.parse_math": False}
+    style["axes.unicode_minus"] = True
+    with matplotlib.style.context(["default", style]), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
+
+
+def figure_png(figure: Figure) -> bytes:
+    """Return a figure as PNG, of exactly the page's pixels."""
+    file = io.BytesIO()
+    _write(figure, file, "png")
+    return file.getvalue()
+
+
+def save_figure(figure: Figure, path: Path | str) -> None:
+    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all.
+
+    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts themselves, so
+    that both look the same everywhere. None holds a date: the same plot gives the same bytes. Raises
+    OutputError when the file cannot be written; ParameterError when the suffix is another.
+    """
+    kind = figure_kind(Path(path))
+    with written(Path(path)) as part:
+        _write(figure, part, kind)
+
+
+def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
+    import matplotlib
+
+    page: Any = {"dpi": figure.dpi, "facecolor": figure.get_facecolor()}
+    with plain_style(), matplotlib.rc_context(_STYLE):
+        figure.savefig(file, format=kind, metadata=_METADATA[kind], **page)
+
+
+def check_figure_path(path: Path) -> None:
+    """Make sure, before any work is done, that a figure can be written there.
+
+    Raises OutputError when there is no such folder, or something else than a file in its place;
+    ParameterError when the suffix is neither PNG, SVG nor PDF.
+    """
+    figure_kind(path)
+    if not writable(path).parent.is_dir():
+        raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")
+
+
+def figure_kind(path: Path) -> str:
+    """Return ``png``, ``svg`` or ``pdf``, by a path's suffix; raises ParameterError when that is another."""
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in _METADATA:
+        raise ParameterError(f"{path}: suffix {shown(path.suffix)}, but .png, .svg or .pdf was wanted")
+    return kind

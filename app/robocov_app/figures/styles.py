@@ -1,0 +1,86 @@
+"""How curves of controllers look: colours, dashes and marks, the same in every picture."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from robocov_app.render.theme import Colour, Theme
+
+_KNOWN: dict[str, tuple[Any, str]] = {
+    "rapf": ("-", "o"),
+    "rpf": ((0, (5, 1.6)), "s"),
+    "lloyd": ((0, (1.6, 1.2)), "^"),
+}
+"""Dashes and end mark of the paper's controllers: the same in every picture."""
+
+VARIANTS: tuple[tuple[Any, str], ...] = (
+    ((0, (6, 1.6, 1.6, 1.6)), "D"),
+    ((0, (9, 2.5)), "v"),
+    ((0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), "P"),
+    ((0, (2.5, 2.5)), "*"),
+    ((0, (9, 1.4, 3, 1.4)), "X"),
+)
+"""Those of controllers that have none of their own, and of one controller's second, third, ... gains."""
+
+_LOOKS = (*_KNOWN.values(), *VARIANTS)
+
+MARKS = {
+    "o": "M0-5a5 5 0 1 0 .01 0z",
+    "s": "M-4.6-4.6h9.2v9.2h-9.2z",
+    "^": "M0-5.6 5.6 4.4H-5.6z",
+    "v": "M0 5.6 5.6-4.4H-5.6z",
+    "D": "M0-6 6 0 0 6-6 0z",
+    "P": "M-2-6h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
+    "*": "M0-6.6 1.8-2.1 6.6-1.8 2.9 1.3 4.1 6 0 3.4-4.1 6-2.9 1.3-6.6-1.8-1.8-2.1z",
+    "X": "M-5.6-3-3-5.6 0-2.6 3-5.6 5.6-3 2.6 0 5.6 3 3 5.6 0 2.6-3 5.6-5.6 3-2.6 0z",
+}
+"""The marks as SVG paths round the origin, 10 to 13 across."""
+
+
+class CurveStyle(NamedTuple):
+    """How a controller's curves are told from others: never by a colour alone.
+
+    `name` is that of the colour: the controller's own, or ``other-0``, ``other-1``, ... for those of
+    `Theme.others`.
+    """
+
+    name: str
+    dashes: Any
+    mark: str
+
+    def colour(self, theme: Theme) -> Colour:
+        """Return the colour in a theme."""
+        kind, _, number = self.name.rpartition("-")
+        return theme.others[int(number)] if kind == "other" else theme.controller(self.name)
+
+
+def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
+    """Return a style for each controller; those that have none of their own get the others' in turn."""
+    names = list(dict.fromkeys(controllers))
+    return dict(zip(names, styles_of(names), strict=True))
+
+
+def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
+    """Return a style for each of several curves: another colour, dashes and mark for a controller's variants.
+
+    >>> [(style.name, style.mark) for style in styles_of(["rapf", "rapf", "mine"])]
+    [('rapf', 'o'), ('other-1', 'v'), ('other-0', 'D')]
+    """
+    spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
+    free = itertools.cycle(spare)
+    first = {
+        name: CurveStyle(name, *_KNOWN[name]) if name in _KNOWN else next(free)
+        for name in dict.fromkeys(controllers)
+    }
+    left, used = dict(first), set(first.values())
+    styles = []
+    for name in controllers:
+        style = left.pop(name, None)
+        if style is None:
+            own = [first[name]._replace(dashes=dashes, mark=mark) for dashes, mark in _LOOKS]
+            style = next((each for each in (*spare, *own) if each not in used), first[name])
+            used.add(style)
+        styles.append(style)
+    return styles
