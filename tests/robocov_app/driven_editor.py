@@ -19,6 +19,7 @@ from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.window import EditorWindow
+from robocov_app.toolkit.dialogs import Choice
 from robocov_app.viewer.opening import display
 
 SIZE = (900, 600)
@@ -121,12 +122,20 @@ class Hands(Driver):
     def wait(self, seconds: float = 0.5) -> None:
         self.window.frame(seconds)
 
-    def widget(self, kind: str, name: str) -> Any:
-        widgets = self.window.panel.widgets
-        assert widgets is not None, "the panel is hidden"
-        found = widgets.find(kind, name)
-        assert found is not None, f"no {kind} {name}"
-        return found
+    def answer(self, text: str) -> None:
+        """Click a button of the question that is asked."""
+        self.settle()
+        shown = self.window.dialogs._ui.shown
+        found = next(each for each in shown.values() if each.kind == "button" and each.text == text)
+        self.click(*found.rect.center)
+
+    def refused(self) -> str:
+        """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
+        asked = self.desk.asked
+        assert isinstance(asked, Choice) and asked.trouble, "nothing was refused"
+        self.key("escape")
+        assert self.desk.asked is None
+        return asked.trouble
 
     def select(self, *keys: Any) -> None:
         self.desk.select(Selection.of(*keys))

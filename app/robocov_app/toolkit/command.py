@@ -182,6 +182,10 @@ class Commands:
         """Take note of a key that comes up."""
         self._down.discard(event.key)
 
+    def hold(self, key: int) -> None:
+        """Take note of a key that is held down already."""
+        self._down.add(key)
+
     def forget_keys(self) -> None:
         """Take note that the window has lost the keyboard, or that something else has got its keys."""
         self._down.clear()

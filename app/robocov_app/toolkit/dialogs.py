@@ -12,20 +12,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Protocol
 
 import pygame
 
-from robocov.errors import RobocovError
+from robocov.errors import InputError, RobocovError
 from robocov_app.render.fonts import label
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.overlay import card, dim, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import TEXT, Ui
+
+MOST_LISTED = 5000
+"""Names of a folder that are looked at."""
 
 ROWS = 9
 """Lines of a list that are in sight."""
@@ -96,7 +101,8 @@ class Question:
         ui.row(max(room, 1.0), *widths, height=30, gap=8, below=0)
         ui.cell()
         for k, answer in enumerate(self.answers):
-            if ui.button(answer.text, key=f"answer:{k}", chosen=k == self.chosen):
+            tip = f"Key {answer.key.upper()}" if answer.key else ""
+            if ui.button(answer.text, key=f"answer:{k}", chosen=k == self.chosen, tip=tip):
                 self._give(answer)
 
     def _give(self, answer: Answer) -> None:
@@ -232,6 +238,25 @@ class Choice:
         """Do nothing."""
 
 
+def list_choice(
+    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
+) -> Choice:
+    """Return a choice of one of some lines: those that hold all words typed."""
+
+    def found(typed: str) -> list[Option]:
+        words = typed.lower().split()
+        return [
+            each for each in options() if all(word in f"{each.text} {each.aside}".lower() for word in words)
+        ]
+
+    def chosen(typed: str, option: Option | None) -> None:
+        if option is None:
+            raise InputError(f"{typed!r}, but one of the list was wanted")
+        accept(option)
+
+    return Choice(title, found, chosen, ghost or "type to find")
+
+
 def file_choice(
     title: str,
     folder: Path,
@@ -244,17 +269,22 @@ def file_choice(
 ) -> Choice:
     """Return a choice of a file; folders are walked into, and what is typed is a path from `folder`."""
 
-    def split(typed: str) -> tuple[Path, str]:
-        before, slash, begun = typed.rpartition("/")
-        return folder / Path(before + slash).expanduser(), begun
-
-    def options(typed: str) -> list[Option]:
-        place, begun = split(typed)
+    def path_of(typed: str) -> Path:
         try:
-            there = sorted(place.iterdir(), key=lambda each: (not each.is_dir(), each.name.lower()))
-        except OSError:
+            return folder / Path(typed).expanduser()
+        except RuntimeError:  # a user who is not there
+            return folder / typed
+
+    @cache
+    def options(typed: str) -> list[Option]:
+        before, slash, begun = typed.rpartition("/")
+        place, prefix = path_of(before + slash), before + slash
+        try:
+            there = sorted(
+                islice(place.iterdir(), MOST_LISTED), key=lambda each: (not each.is_dir(), each.name.lower())
+            )
+        except (OSError, ValueError):
             return []
-        prefix = typed[: len(typed) - len(begun)]
         found = [Option(str(each), "recent", str(each), value=each) for each in recent if not typed]
         for each in there:
             hidden = each.name.startswith(".") and not begun.startswith(".")
@@ -265,17 +295,19 @@ def file_choice(
             found.append(
                 Option(each.name + slash, "folder" if slash else "", prefix + each.name + slash, value=each)
             )
+        if not begun:
+            found.append(Option("../", "folder", f"{place.resolve().parent.as_posix().rstrip('/')}/"))
         return found
 
     def chosen(typed: str, option: Option | None) -> object:
         if saves and typed.strip() and not typed.endswith("/"):
-            accept(folder / Path(typed.strip()).expanduser())
+            accept(path_of(typed.strip()))
         elif option is not None and option.text.endswith("/"):
             return option.fills
         elif option is not None and isinstance(option.value, Path):
             accept(option.value)
         elif typed.strip():
-            accept(folder / Path(typed.strip()).expanduser())
+            accept(path_of(typed.strip()))
         return None
 
     none = "Enter saves it there" if saves else "nothing of that name"
@@ -329,6 +361,8 @@ class Dialogs:
                 return True
         if event.type == pygame.KEYDOWN:
             self._key(asked, ui, event)
+            if self.asked is not asked:  # it was answered, and that asks something else
+                self.swallow(event.unicode)
         elif event.type == pygame.MOUSEWHEEL:
             asked.wheel(wheel_notches(event))
         elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):

@@ -54,8 +54,8 @@ class TextEdit:
                 self.anchor, self.caret = word.span()
 
     def type(self, text: str) -> None:
-        """Replace what is selected by a text; line ends become blanks."""
-        text = " ".join(text.splitlines())
+        """Replace what is selected by a text; line ends become blanks, what cannot be printed is left out."""
+        text = "".join(filter(str.isprintable, " ".join(text.splitlines())))
         if text:
             self._replace(*self.selection, text, typing=len(text) == 1)
         self.composed = ""

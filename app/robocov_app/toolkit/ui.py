@@ -60,7 +60,7 @@ LIST_ROW = 24.0
 TIP_AFTER = 0.6
 """Seconds for which the mouse rests before a tool tip appears."""
 
-_KNOB = 12.0
+_KNOB, _TALLEST = 12.0, 32.0  # a slider's knob, a button in a row that is higher
 _NOTCH = 40.0
 _ENTER = ("return", "enter")
 
@@ -413,6 +413,18 @@ class Ui:
         if self.surface is not None:
             self.surface.set_clip(None)
 
+    def visible_rows(self, count: int, height: float) -> Iterator[int]:
+        """Yield the numbers of those of many equal rows that are in sight."""
+        self.end_row()
+        top = self._clip.top - self.box.top - self.px(self.y)
+        first = min(max(int(top / self.px(height)), 0), count)
+        last = min(first + self._clip.height // self.px(height) + 2, count)
+        self.y += first * height
+        self.row(height=height, below=0)
+        yield from range(first, last)
+        self.end_row()
+        self.y += (count - last) * height
+
     def scroll_to(self, key: str, top: float = 0.0) -> None:
         """Scroll a region to a height."""
         self._scrolled[key], self.stale = top, True
@@ -571,6 +583,7 @@ class Ui:
     ) -> bool:
         """Show a button; return whether it was pressed."""
         key, rect = key or text, self.cell()
+        rect.height = min(rect.height, self.px(_TALLEST))
         self._noted("button", key, rect, text, chosen, tip, why)
         clicked = self._clicks(key, rect, why)
         if self.surface is not None and self._visible(rect):
@@ -595,8 +608,18 @@ class Ui:
             self._write(aside, inner, self.theme.faint, SMALL, at="right")
             inner.width -= text_width(aside, self.px(SMALL)) + self.px(12) if aside else 0
             faint = mix(self.theme.panel, self.theme.ink, 0.45)
-            self._write(text, inner, faint if why else self.theme.ink, TEXT)
+            lines = text.split("\n")
+            inner.top -= self.px((TEXT + 5) * (len(lines) - 1) / 2)
+            for k, line in enumerate(lines):
+                at = inner.move(0, self.px((TEXT + 5) * k))
+                self._write(line, at, faint if why else self.theme.ink, TEXT)
         return clicked
+
+    def area(self, key: str) -> tuple[pygame.Rect, bool]:
+        """Take the next cell for a picture; return where it is, px, and whether it was clicked."""
+        rect = self.cell()
+        self._noted("area", key, rect, "", None, "", "")
+        return rect, self._clicks(key, rect, "")
 
     def tabs(self, key: str, names: Sequence[str], now: str, *widths: float) -> str | None:
         """Show buttons side by side of which one is chosen; return another one that was."""

@@ -20,7 +20,7 @@ from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import mix, robot_hues
-from robocov_app.viewer.overlays import tag
+from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE
 from robocov_app.viewer.session.curves import TIME, compared
 
@@ -327,7 +327,13 @@ class Arena:
             pygame.draw.rect(canvas.surface, accent, box, canvas.width(1.5))
         if preview.words and preview.line:
             x, y = canvas.camera.to_pixels(np.array(preview.line[-1])).tolist()
-            tag(canvas, preview.words, (x + 12 * canvas.scale, y - 14 * canvas.scale))
+            tag(
+                canvas.surface,
+                preview.words,
+                (x + 12 * canvas.scale, y - 14 * canvas.scale),
+                canvas.theme,
+                canvas.scale,
+            )
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
         """Draw what parts the panes, which of them is chosen, and the legend that they share."""

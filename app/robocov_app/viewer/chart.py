@@ -13,8 +13,8 @@ from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_words
 from robocov_app.render.theme import mix
+from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.layout import inside
-from robocov_app.viewer.overlays import tag
 from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, curve_of
 
 if TYPE_CHECKING:
@@ -397,7 +397,13 @@ class Chart:
         screen.fill(mix(theme.panel, theme.ink, 0.35), line)
         canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
         room = right - canvas.text_width(words)
-        tag(canvas, words, (min(x + 12 * scale, room), top + (TOP + 16) * scale))
+        tag(
+            canvas.surface,
+            words,
+            (min(x + 12 * scale, room), top + (TOP + 16) * scale),
+            canvas.theme,
+            canvas.scale,
+        )
 
     def _colour(self, lane: Lane) -> Colour:
         return curve_colour(self.desk, self.theme, lane)

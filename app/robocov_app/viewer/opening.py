@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
 from robocov_app.toolkit.autosave import autosave_folder
+from robocov_app.toolkit.input import KEY_REPEAT
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
-from robocov_app.viewer.actions import KEY_REPEAT
 from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.layout import SMALLEST
 from robocov_app.viewer.presenter import Desk

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
-from robocov.errors import ParameterError, RobocovError
+from robocov.errors import RobocovError
 from robocov.files.atomic import written
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Command, Commands
-from robocov_app.toolkit.dialogs import Answer, Choice, Dialogs, Option, Question, file_choice
+from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.overlay import draw_message
@@ -407,21 +407,14 @@ class Window:
         desk, session = self.desk, self.desk.session
         session.stow()  # the curve of the present with those of the others
 
-        def lines(typed: str) -> list[Option]:
+        def lines() -> list[Option]:
             found = []
             for k, each in enumerate(session.branches, 1):
                 text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
-                if typed.casefold() in text.casefold():
-                    found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
+                found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
             return found
 
-        def enter(typed: str, option: Option | None) -> None:
-            if option is None or not isinstance(option.value, int):
-                raise ParameterError(f"branch: {typed!r}, but one of the list was wanted")
-            desk.enter(option.value)
-
-        hint = "↑ ↓ choose · Enter goes there · Esc closes"
-        self.dialogs.ask(Choice("Branches", lines, enter, "type to find one", hint))
+        self.dialogs.ask(list_choice("Branches", lines, lambda option: desk.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
         """Ask who is here for the first time whether to begin with the lesson."""

@@ -181,7 +181,7 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         hands.command("density none")
         assert hands.sketch.density is None
         hands.command("density some")
-        assert "none was wanted" in hands.said
+        assert "none was wanted" in hands.refused()
         hands.key("v")
         hands.frames(2)
 

@@ -14,7 +14,7 @@ from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonO
 from robocov_app.editor.model.measurement import measure
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.sketch import sketch_text
-from robocov_app.editor.ui.commands import TYPED, all_commands
+from robocov_app.editor.ui.commands import TYPED
 from robocov_app.editor.ui.panel import TABS
 
 EVENTS, BATCH, DRAWN = 2_500, 6, 5
@@ -32,7 +32,6 @@ MOST = {
 }
 """What is done so often at most, since it writes files or takes long."""
 
-KEYS_OF = [(action.name, key) for action in all_commands() for key in action.keys]
 WORDS = (
     *(f"{word} {value}" for word in TYPED for value in ("1", "2 x 3", "-1", "1e309", "0", "zz")),
     *("3 x 2", "@1<45", "120cm", "+0.5 -0.5", "90", "𝔸 é ñ 中 🤖", "%s {x} <b> &", "..", "1e309", "-", "٣"),
@@ -96,7 +95,8 @@ class Monkey:
         return int(min(max(x, 0), width - 1)), int(min(max(y, 0), height - 1))
 
     def key(self) -> None:
-        name, key = self.random.choice(KEYS_OF)
+        commands = self.hands.window.commands.listed
+        name, key = self.random.choice([(each.name, key) for each in commands for key in each.keys])
         self.done[name] = self.done.get(name, 0) + 1
         if self.done[name] > MOST.get(name, 10**9):
             return

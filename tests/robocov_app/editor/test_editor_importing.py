@@ -13,9 +13,10 @@ from driven_editor import Hands, opened_editor, sheet
 from PIL import Image, ImageDraw
 
 from robocov_app.editor.edits.properties import titled
-from robocov_app.editor.ui.asking import Question
-from robocov_app.editor.ui.importing import Importing, ImportQuestion, options_of
+from robocov_app.editor.ui.import_dialog import ImportDialog
+from robocov_app.editor.ui.importing import Importing, options_of
 from robocov_app.importers import IMPORTERS, ReadOptions, Shaping
+from robocov_app.toolkit.dialogs import Question
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker
 
 PATIENCE = 60.0
@@ -33,16 +34,12 @@ def plan(tmp_path: Path) -> Path:
     return tmp_path / "plan.png"
 
 
-def question(path: Path, worker: Any = None, taken: Any = None) -> ImportQuestion:
+def question(path: Path, worker: Any = None, taken: Any = None) -> ImportDialog:
     worker = worker or DirectWorker(Importing())
-    return ImportQuestion(path, IMPORTERS["picture"], worker, taken)
+    return ImportDialog(path, IMPORTERS["picture"], worker, taken)
 
 
-def choose(asked: ImportQuestion, name: str) -> None:
-    asked.move([option.name for option in asked.options].index(name) - asked.chosen)
-
-
-def free(asked: ImportQuestion) -> float:
+def free(asked: ImportDialog) -> float:
     asked.poll()
     assert asked.imported is not None and asked.trouble == ""
     return asked.imported.environment.free_area
@@ -54,7 +51,7 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
     shaping = [field.name for field in fields(Shaping)]
     assert {option.name for option in options} == {*IMPORTERS[name].options, *shaping}
     assert all(option.help.endswith(".") and "None" not in option.help for option in options)
-    asked = ImportQuestion(tmp_path / "x", IMPORTERS[name], DirectWorker(Importing()), None)
+    asked = ImportDialog(tmp_path / "x", IMPORTERS[name], DirectWorker(Importing()), None)
     assert asked.settings() == (ReadOptions(), Shaping())
     given = {"number": "1", "place": "1 2", "words": "a, b", "text": "walls"}
     meant = {"number": 1.0, "place": (1.0, 2.0), "words": ("a", "b"), "text": "walls"}
@@ -71,42 +68,28 @@ def test_the_options_are_those_of_the_format(name: str, tmp_path: Path) -> None:
 def test_every_change_shows_what_would_come_of_it(plan: Path) -> None:
     asked = question(plan)
     assert "--cell" in asked.trouble and not asked.ready
-    asked.type("0.1")
+    asked.set("cell", "0.1")
     assert free(asked) == pytest.approx(80 - 1)
-    choose(asked, "invert")
-    asked.type(" ")
+    asked.set("invert", "yes")
     assert free(asked) == pytest.approx(200 - 80 - 56)
-    asked.turn(1)
-    choose(asked, "threshold")
-    asked.type("0.3")
+    asked.set("invert", "no")
+    asked.set("threshold", "0.3")
     assert free(asked) == pytest.approx(80)
-    asked.type("x")
+    asked.set("threshold", "0.3x")
     assert asked.trouble == "threshold: '0.3x', but a number was wanted"
-    asked.erase(all_of_it=True)
-    choose(asked, "keep")
-    asked.turn(-1)
+    asked.set("threshold", "")
+    asked.set("keep", "all")
     assert free(asked) == pytest.approx(80 + 56 - 1)
     asked.keep_inside((15.0, 5.0))
     assert free(asked) == pytest.approx(56)
     asked.keep_inside((11.5, 5.0))
     assert "is solid, but a place in the free space was wanted" in asked.trouble
-    choose(asked, "inside")
-    asked.erase(all_of_it=True)
+    asked.set("inside", "")
     assert free(asked) == pytest.approx(80 - 1)
     assert asked.given == {"cell": "0.1"}
 
 
-def test_an_option_without_a_default_can_be_left_again(plan: Path) -> None:
-    asked = question(plan)
-    choose(asked, "unknown")
-    seen = []
-    for _ in range(4):
-        asked.turn(1)
-        seen.append(asked.text(asked.option))
-    assert seen == ["obstacle", "free", "cut", ""]
-
-
-def waited(asked: ImportQuestion) -> None:
+def waited(asked: ImportDialog) -> None:
     end = time.monotonic() + PATIENCE
     while asked.busy and time.monotonic() < end:
         asked.poll()
@@ -119,8 +102,8 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     # every older import is given up
     worker: Any = LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=0.0)
     asked = question(plan, worker)
-    for letter in "0.1":
-        asked.type(letter)
+    for text in ("0", "0.", "0.1"):
+        asked.set("cell", text)
     process = worker._talk.process
     waited(asked)
     assert free(asked) == pytest.approx(80 - 1)
@@ -130,7 +113,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     taken = asked.poll()
     assert taken is not None and taken.environment.free_area == pytest.approx(56)
     assert worker._talk.process is process
-    asked.close()
+    asked.cancelled()
     assert process.poll() is not None
 
 
@@ -140,10 +123,11 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
         yield driver
 
 
-def shown(hands: Hands) -> tuple[ImportQuestion, Any]:
+def shown(hands: Hands) -> tuple[ImportDialog, Any]:
+    """Return the dialog, and its widgets by kind and name."""
     hands.frames(2)
-    assert isinstance(hands.desk.asked, ImportQuestion)
-    return hands.desk.asked, hands.window.dialogs._import
+    assert isinstance(hands.desk.asked, ImportDialog)
+    return hands.desk.asked, hands.window.dialogs._ui.shown
 
 
 def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, plan: Path) -> None:
@@ -151,13 +135,13 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.type("plan.png")
     hands.key("return")
     hands.type("0.1")
-    asked, view = shown(hands)
+    asked, _ = shown(hands)
     assert asked.given == {"cell": "0.1"}
-    for camera, place in zip(view._cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
+    for camera, place in zip(asked.cameras, ((15.0, 3.0), (5.0, 8.0)), strict=True):
         hands.click(*camera.to_pixels(np.array(place)).tolist())
         x, y = (float(word) for word in asked.given["inside"].split())
         assert (x, y) == pytest.approx(place, abs=0.1)
-    hands.click(*view._cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
+    hands.click(*asked.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
     hands.frames(2)
     assert hands.desk.asked is None
@@ -170,24 +154,28 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     assert hands.said == "imported: plan.png, not saved yet"
 
 
-def test_rows_and_buttons_take_clicks(hands: Hands, plan: Path) -> None:
+def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     hands.window.documents.open(plan)
     asked, view = shown(hands)
     hands.type("0.1")
-    names = [option.name for option in asked.options]
-    row = {names[k]: rect for rect, k in view._rows}
-    hands.click(*row["invert"].center)
-    assert asked.option.name == "invert" and "invert" not in asked.given
-    hands.click(*row["invert"].center)
-    assert asked.given["invert"] == "yes"
-    hands.key("delete")
-    hands.key("up")
-    hands.key("up")
-    hands.key("right")
-    assert asked.given["unknown"] == "obstacle"
+    hands.click(*view["menu:invert"].rect.center)
+    hands.key("down")
+    hands.key("return")
+    assert asked.given == {"cell": "0.1", "invert": "yes"} and not asked.accepted
+    menu = shown(hands)[1]["menu:unknown"]
+    seen = []
+    for _ in range(4):
+        hands.click(*menu.rect.center)
+        hands.key("down")
+        hands.key("return")
+        seen.append(asked.given.get("unknown"))
+    assert seen == ["obstacle", "free", "cut", "cut"]
+    hands.click(*menu.rect.center)
+    hands.key("home")
+    hands.key("return")
+    assert "unknown" not in asked.given, "an option without a default can be left again"
     before = hands.sketch
-    cancel = next(rect for rect, key in view._buttons if key == "escape")
-    hands.click(*cancel.center)
+    hands.click(*view["button:cancel"].rect.center)
     assert hands.desk.asked is None and hands.sketch is before
 
 
@@ -231,15 +219,16 @@ def test_options_maps_and_report_keep_apart(tmp_path: Path, plan: Path, size: tu
         hands.window.documents.ask_import(plan, IMPORTERS["svg"])  # which has most options
         hands.frames(2)
         asked, view = shown(hands)
-        rects = [rect for rect, _ in (*view._rows, *view._buttons)]
-        assert len(rects) == len(asked.options) + 2
+        rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button", "area")]
+        assert len(rects) == len(asked.options) + 3
         assert all(not one.colliderect(other) for k, one in enumerate(rects) for other in rects[:k])
         assert min(rect.height for rect in rects) >= 16
         hands.key("escape")
         hands.window.documents.ask_import(plan, IMPORTERS["picture"])
         hands.type("0.1")
-        _, view = shown(hands)
-        views = [pygame.Rect(camera.view) for camera in view._cameras]
+        asked, view = shown(hands)
+        rects = [each.rect for each in view.values() if each.kind in ("menu", "entry", "button")]
+        views = [pygame.Rect(camera.view) for camera in asked.cameras]
         assert not views[0].colliderect(views[1]) and min(min(view.size) for view in views) > 120
         assert all(not view.colliderect(rect) for view in views for rect in rects)
         left, right = (hands.window.screen.subsurface(view).copy() for view in views)

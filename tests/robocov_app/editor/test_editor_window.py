@@ -13,11 +13,12 @@ from robocov_app.editor.canvas import arena
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.commands import told_commands
 from robocov_app.editor.ui.panel import TABS
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.status import facts
 from robocov_app.toolkit import clipboard
+from robocov_app.toolkit import help as help_page
+from robocov_app.toolkit.dialogs import Choice
 from robocov_app.viewer.layout import SMALLEST
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
@@ -67,7 +68,7 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
 def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
     hands.select(0)
     hands.turn("object")
-    assert hands.widget("entry", "name").get_text() == "box"
+    assert hands.widget("entry", "name").text == "box"
     hands.write("x", "3.5")
     hands.key("return")
     hands.write("wide", "120cm")
@@ -107,23 +108,22 @@ def test_the_list_of_vertices_selects_and_scrolls(hands: Hands) -> None:
     ring = tuple((5 + np.cos(a), 5 + np.sin(a)) for a in np.arange(0, 6.2, 0.1))
     hands.desk.change(polygon_drawn(hands.sketch, ring))
     hands.turn("object")
-    hands.frames(2, 0.2)
-    left, top = hands.window.panel.list_box()[:2]
-    hands.click(left + 50, top + 30)
+    hands.click(*hands.widget("option", "vertex:1").rect.center)
     assert hands.desk.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
-    hands.wheel(left + 50, top + 30, -3)
-    hands.frames(2, 0.2)
-    left, top = hands.window.panel.list_box()[:2]
-    hands.click(left + 50, top + 30)
+    assert hands.find("option", "vertex:61") is None, "what is out of sight is not laid out"
+    at = hands.widget("option", "vertex:3").rect.center
+    for _ in range(8):
+        hands.wheel(*at, -5)
+    hands.click(*hands.widget("option", "vertex:61").rect.center)
     (vertex,) = hands.desk.selection.vertices
-    assert vertex.index > 3
+    assert vertex.index == 61
 
 
 def test_the_snap_page_switches_and_sets(hands: Hands) -> None:
     hands.turn("snap")
     hands.tick("snap:grid")
     assert "grid" not in hands.desk.snaps
-    hands.tick("page:names")
+    hands.tick("show:names")
     assert "names" not in hands.desk.shown
     hands.write("grid", "0.5")
     hands.key("return")
@@ -139,7 +139,7 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
     hands.key("h")
     assert hands.window.layout.panel[2] == 0
     hands.key("f2")  # the field of the map's name brings the panel back
-    assert hands.window.layout.panel[2] > 0 and hands.window.panel.typing
+    assert hands.window.layout.panel[2] > 0 and hands.window.panel.ui.typing
     hands.type("New name")
     hands.key("return")
     assert hands.sketch.name == "New name"
@@ -148,9 +148,9 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
     hands.turn("map")
     hands.write("title", "wall")
-    assert hands.desk.tool.name == "select" and hands.window.panel.typing
+    assert hands.desk.tool.name == "select" and hands.window.panel.ui.typing
     hands.key("escape")
-    assert not hands.window.panel.typing and hands.sketch.name == "Untitled"
+    assert not hands.window.panel.ui.typing and hands.sketch.name == "Untitled"
 
 
 def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:
@@ -158,30 +158,34 @@ def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Ha
     drawn = hands.sketch
     hands.turn("map")
     hands.write("title", "ab")
-    field = hands.widget("entry", "title")
-    texts = [field.get_text()]
-    for key in ("ctrl+z", "ctrl+z", "ctrl+z", "ctrl+y", "ctrl+y"):
-        hands.key(key)
-        texts.append(field.get_text())
-    assert texts == ["ab", "a", "Untitled", "Untitled", "a", "ab"] and hands.sketch is drawn
+    hands.key("left")
+    hands.type("c")
+    texts = []
+    for key in ("", "ctrl+z", "ctrl+z", "ctrl+z", "ctrl+y", "ctrl+y"):
+        if key:
+            hands.key(key)
+        texts.append(hands.widget("entry", "title").text)
+    assert texts == ["acb", "ab", "Untitled", "Untitled", "ab", "acb"] and hands.sketch is drawn
 
 
 def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
     for radius in (0.2, 0.3, 0.4):
         hands.desk.change(circle_drawn(hands.sketch, (5, 5), radius))
     hands.turn("history")
-    rows = hands.window.panel.history._rows
-    assert [row.about for row in rows] == [0, 1, 2, 3]
-    left, top, _, _ = hands.window.panel.list_box()
+
+    def lines() -> list[tuple[str, bool]]:
+        hands.frames(1)
+        shown = hands.window.panel.ui.shown.values()
+        return [(each.text, bool(each.value)) for each in shown if each.key.startswith("step:")]
 
     def click(row: int) -> None:
         hands.wait()
-        hands.click(left + 60, top + 22 * row + 8)
-        hands.frames(1, 0.2)
+        hands.click(*hands.widget("option", f"step:{row}").rect.center)
 
+    assert [chosen for _, chosen in lines()] == [True, False, False, False]
     click(2)
     assert len(hands.shapes) == 3
-    assert [row.about for row in hands.window.panel.history._rows] == [-2, -1, 0, 1]
+    assert [chosen for _, chosen in lines()] == [False, False, True, False]
     click(3)
     assert len(hands.shapes) == 2
     click(0)
@@ -240,7 +244,7 @@ def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     menu = hands.window.menu
     assert menu is not None and hands.desk.selection == Selection.of(0)
     hands.window.draw()
-    names = [action.name if action else "" for action in menu.actions]
+    names = [action.name if action else "" for action in menu.commands]
     row = names.index("duplicate")
     hands.key("down", times=sum(1 for name in names[: row + 1] if name))
     hands.key("return")
@@ -248,11 +252,9 @@ def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
     assert not hands.desk.selection
-    assert "paste" in [action.name for action in hands.window.menu.actions if action]
-    box = hands.window.menu.box
-    hands.move(box.left + 30, box.top + 40)
-    hands.release()
-    assert hands.window.menu is None and hands.desk.selection  # "Select all"
+    assert "paste" in [action.name for action in hands.window.menu.commands if action]
+    hands.click(*hands.window.menu._ui.shown["option:select:all"].rect.center)
+    assert hands.window.menu is None and hands.desk.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
     assert hands.window.menu is None
@@ -277,30 +279,26 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")
-    assert hands.window.palette.open and hands.window.palette.text == ""
+    assert isinstance(hands.desk.asked, Choice) and hands.desk.asked.text == ""
     hands.key("escape")
-    hands.key("ctrl+k")
-    hands.key("return")
-    assert not hands.window.palette.open
+    assert hands.desk.asked is None
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
 def test_all_keys_are_on_the_card(tmp_path: Path, size, scale: float, monkeypatch) -> None:
-    from robocov_app.viewer import overlays
-
     words: set[str] = set()
-    real = overlays.label
+    real = help_page.label
 
     def label(text, *rest):
         words.add(text)
         return real(text, *rest)
 
     with opened_editor(tmp_path, size=size, scale=scale) as hands:
-        monkeypatch.setattr(overlays, "label", label)
+        monkeypatch.setattr(help_page, "label", label)
         hands.key("f1")
-    for action in told_commands():
-        if action.keys:
-            title = action.title.partition(":")[0] if action.group == "Tools" else action.title
+    for action in hands.window.commands.listed:
+        if action.keys and not action.hidden:
+            title = action.title.partition(":")[0]
             assert any(word.strip("… ") and title.startswith(word.rstrip("…")) for word in words), title
 
 
@@ -399,14 +397,12 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     hands.select(0)
     hands.key("ctrl+h")
     hands.key("ctrl+tab")
+    hands.desk.select(Selection())
     hands.frames(2)
-    things = hands.window.panel.list
-    assert things is not None
-    rows = things.rows(200.0)
-    assert rows[-1].lines[0] == "boundary" and len(rows) == len(hands.shapes) + 1 + len(hands.sketch.starts)
-    (hidden,) = [row for row in rows if row.lines[1] == "hidden"]
-    things.take(hidden)
-    assert hands.desk.selection.items == {0} and things.chosen(hidden)
+    lines = [each for each in hands.window.panel.ui.shown.values() if each.key.startswith("thing:")]
+    assert lines[-1].text == "boundary" and len(lines) == len(hands.shapes) + 1 + len(hands.sketch.starts)
+    hands.click(*hands.widget("option", "thing:0").rect.center)
+    assert hands.desk.selection.items == {0}
 
 
 def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path, monkeypatch) -> None:

@@ -172,7 +172,7 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         assert isinstance(asked, Choice)
         offered = [each.text for each in asked.options("")]
         assert offered[:2] == [str(tmp_path / "second.robocov"), str(tmp_path / "first.robocov")]
-        assert offered[2:] == ["first.robocov", "other.json", "second.robocov"]
+        assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
         driver.key("return")
         assert not driver.window.dialogs.open and desk.map_name == str(tmp_path / "other.json")

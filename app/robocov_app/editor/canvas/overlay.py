@@ -17,7 +17,7 @@ from robocov_app.editor.tools.tool import length_words
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, LegendEntry, bounded
 from robocov_app.render.theme import mix
-from robocov_app.viewer.overlays import tag
+from robocov_app.toolkit.overlay import tag
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -220,7 +220,13 @@ def draw_preview(canvas: Canvas, preview: Preview, at: tuple[float, float] | Non
     if preview.box is not None:
         _draw_selecting(canvas, preview)
     if preview.words and at is not None:
-        tag(canvas, preview.words, (at[0] + 18 * scale, at[1] - 22 * scale))
+        tag(
+            canvas.surface,
+            preview.words,
+            (at[0] + 18 * scale, at[1] - 22 * scale),
+            canvas.theme,
+            canvas.scale,
+        )
 
 
 def _tint(canvas: Canvas, corners: Array, colour: Colour) -> None:
@@ -424,7 +430,7 @@ def tag_gap(canvas: Canvas, gap: Gap, radius: float, cursor: tuple[float, float]
         near = beside - canvas.text_width(words) - 20 * scale < x < beside + 200 * scale
         if near and abs(y - level) < 24 * scale:
             y = level - 24 * scale
-    tag(canvas, words, (x, y))
+    tag(canvas.surface, words, (x, y), canvas.theme, canvas.scale)
 
 
 def _gap(canvas: Canvas, gap: Gap, radius: float) -> tuple[Colour, Array, Array, Array]:
@@ -468,7 +474,13 @@ def draw_problems(
             beside = x + (BADGE + 10) * scale
             room = canvas.surface.get_width() - beside - 8 * scale > canvas.text_width(problem.words)
             # where there is no room beside the badge, above it
-            tag(canvas, problem.words, (beside, y) if room else (beside, y - (BADGE + 14) * scale))
+            tag(
+                canvas.surface,
+                problem.words,
+                (beside, y) if room else (beside, y - (BADGE + 14) * scale),
+                canvas.theme,
+                canvas.scale,
+            )
             if problem is told:
                 ring = partial(sprites.ring, (BADGE + 4) * scale, theme.ink, 1.6 * scale)
                 canvas.stamp(ring, (x, y))

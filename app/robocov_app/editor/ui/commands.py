@@ -1,9 +1,9 @@
-"""Everything that the editor does, by key, menu, button, palette or typed value. Knows no pygame."""
+"""Everything that the editor does, by key, menu, button, palette or typed value."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 from robocov.environment import Point, PolygonObstacle, WallObstacle
@@ -25,11 +25,9 @@ from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, 
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.tools.density import DensityTool
-from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
-from robocov_app.toolkit.command import parted
-from robocov_app.viewer.actions import Action
+from robocov_app.toolkit.command import Command, Takes, parted
 
 FAR = 10
 """How many times farther arrows nudge with Shift."""
@@ -47,16 +45,8 @@ GHOST = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 �
 _SEPARATE = ""
 
 
-@dataclass(frozen=True)
-class Command(Action):
-    """An action with what it does to a desk; `run` is None where the window does it."""
-
-    run: Callable[[Editor], object] | None = None
-    repeats: bool = False  # while its key is held down
-
-
 class Row(NamedTuple):
-    """A command in the list of its group; keys are separated by commas."""
+    """A command of a group: keys separated by commas; `run` is None where the window does it."""
 
     name: str
     title: str
@@ -575,7 +565,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
     "Snap": (
         Row("grid:finer", "Finer grid", "-", lambda desk: desk.change_grid(-1), repeats=True),
         Row("grid:coarser", "Coarser grid", "=, +", lambda desk: desk.change_grid(1), repeats=True),
-        Row("snap:all", "Snap to everything, or to nothing", "0"),
+        Row("snap:all", "Snap to everything, or to nothing", "0", lambda desk: desk.switch("snap", "all")),
     ),
     "View": (
         Row("fit", "Show the whole map", "f"),
@@ -623,36 +613,37 @@ _ROWS: dict[str, tuple[Row, ...]] = {
 }
 
 
-def all_commands() -> list[Command]:
+def editor_commands(desk: Editor, of_window: Mapping[str, Callable[[], object]]) -> list[Command]:
     """Return every command, those of the tools and of what is snapped to or shown among them."""
+
+    def command(group: str, row: Row) -> Command:
+        run = of_window[row.name] if row.run is None else partial(row.run, desk)
+        keys = tuple(row.keys.split(", ")) if row.keys else ()
+        return Command(row.name, row.title, group, run, keys, repeats=row.repeats, hidden=not row.title)
+
+    def switch(kind: str, name: str, title: str, group: str, key: str) -> Command:
+        return Command(f"{kind}:{name}", title, group, partial(desk.switch, kind, name), (key,))
+
+    found = [command(group, row) for group, rows in _ROWS.items() for row in rows]
+    for tool in desk.tools.values():
+        run, keys = partial(desk.choose, tool.name), (_TOOL_KEYS[tool.name],)
+        found.append(Command(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", "Tools", run, keys))
+    for k, (name, (title, _)) in enumerate(SNAPS.items(), 1):
+        found.append(switch("snap", name, f"Snap to {title.lower()}", "Snap", str(k)))
+    found += [switch("show", name, title, "View", _SHOWN_KEYS[name]) for name, title in SHOWN.items()]
+    return found
+
+
+def typed_commands(desk: Editor) -> list[Command]:
+    """Return the commands with a value after them."""
+
+    def run(word: str, text: str) -> None:
+        desk.carry_out(lambda: run_typed(desk, f"{word} {text}"))
+
     return [
-        *(
-            Command(
-                row.name,
-                row.title,
-                group,
-                tuple(row.keys.split(", ")) if row.keys else (),
-                row.run,
-                row.repeats,
-            )
-            for group, rows in _ROWS.items()
-            for row in rows
-        ),
-        *(
-            Command(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", "Tools", (_TOOL_KEYS[tool.name],))
-            for tool in toolbox().values()
-        ),
-        *(
-            Command(f"snap:{name}", f"Snap to {title.lower()}", "Snap", (str(k),))
-            for k, (name, (title, _)) in enumerate(SNAPS.items(), 1)
-        ),
-        *(Command(f"show:{name}", title, "View", (_SHOWN_KEYS[name],)) for name, title in SHOWN.items()),
+        Command(word, f"{word} {typed.example}", "", partial(run, word), takes=Takes(typed.example))
+        for word, typed in TYPED.items()
     ]
-
-
-def told_commands() -> list[Command]:
-    """Return those that are listed by name."""
-    return [command for command in all_commands() if command.title]
 
 
 TYPED: dict[str, Typed] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -15,6 +16,7 @@ from robocov_app.editor.tools.snap_targets import Snapper, vertex_count
 from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui.settings import SHOWN, SNAPS, snapping_for
+from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
     from robocov_app.editor.model.validation import Problem
     from robocov_app.editor.tools.select import SelectTool
     from robocov_app.editor.tools.tool import Tool
-    from robocov_app.editor.ui.asking import ListQuestion, Question
-    from robocov_app.editor.ui.importing import ImportQuestion
     from robocov_app.toolkit.worker import Worker
 
 SAID_FOR = 5.0
@@ -73,7 +73,7 @@ class Editor:
         Where the mouse is.
     moves_since : float or None, s
         Since when obstacles that move are shown moving.
-    asked : Question, ListQuestion, ImportQuestion or None
+    dialogs : Dialogs
         What is waiting for an answer.
     problem : Problem or None
         The one that is shown with its words.
@@ -97,7 +97,7 @@ class Editor:
         self.recent: list[str] = []
         self.measurement: Measurement | None = None
         self.problem: Problem | None = None
-        self.asked: Question | ListQuestion | ImportQuestion | None = None
+        self.dialogs = Dialogs()
         self.message = ""
         self.trouble = False
         self.pixel = 0.01
@@ -273,13 +273,29 @@ class Editor:
     def attempt(self, action: Callable[[], object]) -> None:
         """Do something; what cannot be done is told, in a sentence."""
         try:
+            self.carry_out(action)
+        except RobocovError as error:
+            self.say(str(error), trouble=True)
+
+    def carry_out(self, action: Callable[[], object]) -> None:
+        """Do something; a MapError names what is wrong by its name, not by its place in the file."""
+        self.version += 1
+        try:
             words = action()
         except RobocovError as error:
-            self.say(in_words(str(error), self.sketch), trouble=True)
-        else:
-            if isinstance(words, str):
-                self.say(words)
-        self.version += 1
+            raise MapError(in_words(str(error), self.sketch)) from None
+        if isinstance(words, str):
+            self.say(words)
+
+    @property
+    def asked(self) -> Dialog | None:
+        """The dialog that is open."""
+        return self.dialogs.asked
+
+    def ask(self, title: str, words: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
+        """Ask a question with answers: their words, keys, and what they do; Escape gives the last one."""
+        given = [Answer(text, partial(self.attempt, call), key) for text, key, call in answers]
+        self.dialogs.ask(Question(title, words, given, on_cancel=given[-1].call))
 
     def pass_time(self, seconds: float) -> None:
         """Let the clock go on: old messages go, answers come."""

@@ -1,4 +1,4 @@
-"""FileCommands opened, saved and left, with the questions that have to be asked. Knows no pygame."""
+"""Documents opened, saved and left, with the questions that have to be asked."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from robocov_app.editor.model.background import picture_laid
 from robocov_app.editor.model.document import SUFFIX, Document
 from robocov_app.editor.model.file import ChangedError
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.asking import Answer, FileQuestion, Picker, Question
-from robocov_app.editor.ui.importing import Imported, Importing, ImportQuestion
+from robocov_app.editor.ui.import_dialog import ImportDialog
+from robocov_app.editor.ui.importing import Imported, Importing
 from robocov_app.editor.ui.settings import MOST_RECENT
+from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.ui.editor import Editor
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 _PATIENCE = 2.0
 """Seconds after which an import with settings that have changed since is given up."""
+
+_CANCEL = ("Cancel", "c", lambda: None)
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
@@ -44,8 +47,8 @@ class FileCommands:
 
     def close(self) -> None:
         """End what is going on beside the window."""
-        if isinstance(self.desk.asked, ImportQuestion):
-            self.desk.asked.close()
+        if isinstance(self.desk.asked, ImportDialog):
+            self.desk.dialogs.close()
 
     def commands(self) -> dict[str, Callable[[], object]]:
         """Return what the commands do, by their names."""
@@ -79,12 +82,8 @@ class FileCommands:
             document.close(discard=True)
 
         words = f"“{document.title}” has changes that are in no file."
-        answers = (
-            Answer("Save", "s", save),
-            Answer("Discard", "d", discard),
-            Answer("Cancel", "c", _nothing),
-        )
-        self.desk.asked = Question("Save the changes?", words, answers)
+        answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
+        self.desk.ask("Save the changes?", words, *answers)
 
     def quit(self) -> None:
         """End, after asking what is to become of what is open."""
@@ -112,22 +111,33 @@ class FileCommands:
         from robocov_app.importers import IMPORTERS
 
         foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
-        suffixes = [SUFFIX, *foreign]
+        self._ask_path("Open a map", self.open, [SUFFIX, *foreign])
 
-        def chosen(text: str) -> None:
-            self.open(Path(text))
+    def _ask_path(
+        self,
+        title: str,
+        call: Callable[[Path], object],
+        endings: Sequence[str],
+        text: str = "",
+        *,
+        saves: bool = False,
+    ) -> None:
+        desk = self.desk
 
-        self.desk.asked = FileQuestion("Open a map", self.desk.folder, chosen, suffixes)
+        def chosen(path: Path) -> None:
+            desk.carry_out(lambda: call(path))
+
+        desk.dialogs.ask(file_choice(title, desk.folder, chosen, endings=endings, text=text, saves=saves))
 
     def ask_recent(self) -> None:
         """Ask which of the maps to open that were open lately, or come with robocov."""
-        names = [(path, "recent") for path in self.desk.recent if Path(path).exists()]
-        names += [(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
+        names = [Option(path, "recent") for path in self.desk.recent if Path(path).exists()]
+        names += [Option(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
 
-        def chosen(text: str) -> None:
-            self.open(map_file(text))
+        def chosen(option: Option) -> None:
+            self.desk.carry_out(lambda: self.open(map_file(option.text)))
 
-        self.desk.asked = Picker("Open a recent or bundled map", names, chosen)
+        self.desk.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 
     def open(self, path: Path) -> None:
         """Open a file: a map, or one of a foreign format as a new map."""
@@ -151,7 +161,7 @@ class FileCommands:
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
             self.leave(lambda: self._put(document, f"imported: {path.name}, not saved yet"))
 
-        self.desk.asked = ImportQuestion(path, importer, self._import_worker(), put)
+        self.desk.dialogs.ask(ImportDialog(path, importer, self._import_worker(), put))
 
     def _import_worker(self) -> Worker[Imported]:
         if self._patient:
@@ -184,10 +194,7 @@ class FileCommands:
         if suggested.parent == self.desk.folder:
             text = suggested.name
 
-        def chosen(typed: str) -> str | None:
-            return self._save(Path(typed), then)
-
-        self.desk.asked = FileQuestion("Save as", self.desk.folder, chosen, [SUFFIX], text=text, saves=True)
+        self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text, saves=True)
 
     def _save(
         self, path: Path, then: Callable[[], object] | None, *, over: bool = False, spoil: bool = False
@@ -215,12 +222,8 @@ class FileCommands:
     def _ask_over(
         self, title: str, words: str, then: Callable[[], object] | None, go_on: Callable[[], object]
     ) -> None:
-        answers = (
-            Answer("Save as…", "a", lambda: self.ask_name(then)),
-            Answer("Replace it", "r", go_on),
-            Answer("Cancel", "c", _nothing),
-        )
-        self.desk.asked = Question(title, words, answers)
+        answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
+        self.desk.ask(title, words, *answers)
 
     # exporting
 
@@ -231,25 +234,17 @@ class FileCommands:
         self.desk.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
 
-        def chosen(text: str) -> str | None:
-            return self._export(Path(text))
-
         title = f"Export to a file ending in {', '.join(suffixes)}"
         name = Path(self.desk.document.suggested(self.desk.folder).name).stem
-        self.desk.asked = FileQuestion(
-            title, self.desk.folder, chosen, suffixes, text=f"{name}.svg", saves=True
-        )
+        self._ask_path(title, self._export, suffixes, f"{name}.svg", saves=True)
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
         from robocov_app.exporters import export_map
 
         if path.exists() and not over:
-            answers = (
-                Answer("Another name…", "a", self.ask_export),
-                Answer("Replace it", "r", lambda: self._export(path, over=True)),
-                Answer("Cancel", "c", _nothing),
-            )
-            self.desk.asked = Question("Replace the file?", f"{path} is there already.", answers)
+            over_it = ("Replace it", "r", lambda: self._export(path, over=True))
+            answers = (("Another name…", "a", self.ask_export), over_it, _CANCEL)
+            self.desk.ask("Replace the file?", f"{path} is there already.", *answers)
             return None
         report = export_map(self.desk.sketch.environment(), path)
         said = [
@@ -264,9 +259,8 @@ class FileCommands:
     def look(self) -> None:
         """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
         desk = self.desk
-        if isinstance(asked := desk.asked, ImportQuestion) and (imported := asked.poll()) is not None:
-            asked.close()
-            desk.asked = None
+        if isinstance(asked := desk.asked, ImportDialog) and (imported := asked.poll()) is not None:
+            desk.dialogs.close()
             desk.attempt(lambda: asked.call(imported))
         if desk.asked is not None:
             return
@@ -274,9 +268,9 @@ class FileCommands:
         if state == "gone":
             desk.say(f"{desk.document.title} is no longer there; Ctrl S writes it again", trouble=True)
         elif state == "changed":
-            answers = (Answer("Reload", "r", self.reload), Answer("Keep mine", "k", desk.document.keep_mine))
             words = f"Something else has changed {desk.document.title}. Reloading can be undone."
-            desk.asked = Question("The file has changed", words, answers)
+            answers = (("Reload", "r", self.reload), ("Keep mine", "k", desk.document.keep_mine))
+            desk.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
         """Read the file again."""
@@ -293,10 +287,7 @@ class FileCommands:
     def ask_picture(self) -> None:
         """Ask which picture to put under the map."""
 
-        def chosen(text: str) -> None:
-            self.underlay(Path(text))
-
-        self.desk.asked = FileQuestion("Picture under the map", self.desk.folder, chosen, PICTURES)
+        self._ask_path("Picture under the map", self.underlay, PICTURES)
 
     def underlay(self, path: Path) -> None:
         """Put a picture under the map."""
@@ -368,7 +359,3 @@ def _is_map(path: Path) -> bool:
             return b"robocov-map" in file.read(4096)
     except OSError:
         return True
-
-
-def _nothing() -> None:
-    """Change nothing."""

@@ -10,7 +10,6 @@ from robocov.errors import InputError
 from robocov_app.editor.model.autosave import opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement_worker import measurement_worker
-from robocov_app.editor.ui.asking import Answer, Question
 from robocov_app.editor.ui.editor import Editor, Pasteboard
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
@@ -133,15 +132,11 @@ def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
         discard(draft.folder)
         offer(window, rest)
 
-    answers = (
-        Answer("Recover", "r", recover),
-        Answer("Discard", "d", throw_away),
-        Answer("Later", "l", lambda: None),
-    )
+    answers = (("Recover", "r", recover), ("Discard", "d", throw_away), ("Later", "l", lambda: None))
     words = f"An editor ended without saving: {draft.words()}."
     if rest:
         words += f"\n{len(rest)} more {'are' if len(rest) > 1 else 'is'} kept besides."
-    desk.asked = Question("Recover unsaved work?", words, answers)
+    desk.ask("Recover unsaved work?", words, *answers)
 
 
 def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:

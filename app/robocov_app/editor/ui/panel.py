@@ -1,156 +1,437 @@
-"""The editor's panel: file and tools stay in sight, the rest is on pages."""
+"""The editor's panel: file and tools stay in sight, the rest is on pages that follow the selection."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
-from robocov_app.editor.ui.commands import all_commands
+import numpy as np
+import pygame
+
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov_app.editor.canvas.overlay import draw_badge
+from robocov_app.editor.edits.density import density_words
+from robocov_app.editor.edits.fixes import TITLES
+from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner
+from robocov_app.editor.ui.commands import fix_problem, whole
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.fields import FIELDS
-from robocov_app.editor.ui.lists import HistoryList, PanelList, ProblemList, ThingList, VertexList
-from robocov_app.editor.ui.pages import (
-    FACTS,
-    OBJECT_HEIGHTS,
-    facts,
-    history_page,
-    map_page,
-    object_kind,
-    object_page,
-    object_words,
-    problems_page,
-    snap_page,
-)
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
-from robocov_app.render.fonts import shortened
-from robocov_app.viewer.paged import Paged
-from robocov_app.viewer.pages import MARGIN, WIDE, columns
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import pygame
-
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.render.theme import Theme
-    from robocov_app.viewer.layout import Box
-    from robocov_app.viewer.widgets import Widgets
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.theme import LIGHT, Theme
+from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.overlay import FLAT, wrapped
+from robocov_app.toolkit.ui import SMALL, TEXT, Ui
+from robocov_app.viewer.layout import Layout
 
 TABS = ("map", "object", "snap", "problems", "history")
 
+ROW = 20.0
+"""Height of a line of a list, px at scale 1."""
 
-class Panel(Paged):
-    """Builds the widgets, and keeps them as the desk is."""
+MOST_PROBLEMS = 200
+"""Problems that are listed."""
 
-    tabs = TABS
-    tab_widths = (44, 56, 46, 72, 54)
+_NAME = 62.0
 
-    def __init__(self, desk: Editor, do: Callable[[str], None]) -> None:
-        super().__init__(desk, all_commands(), do)
-        self.desk = desk
-        self.vertices, self.things, self.problems = VertexList(desk), ThingList(desk), ProblemList(desk)
-        self.history = HistoryList(desk)
+_FILE = (
+    (("New", "new"), ("Open", "open"), ("Save", "save"), ("Try it", "try")),
+    (("Undo", "undo"), ("Redo", "redo"), ("Keys", "help"), ("Commands", "palette")),
+)
 
-    def wanted(self) -> object:
-        """Return all on which it depends what widgets there are."""
-        return self.tab, object_kind(self.desk) if self.tab == "object" else ""
+_FACTS = {
+    "Size": "Width and height of the boundary",
+    "Free": "Area where robots can be, of that inside the boundary",
+    "Parts": "Connected parts of the free space, and those that a robot can sweep",
+    "Gap": "The narrowest passage, against a robot's diameter",
+    "Holds": "Obstacles and their vertices",
+    "Density": "How much each place counts: the tool Density; floor 0.5 and density none are commands",
+}
 
-    def build(self, widgets: Widgets) -> None:
-        """Make the widgets."""
-        widgets.section("file", None, 8, lambda: self._file(widgets))
-        widgets.section("tools", None, 94, lambda: self._tools(widgets))
-        below = 100 + 30 * -(-len(self.desk.tools) // 4) + 20
-        widgets.section("tabs", None, below, lambda: self._tabs(widgets))
-        y = below + 34.0
-        self._place_body(widgets, y)
-        if self.tab == "map":
-            map_page(widgets, self.desk, y)
-        elif self.tab == "object":
-            object_page(widgets, self.desk, y)
-        elif self.tab == "snap":
-            snap_page(widgets, self.desk, y)
-        elif self.tab == "problems":
-            problems_page(widgets, y)
-        else:
-            history_page(widgets, y)
+_NOTHING = (
+    "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
+    "Tab goes on to the next; Ctrl A takes all."
+)
 
-    def _file(self, widgets: Widgets) -> None:
-        rect = widgets.rect
-        widgets.label(" " * 60, rect(MARGIN, 0, WIDE, 18), name="title", style="#header")
-        rows = (
-            (("New", "new"), ("Open", "open"), ("Save", "save"), ("Try it", "try")),
-            (("Undo", "undo"), ("Redo", "redo"), ("Keys", "help"), ("Commands", "palette")),
-        )
-        for k, row in enumerate(rows):
-            for (x, width), (text, action) in zip(columns(4), row, strict=True):
-                style = "#small" if text == "Commands" else None
-                rect_of = rect(x, 20 + 31 * k, width, 27)
-                widgets.does(text, rect_of, action, style=style)
+_Buttons = tuple[tuple[str, str], ...]
+_TURNS = (
+    ("Turn ↺", "rotate:left"),
+    ("Turn ↻", "rotate:right"),
+    ("Flip ↔", "mirror:x"),
+    ("Flip ↕", "mirror:y"),
+)
+_ONE: tuple[_Buttons, ...] = (
+    _TURNS,
+    (("Path", "tool:path"), ("Loop ↺", "path:repeat"), ("Play", "path:play"), ("No path", "path:none")),
+)
+_START: tuple[_Buttons, ...] = ((("Delete", "delete"), ("Copy", "duplicate"), ("Default", "start:default")),)
 
-    def _tools(self, widgets: Widgets) -> None:
-        widgets.label("TOOLS", widgets.rect(MARGIN, 0, WIDE, 18), style="#header")
-        for k, tool in enumerate(self.desk.tools.values()):
-            x, width = columns(4)[k % 4]
-            place = widgets.rect(x, 20 + 30 * (k // 4), width, 26)
-            widgets.does(tool.title, place, f"tool:{tool.name}", style="#small")
+_BUTTONS: dict[str, tuple[_Buttons, ...]] = {
+    "vertex": ((("Delete", "delete"), ("Cut off", "bevel"), ("Round", "round"), ("Split", "split")),),
+    "vertices": ((("Delete", "delete"), ("Cut off", "bevel"), ("Round", "round"), ("Align", "align:left")),),
+    "boundary": ((("Simplify", "simplify"), ("Straighten", "straighten"), ("Repair", "repair")),),
+    "disc": _START,
+    "start": _START,
+    "polygon": _ONE,
+    "circle": _ONE,
+    "wall": _ONE,
+    "several": (
+        _TURNS,
+        (("Unite", "unite"), ("Subtract", "subtract"), ("Intersect", "intersect"), ("Divide", "divide")),
+        (
+            ("Left", "align:left"),
+            ("Centre", "align:centre"),
+            ("Right", "align:right"),
+            ("Gaps ↔", "distribute:x"),
+        ),
+        (
+            ("Top", "align:top"),
+            ("Middle", "align:middle"),
+            ("Bottom", "align:bottom"),
+            ("Gaps ↕", "distribute:y"),
+        ),
+        (("Join", "join"), ("Polygons", "polygons"), ("Simplify", "simplify"), ("Delete", "delete")),
+    ),
+}
+"""Buttons of the page Object, by what is selected."""
 
-    # keeping up
 
-    def sync(self, widgets: Widgets) -> None:
-        """Let the widgets say what the desk says."""
+class Panel:
+    """Shows the editor, and lets it be edited.
+
+    `tab`: the page that is open. `covered`: something else takes the events. `picked`: called when a problem
+    was clicked.
+    """
+
+    def __init__(
+        self, desk: Editor, commands: Commands, do: Callable[[str], object], picked: Callable[[], object]
+    ) -> None:
+        self.desk, self._commands, self._do, self._picked = desk, commands, do, picked
+        self.tab = TABS[0]
+        self.covered = self.hidden = False
+        self.ui = Ui(self._page, LIGHT)
+        self._drawn: tuple[object, ...] = ()
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Fit another layout and theme."""
+        self.hidden = not layout.panel[2]
+        if self.hidden:
+            self.ui.stop_typing()
+        if theme is not self.ui.theme or layout.scale != self.ui.scale:
+            self.ui = Ui(self._page, theme, layout.scale)
+        self.ui.box, self.ui.stale = pygame.Rect(layout.panel), True
+
+    def show_tab(self, name: str) -> None:
+        """Turn to a page."""
+        if name in TABS:
+            self.tab, self.ui.stale = name, True
+
+    def update(self) -> None:
+        """Let the page be drawn anew when something that it shows is different."""
         desk = self.desk
-        self._mark_tabs(widgets)
-        document = desk.document
-        words = f"{document.title}{', not saved' if document.unsaved else ''}"
-        widgets.say("label", "title", shortened(words, round(11 * widgets.scale), WIDE * widgets.scale, True))
-        for name in desk.tools:
-            widgets.mark(f"tool:{name}", desk.tool.name == name, ("#chosen_tab", "#small"))
-        count = len(desk.problems)
-        widgets.say("button", "tab:problems", f"Problems {min(count, 99)}" if count else "Problems")
-        for name, spec in FIELDS.items():
-            if widgets.find("entry", name) is not None:
-                widgets.fill(name, spec.text(desk))
-        for name in SNAPS:
-            widgets.tick(f"snap:{name}", name in desk.snaps)
-        for name in SHOWN:
-            widgets.tick(f"page:{name}", name in desk.shown)
-        widgets.tick("show:robots", "robots" in desk.shown)
-        if self.tab == "map":
-            said = facts(desk)
-            room = (WIDE - 70) * widgets.scale
-            for name in FACTS:
-                widgets.say("label", f"fact:{name}", shortened(said[name], round(12 * widgets.scale), room))
-        if self.tab == "object":
-            words = shortened(object_words(desk), round(11 * widgets.scale), WIDE * widgets.scale, True)
-            widgets.say("label", "object", words)
-        if desk.sketch.background is not None:
-            widgets.slide("opacity", desk.sketch.background.opacity)
+        sketch, selection = desk.preview
+        shows = (desk.version, self.tab, id(sketch), selection, id(desk.measurement), desk.document.unsaved)
+        if shows != self._drawn:
+            self._drawn, self.ui.stale = shows, True
+
+    def draw(self, screen: pygame.Surface) -> None:
+        """Draw the panel and what hangs over it."""
+        self.ui.draw(screen)
+        self.ui.draw_over(screen)
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Give an event to the widgets; return whether one of them took it."""
+        return not self.covered and not self.hidden and self.ui.take(event)
 
     def focus(self, name: str) -> None:
         """Let keys go into a field of the open page."""
-        if self.widgets is not None:
-            self.update(0.0)
-            self.widgets.focus(name)
+        self.ui.run(None, None)
+        self.ui.set_focus(name)
+
+    # the page
+
+    def _page(self, ui: Ui) -> None:
+        ui.inset(12, 8, 12)
+        document = self.desk.document
+        ui.header(f"{document.title}{', not saved' if document.unsaved else ''}")
+        for row in _FILE:
+            self._buttons(ui, row)
+        ui.header("TOOLS")
+        tools = [(tool.title, f"tool:{tool.name}") for tool in self.desk.tools.values()]
+        for k in range(0, len(tools), 4):
+            self._buttons(ui, tools[k : k + 4], columns=4, chosen=f"tool:{self.desk.tool.name}")
+        count = len(self.desk.problems)
+        titles = {name: name.capitalize() for name in TABS}
+        titles["problems"] += f" {min(count, 99)}" if count else ""
+        ui.row(44, 56, 46, 72, 0, below=8)
+        for name, title in titles.items():
+            if ui.button(title, key=f"tab:{name}", chosen=name == self.tab, small=True):
+                self.show_tab(name)
+        ui.row()
+        pages = (self._map, self._object, self._snap, self._problems, self._history)
+        pages[TABS.index(self.tab)](ui)
+
+    def _does(self, ui: Ui, text: str, action: str, chosen: str = "") -> None:
+        key = action if ui.find("button", action) is None else f"{action}:again"
+        if ui.button(text, key=key, tip=self._commands[action].tip, chosen=action == chosen, small=True):
+            self._do(action)
+
+    def _buttons(self, ui: Ui, row: Sequence[tuple[str, str]], columns: int = 0, chosen: str = "") -> None:
+        ui.row(*[0.0] * (columns or len(row)), below=4)
+        for text, action in row:
+            self._does(ui, text, action, chosen)
+        ui.row()
+
+    def _check(self, ui: Ui, kind: str, name: str, title: str) -> None:
+        desk = self.desk
+        chosen = desk.shown if kind == "show" else desk.snaps
+        tip = self._commands[f"{kind}:{name}"].tip
+        if ui.check(title, key=f"{kind}:{name}", now=name in chosen, tip=tip) is not None:
+            self._do(f"{kind}:{name}")
+
+    def _field(self, ui: Ui, name: str, word: str, unit: str = "") -> None:
+        """Show a field between its word and its unit, each in a cell of its own."""
+        desk, field = self.desk, FIELDS[name]
+        ui.label(word, key=f"word:{name}", tip=field.tip)
+        given = ui.text_entry(name, field.text(desk), tip=field.tip)
+        if unit:
+            ui.label(unit, key=f"unit:{name}", style="unit")
+        if given is not None:
+            desk.attempt(lambda: field.take(desk, given))
+
+    def _pair(self, ui: Ui, *fields: tuple[str, str, str]) -> None:
+        """Show one or two fields side by side."""
+        names = max(len(word) for _, word, _ in fields)
+        word = 14.0 if names < 3 else 48.0
+        ui.row(*(width for _ in range(2) for width in (word, 0.0, 16.0)))
+        for name, words, unit in fields:
+            self._field(ui, name, words, unit or " ")
+        ui.row()
+
+    def _whole_row(self, ui: Ui, name: str, word: str) -> None:
+        ui.row(_NAME, 0)
+        self._field(ui, name, word)
+        ui.row()
+
+    # pages
+
+    def _map(self, ui: Ui) -> None:
+        with ui.scroll("map"):
+            self._whole_row(ui, "title", "Name")
+            self._whole_row(ui, "description", "About")
+            ui.row(_NAME, 0, height=18, below=2)
+            for (word, tip), said in zip(_FACTS.items(), facts(self.desk), strict=True):
+                ui.label(word, style="unit", tip=tip)
+                ui.label(said, key=f"fact:{word}")
+            ui.space(4)
+            ui.header("ROBOTS")
+            ui.row(48, 0, 16, 44, 44, 23, 23)
+            self._field(ui, "radius", "Radius", "m")
+            self._field(ui, "robots", "Team")
+            self._does(ui, "−", "fewer")
+            self._does(ui, "+", "more")
+            ui.header("STARTS")
+            row = (
+                ("Disc", "tool:disc"),
+                ("Points", "tool:places"),
+                ("Anywhere", "start:uniform"),
+                ("Next", "start:next"),
+            )
+            self._buttons(ui, row)
+            ui.row()
+            self._check(ui, "show", "robots", "Show the team there")
+
+    def _object(self, ui: Ui) -> None:
+        desk, kind = self.desk, object_kind(self.desk)
+        if kind == "nothing":
+            ui.words(_NOTHING, size=SMALL + 1, colour=ui.theme.faint)
+            ui.space(6)
+            self._things(ui)
+            return
+        ui.header(object_words(desk))
+        if kind in ("polygon", "circle", "wall", "disc", "start"):
+            self._whole_row(ui, "name", "Name")
+        if kind in ("polygon", "circle", "wall", "several"):
+            self._whole_row(ui, "note", "Note")
+        if kind not in ("vertices", "start"):
+            self._pair(ui, ("x", "x", "m"), ("y", "y", "m"))
+        if kind in ("circle", "disc"):
+            self._pair(ui, ("size:radius", "Radius", "m"))
+        elif kind in ("polygon", "wall", "several", "boundary"):
+            self._pair(ui, ("wide", "Wide", "m"), ("high", "High", "m"))
+        if kind == "wall":
+            self._pair(ui, ("width", "Thick", "m"))
+        for row in _BUTTONS[kind]:
+            self._buttons(ui, row)
+        ui.space(4)
+        if desk.handled:
+            self._vertices(ui)
+        else:
+            self._things(ui)
+
+    def _snap(self, ui: Ui) -> None:
+        with ui.scroll("snap"):
+            ui.header("SNAP TO")
+            ui.row(0, 0, height=20, below=3)
+            for name, (title, _) in SNAPS.items():
+                self._check(ui, "snap", name, title)
+            ui.row()
+            self._pair(ui, ("grid", "Grid", "m"), ("angle", "Angle", "°"))
+            ui.header("SHOW")
+            ui.row(0, 0, height=20, below=3)
+            for name, title in SHOWN.items():
+                if name != "robots":  # which has its check box beside the starts
+                    self._check(ui, "show", name, title)
+            ui.header("PICTURE UNDER THE MAP")
+            row = (("Choose…", "background"), ("Scale, move", "tool:picture"), ("Remove", "background:none"))
+            self._buttons(ui, row)
+            self._pair(ui, ("picture:scale", "Pixel", "m"), ("picture:turn", "Turn", "°"))
+            ui.row(_NAME, 0)
+            ui.label("Opacity")
+            picture = self.desk.sketch.background
+            why = "" if picture is not None else "there is no picture under the map"
+            part = ui.slider("opacity", picture.opacity if picture is not None else 0.5, 0.0, 1.0, why=why)
+            if part is not None:
+                text = f"{part:.2f}"
+                self.desk.attempt(lambda: FIELDS["picture:opacity"].take(self.desk, text))
+
+    def _problems(self, ui: Ui) -> None:
+        desk, problems = self.desk, self.desk.problems
+        row = (("Next", "problem:next"), ("Repair", "repair"), ("Clip", "clip"), ("Mend", "problem:fix"))
+        self._buttons(ui, row)
+        with ui.scroll("problems"):
+            if not problems:
+                said = (
+                    "Nothing is wrong with the map." if desk.measurement is not None else "Being looked at …"
+                )
+                ui.words(said, colour=ui.theme.faint)
+            for k, problem in enumerate(problems[:MOST_PROBLEMS]):
+                mends = problem.kind in TITLES
+                room = ui.wide - 26 - (66 if mends else 0)
+                lines = wrapped(problem.words, ui.px(TEXT), ui.px(room - 18))
+                high = (TEXT + 5) * len(lines) + 8
+                ui.row(20, 0, *([54] if mends else []), height=high, below=2)
+                badge = ui.cell()
+                if ui.surface is not None:
+                    canvas = Canvas(ui.surface, FLAT, ui.theme, ui.scale, np.zeros(1, dtype=np.intp))
+                    draw_badge(canvas, badge.centerx, badge.top + ui.px(13), grave=problem.grave)
+                if ui.option("\n".join(lines), key=f"problem:{k}", chosen=problem is desk.problem):
+                    desk.problem = problem
+                    if problem.of is not None:
+                        desk.select(Selection.of(problem.of).within(desk.sketch))
+                    desk.version += 1
+                    self._picked()
+                if mends and ui.button(TITLES[problem.kind], key=f"mend:{k}", small=True):
+                    desk.problem = problem
+                    desk.attempt(lambda: fix_problem(desk))
+                    return  # these problems are of the map before
+            if len(problems) > MOST_PROBLEMS:
+                ui.words(f"… and {len(problems) - MOST_PROBLEMS} more", colour=ui.theme.faint)
+
+    def _history(self, ui: Ui) -> None:
+        history = self.desk.document.history
+        self._buttons(ui, (("Undo", "undo"), ("Redo", "redo")))
+        steps = [(words, k - len(history.future)) for k, words in enumerate(reversed(history.future))]
+        steps += [(words, k) for k, words in enumerate(history.past)]
+        steps.append(("as it was opened", len(history.past)))
+        with ui.scroll("history"):
+            for k in ui.visible_rows(len(steps), ROW + 2):
+                done, count = steps[k]
+                aside = "undone" if count < 0 else ""
+                if ui.option(done, aside, key=f"step:{k}", chosen=count == 0):
+                    self.desk.travel(count)
 
     # lists
 
-    @property
-    def list(self) -> PanelList | None:
-        """The list that is drawn on the open page."""
-        if self.tab in ("problems", "history"):
-            return self.problems if self.tab == "problems" else self.history
-        if self.tab == "object":
-            return self.vertices if self.desk.handled else self.things
-        return None
+    def _things(self, ui: Ui) -> None:
+        """Show all things of the map, the topmost first, also those that are locked or hidden."""
+        desk, sketch = self.desk, self.desk.sketch
+        things: list[tuple[Owner, str]] = []
+        for item in reversed(sketch.obstacles):
+            marks = [item.group, "locked" if item.locked else "", "hidden" if item.hidden else ""]
+            things.append((item.key, " · ".join(filter(None, marks))))
+        things += [(name, "") for name, _ in sketch.starts]
+        things += [(BOUNDARY, "")] if sketch.boundary is not None else []
+        with ui.scroll("things"):
+            for k in ui.visible_rows(len(things), ROW):
+                owner, said = things[k]
+                chosen = owner in desk.selection.owners
+                if ui.option(numbered_name(sketch, owner), said, key=f"thing:{owner}", chosen=chosen):
+                    own = Selection.of(owner)
+                    before = desk.selection.without_vertices()
+                    desk.select(before.toggled(own) if _added() else own)
 
-    def list_box(self) -> Box:
-        """Return where it is."""
-        assert self.widgets is not None
-        left, top, width, height = self.body
-        used = 40 if self.tab in ("problems", "history") else OBJECT_HEIGHTS[object_kind(self.desk)]
-        used = round(used * self.widgets.scale)
-        return left, top + used, width, max(height - used - round(6 * self.widgets.scale), 0)
+    def _vertices(self, ui: Ui) -> None:
+        """Show the vertices of what is selected, with their coordinates; in a drag, where they are by now."""
+        desk = self.desk
+        found = [vertex for owner in desk.handled for vertex, _ in points_of(desk.sketch, owner)]
+        with ui.scroll("vertices"):
+            for k in ui.visible_rows(len(found), ROW):
+                vertex: Vertex = found[k]
+                x, y = place_of(desk.preview[0], vertex)
+                chosen = vertex in desk.selection.vertices
+                if ui.option(f"{k + 1}", f"{x:.3f}      {y:.3f}  m", key=f"vertex:{k}", chosen=chosen):
+                    own = Selection(vertices=frozenset({vertex}))
+                    before = Selection(vertices=desk.selection.vertices)
+                    desk.select(before.toggled(own) if _added() else own)
 
-    def draw_list(self, screen: pygame.Surface, theme: Theme) -> None:
-        """Draw it."""
-        found = self.list
-        if found is not None and self.widgets is not None:
-            found.draw(screen, self.list_box(), theme, self.widgets.scale)
+
+def _added() -> bool:
+    """Whether Shift adds to what is selected."""
+    return bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
+
+
+def object_kind(desk: Editor) -> str:
+    """Return what kind of thing is selected, on which it depends what the page offers."""
+    selection = desk.selection
+    if not selection:
+        return "nothing"
+    if selection.vertices:
+        return "vertex" if len(selection.vertices) == 1 else "vertices"
+    if len(selection.owners) > 1:
+        return "several"
+    if selection.boundary:
+        return "boundary"
+    if selection.starts:
+        (name,) = selection.starts
+        spec = dict(desk.sketch.starts).get(name)
+        return "disc" if isinstance(spec, DiscStart) else "start"
+    (key,) = selection.items
+    if key not in desk.sketch.places:
+        return "nothing"
+    shape = desk.sketch.item(key).shape
+    return {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(shape)]
+
+
+def object_words(desk: Editor) -> str:
+    """Return what the object page is about."""
+    selection = desk.selection
+    if selection.vertices:
+        return f"{selection.words(desk.sketch)} of {whole(selection).words(desk.sketch)}".upper()
+    if selection.owners == {BOUNDARY}:
+        return "BOUNDARY"
+    return selection.words(desk.sketch).upper()
+
+
+def facts(desk: Editor) -> tuple[str, ...]:
+    """Return what the map page says of the map, in the order of its words."""
+    sketch, measurement = desk.sketch, desk.measurement
+    size, ring = "no boundary yet: B draws one", sketch.boundary
+    if ring:
+        xs, ys = [x for x, _ in ring], [y for _, y in ring]
+        size = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
+    if measurement is None:
+        return (size, "…", "…", "…", "…", density_words(sketch.density))
+    parts, reached = len(measurement.components), len(measurement.reached)
+    gap, diameter = measurement.gap, 2 * measurement.radius
+    count = len(sketch.obstacles)
+    return (
+        size,
+        f"{measurement.free_area:.2f} m²",
+        f"{parts}" if parts == reached else f"{parts}; {reached} for a robot",
+        "none"
+        if gap is None
+        else f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m",
+        f"{count} obstacle{'' if count == 1 else 's'}, {measurement.vertices} vertices",
+        density_words(sketch.density),
+    )

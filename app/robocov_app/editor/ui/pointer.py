@@ -8,8 +8,8 @@ import numpy as np
 import pygame
 
 from robocov_app.editor.tools.tool import PointerEvent
+from robocov_app.toolkit.input import DOUBLE, WHEEL, show_cursor, wheel_notches
 from robocov_app.viewer.layout import inside
-from robocov_app.viewer.mouse import DOUBLE, Mouse
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from robocov_app.editor.canvas.arena import Arena
     from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.panel import Panel
-    from robocov_app.viewer.layout import Box
 
 SLIP = 4.0
 """Pixels at scale 1 that a click may move."""
@@ -34,17 +33,44 @@ _SHAPES = {
 }
 
 
-class Pointer(Mouse):
-    """Turns events of the mouse into what panel, sheet and tools do."""
+class Pointer:
+    """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
 
     def __init__(
         self, desk: Editor, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
     ) -> None:
-        super().__init__(panel)
-        self._desk, self._arena, self._menu = desk, arena, menu
+        self._desk, self._arena, self._panel, self._menu = desk, arena, panel, menu
+        self.at = (0, 0)
         self.held = False
         """Whether the sheet is panned by the left button, for as long as a key is held."""
+        self._drag = ""
+        self._button = 0
+        self._pressed_at = (0, 0)
+        self._last_click = -1.0, (0, 0)
         self._moved_off = False
+        self._shape = -1
+
+    @property
+    def dragging(self) -> bool:
+        """Whether a button is held down on something."""
+        return bool(self._drag)
+
+    def take(self, event: pygame.event.Event, now: float) -> None:
+        """Take an event of the mouse at a time in seconds."""
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        taken = not self._drag and self._panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self._desk.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.ui.stop_typing()
+            self._pressed(event, now)
+        elif self._arena.over(self.at):
+            self._arena.zoom(WHEEL ** wheel_notches(event), self.at)
 
     def aim(self, pixel: tuple[int, int]) -> PointerEvent:
         """Return where a pixel means, with what is held down on the keyboard."""
@@ -59,16 +85,6 @@ class Pointer(Mouse):
             tool.guides = tool_guides
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
         return PointerEvent(point, raw, reach, shift, alt, ctrl)
-
-    def _panel_box(self) -> Box:
-        return self._arena.layout.panel
-
-    def _over_panel(self) -> None:
-        self._desk.cursor = None
-
-    def _turned(self, factor: float) -> None:
-        if self._arena.over(self.at):
-            self._arena.zoom(factor, self.at)
 
     def leave(self) -> None:
         """The mouse is not in the window any more."""
@@ -147,7 +163,9 @@ class Pointer(Mouse):
         if arena.over(self.at):
             panned = self._drag == "pan" or self.held
             shape = "move" if panned else "hand" if arena.hovered else desk.tool.shape_of_cursor(desk)
-        self._show_cursor(_SHAPES[shape])
+        if _SHAPES[shape] != self._shape:
+            self._shape = _SHAPES[shape]
+            show_cursor(self._shape)
 
 
 def _far(a: tuple[int, int], b: tuple[int, int]) -> float:

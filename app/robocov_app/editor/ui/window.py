@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -13,11 +12,9 @@ from robocov.files.atomic import written
 from robocov_app.editor.canvas.arena import Arena
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.ui.commands import GROUPS, all_commands, offered, told_commands
-from robocov_app.editor.ui.dialogs import Commands, Dialogs, Menu
+from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
 from robocov_app.editor.ui.file_commands import FileCommands
-from robocov_app.editor.ui.importing import ImportQuestion
-from robocov_app.editor.ui.keyboard import Keyboard
+from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
 from robocov_app.editor.ui.pointer import Pointer
@@ -26,10 +23,14 @@ from robocov_app.editor.ui.team import TeamThread
 from robocov_app.render.theme import theme_named
 from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
-from robocov_app.toolkit.input import OF_THE_MOUSE
+from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.help import draw_keys
+from robocov_app.toolkit.input import OF_THE_MOUSE, key_of
+from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.palette import palette
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.layout import inside, laid_out
-from robocov_app.viewer.overlays import draw_keys, draw_message
+from robocov_app.viewer.layout import laid_out
 from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.status import draw_status
 from robocov_app.viewer.window import FPS
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.ui.editor import Editor
 
 _SELDOM = 0.1
-"""Seconds after which the panel looks at its widgets also while nobody is near."""
+"""Seconds between two frames while nothing happens."""
 
 _CALM = 0.5
 """Seconds without anything new after which the window waits for events."""
@@ -50,6 +51,9 @@ _PAN = 60
 """Pixels that a key pans."""
 
 _CAPTION = "robocov edit"
+
+_OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
+"""What numbers are typed with, and what may follow in one."""
 
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
@@ -68,25 +72,19 @@ class EditorWindow:
         self.screen = shown(size)
         self.arena = Arena(desk)
         self.documents = FileCommands(desk, drafts, self.arena.fit, patient=patient)
-        self.panel = Panel(desk, self.do)
-        self.palette = Commands()
-        self.dialogs = Dialogs(desk)
+        self.dialogs = desk.dialogs
+        listed = editor_commands(desk, {**self.documents.commands(), **self._what_to_do()})
+        self.commands = Commands(listed, self._attempt, lambda: typed_commands(desk))
+        self.panel = Panel(desk, self.commands, self.do, self._show_problem)
         self.menu: Menu | None = None
         self.pointer = Pointer(desk, self.arena, self.panel, self.open_menu)
-        self.keyboard = Keyboard(desk, self.panel, self.palette, self.dialogs, self.do)
         self.team = TeamThread()
         self._patient = desk.snapper.patient = patient
-        of_desk = {each.name: partial(each.run, desk) for each in all_commands() if each.run is not None}
-        self._own: dict[str, Callable[[], object]] = {
-            **of_desk,
-            **self.documents.commands(),
-            **self._what_to_do(),
-        }
         self._arranged: tuple[object, ...] | None = None
         self._tried: Environment | None = None
         self._caption = ""
         self._rate = float(FPS)
-        self._unseen = self._calm = 0.0
+        self._calm = 0.0
         self._come: list[pygame.event.Event] = []
         self._touched = False
         self._drawn: tuple[object, ...] | None = None
@@ -136,13 +134,14 @@ class EditorWindow:
     def _what_is_shown(self) -> tuple[object, ...] | None:
         """Return all on which it depends what the window looks like; None where it always changes."""
         desk, arena = self.desk, self.arena
-        animated = self._touched or self.panel.busy or desk.moves_since is not None or desk.asked is not None
-        if animated or inside(self.layout.panel, self.pointer.at):
+        ui = self.panel.ui
+        animated = self._touched or ui.busy or desk.moves_since is not None or self.dialogs.open
+        if animated or ui.stale or ui.due is not None or self.menu is not None:
             return None
         return (
             *(desk.version, desk.message, desk.trouble, desk.typed, desk.readings.busy, desk.problem),
             *(desk.sketch, desk.selection, desk.measurement, desk.tool, desk.cursor, frozenset(desk.shown)),
-            *(arena.team, arena.camera, arena.hovered, self.help, self.palette.open, self.menu),
+            *(arena.team, arena.camera, arena.hovered, self.help),
             *(self._arranged, self._caption, desk.grid, frozenset(desk.snaps)),
         )
 
@@ -172,7 +171,8 @@ class EditorWindow:
             self.closed = True
             return
         self._arrange()
-        self._update_panel(seconds)
+        self.panel.covered = self.dialogs.open or self.menu is not None
+        self.panel.update()
         self.pointer.show()
         caption = f"{'● ' if desk.document.unsaved else ''}{desk.document.title} · {_CAPTION}"
         if caption != self._caption:
@@ -201,54 +201,51 @@ class EditorWindow:
         self.arena.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
-    def _update_panel(self, seconds: float) -> None:
-        """Let the panel live; seldom while nobody is near it, since it looks at all of its widgets."""
-        self._unseen += seconds
-        self.panel.covered = self.dialogs.open or self.menu is not None
-        near = inside(self.layout.panel, self.pointer.at) or self.panel.busy
-        if near or self._unseen >= _SELDOM:
-            self.panel.update(self._unseen)
-            self._unseen = 0.0
-
     def draw(self) -> None:
         """Draw everything, and show it."""
         layout, theme, desk = self.layout, self.theme, self.desk
         self.arena.draw(self.screen)
         draw_status(self.screen, layout, theme, facts(desk, self._rate, self.arena.team), HINT)
         if layout.panel[2]:
-            self.panel.fill(self.screen)
-            self.panel.draw_list(self.screen, theme)
             self.panel.draw(self.screen)
-        draw_message(self.screen, desk, layout, theme)
+        draw_message(self.screen, desk.message, layout.arena, theme, layout.scale, desk.trouble)
         if self.menu is not None:
             self.menu.draw(self.screen, theme, layout.scale)
         if self.help:
-            draw_keys(self.screen, layout, theme, told_commands(), GROUPS, _HINT)
-        elif self.palette.open:
-            self.palette.draw(self.screen, layout, theme)
-        self.dialogs.draw(self.screen, layout, theme)
+            draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
+        self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
 
     # doing
 
     def do(self, name: str) -> None:
-        """Do the action of this name."""
-        desk = self.desk
-        kind, _, what = name.partition(":")
+        """Do the command of this name."""
         self.menu = None
-        if name == "cancel" and (self.help or self.palette.open):
-            self.help = self.palette.open = False
-        elif kind == "tool":
-            desk.attempt(lambda: desk.choose(what))
-        elif kind == "type":
-            self.palette.show(f"{what} ")
-        elif kind in ("show", "snap"):
-            desk.attempt(lambda: desk.switch(kind, what))
+        if name == "cancel" and self.help:
+            self.help = False
         else:
-            problem = desk.problem
-            desk.attempt(self._own[name])
-            if desk.problem is not None and desk.problem is not problem:
-                self.arena.go_to(desk.problem)
+            self.commands.do(name)
+
+    def _attempt(self, action: Callable[[], object]) -> None:
+        desk, problem = self.desk, self.desk.problem
+        desk.attempt(action)
+        if desk.problem is not problem:
+            self._show_problem()
+
+    def _show_problem(self) -> None:
+        if self.desk.problem is not None:
+            self.arena.go_to(self.desk.problem)
+
+    def open_palette(self, text: str = "") -> None:
+        """Open the palette, with the beginning of a command."""
+
+        def told(words: str) -> None:
+            self.desk.version += 1
+            self.desk.say(words)
+
+        asked = palette(self.commands, GHOST, told)
+        asked.text = text
+        self.dialogs.ask(asked)
 
     def _what_to_do(self) -> dict[str, Callable[[], object]]:
         return {
@@ -269,7 +266,7 @@ class EditorWindow:
             "fullscreen": self._fullscreen,
             "screenshot": self.screenshot,
             "help": self._toggle_help,
-            "palette": self.palette.show,
+            "palette": self.open_palette,
             "try": self.try_it,
         }
 
@@ -314,12 +311,12 @@ class EditorWindow:
         """Open the menu for what is at a pixel; what is not selected yet is selected then."""
         desk = self.desk
         if self.arena.over(pixel):
-            found = owners_at(desk.sketch, self.arena.to_world(pixel), 0.5 * self.arena.reach)
-            near = desk.selection.vertices or any(each in desk.selection.owners for each in found)
+            there = owners_at(desk.sketch, self.arena.to_world(pixel), 0.5 * self.arena.reach)
+            near = desk.selection.vertices or any(each in desk.selection.owners for each in there)
             if not near:
-                desk.select(Selection.of(*found[:1]))
-        known = {command.name: command for command in all_commands()}
-        self.menu = Menu([known.get(name) for name in offered(desk)], pixel)
+                desk.select(Selection.of(*there[:1]))
+        found = [self.commands[name] if name else None for name in offered(desk)]
+        self.menu = Menu(found, pixel, self.do)
 
     # trying
 
@@ -350,9 +347,9 @@ class EditorWindow:
         change = brought_back(desk.sketch, self._tried, trial.desk.session.environment)
         if change is not None and not trial.desk.elsewhere:
             desk.change(change)
-        self.keyboard.leave()
+        self.commands.forget_keys()
         if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
-            self.keyboard.hold(pygame.K_F5)
+            self.commands.hold(pygame.K_F5)
         self._arrange()
         desk.version += 1
         if leaving:
@@ -364,87 +361,73 @@ class EditorWindow:
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
-        if event.type == pygame.QUIT:
-            if isinstance(self.desk.asked, ImportQuestion):
-                self.dialogs.key("escape")
+        kind = event.type
+        if kind == pygame.KEYUP:
+            self.commands.release(event)
+            self.pointer.held = self.pointer.held and event.key != pygame.K_SPACE
+        elif kind == pygame.WINDOWFOCUSLOST:
+            self.commands.forget_keys()
+            self.pointer.held = False
+        elif kind == pygame.KEYDOWN and event.key == pygame.K_F12:
+            self.do("screenshot")
+            return
+        if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
+            self.pointer.at = event.pos
+        if kind == pygame.QUIT:
+            if isinstance(self.desk.asked, ImportDialog):
+                self.dialogs.close()
             if not self.dialogs.open:
                 self.do("quit")
-        elif event.type == pygame.DROPFILE:
-            if not self.dialogs.open and self.trial is None:
-                self.desk.attempt(lambda: self.documents.open(Path(event.file)))
-        elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+        elif self.dialogs.take(event):
+            return
+        elif kind == pygame.DROPFILE:
+            self.desk.attempt(lambda: self.documents.open(Path(event.file)))
+        elif kind in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self.screen = pygame.display.get_surface() or self.screen
-        elif event.type == pygame.KEYDOWN and self.menu is not None:
-            self._key_of_menu(event)
-        elif event.type == pygame.KEYDOWN:
-            self.keyboard.press(event)
+        elif self.menu is not None and self._menu_takes(self.menu, event):
+            return
+        elif kind == pygame.KEYDOWN:
+            self._press(event)
             if self.trial is not None:
                 self.trial.held = event.key
-        elif event.type == pygame.TEXTINPUT and self.dialogs.open:
-            self.dialogs.letters(event.text)
-        elif event.type == pygame.TEXTINPUT and self.palette.open:
-            self.keyboard.letters(event.text)
-        elif event.type in OF_THE_MOUSE:
-            self._mouse(event)
-        elif event.type == pygame.WINDOWLEAVE:
+            self.dialogs.swallow(event.unicode)
+        elif kind == pygame.MOUSEBUTTONDOWN and self.help:
+            self.help = False
+        elif kind in OF_THE_MOUSE:
+            self.pointer.take(event, self.desk.now)
+        elif kind == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
-            if event.type == pygame.KEYUP:
-                self.keyboard.release(event)
-                if event.key == pygame.K_SPACE:
-                    self.pointer.held = False
-            elif event.type == pygame.WINDOWFOCUSLOST:
-                self.keyboard.leave()
-                self.pointer.held = False
             self.panel.take(event)
 
-    def _mouse(self, event: pygame.event.Event) -> None:
-        pressed = event.type == pygame.MOUSEBUTTONDOWN
-        if self.dialogs.open or self.menu is not None:
-            if event.type != pygame.MOUSEWHEEL:
-                self.pointer.at = event.pos
-            self._mouse_over(event)
-        elif pressed and (self.help or self.palette.open):
-            self.help = self.palette.open = False
-        elif self._over_list() and event.type == pygame.MOUSEWHEEL:
-            assert self.panel.list is not None
-            self.panel.list.wheel(event.y)
-        elif pressed and event.button == 1 and self._over_list(event.pos):
-            assert self.panel.list is not None
-            self.panel.stop_typing()
-            if self.panel.list.click(event.pos) and self.desk.problem is not None:
-                self.arena.go_to(self.desk.problem)
-        else:
-            self.pointer.take(event, self.desk.now)
-
-    def _over_list(self, pixel: tuple[int, int] | None = None) -> bool:
-        found = self.panel.list
-        at = self.pointer.at if pixel is None else pixel
-        if found is None or not self.desk.panel or self.panel.unfolded or self.pointer.dragging:
-            return False
-        return inside(found.box, at)
-
-    def _mouse_over(self, event: pygame.event.Event) -> None:
-        """Let the mouse do to a question or the menu what it does."""
-        if self.menu is not None:
-            self._after(self.menu.mouse(event, self.layout.scale))
-        elif event.type == pygame.MOUSEMOTION:
-            self.dialogs.hover(event.pos)
-        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-            self.dialogs.click(event.pos)
-        elif event.type == pygame.MOUSEWHEEL:
-            self.dialogs.wheel(event.y)
-
-    def _after(self, chosen: str | None) -> None:
-        """Do what was chosen in the menu; an empty name only closes it."""
-        if chosen is not None:
+    def _menu_takes(self, menu: Menu, event: pygame.event.Event) -> bool:
+        taken = menu.take(event)
+        if not menu.open and self.menu is menu:
             self.menu = None
-            if chosen:
-                self.do(chosen)
+        return taken
 
-    def _key_of_menu(self, event: pygame.event.Event) -> None:
-        assert self.menu is not None
-        chosen = self.menu.key(event.key)
-        self._after(chosen)
-        if chosen == "" and event.key != pygame.K_ESCAPE:
-            self.keyboard.press(event)
+    def _press(self, event: pygame.event.Event) -> None:
+        """Take a key: for a field, for a number while something is drawn, else for a command."""
+        if self.panel.take(event) or (not self.panel.ui.busy and self._number(event)):
+            return
+        command = self.commands.of_key(event)
+        if command is not None:
+            self.do(command.name)
+
+    def _number(self, event: pygame.event.Event) -> bool:
+        """Take a key for the number that is typed while something is drawn; say whether it was one."""
+        desk, name, sign = self.desk, key_of(event), event.unicode
+        if not desk.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
+            return False
+        if desk.typed and name in ("return", "enter", "backspace", "tab"):
+            if name in ("return", "enter"):
+                desk.enter()
+            else:
+                desk.typed = desk.typed[:-1] if name == "backspace" else f"{desk.typed} "
+            return True
+        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if desk.tool.busy else "x×*/ ;%,-+@<°")
+        follows = bool(desk.typed) and (sign in _OF_NUMBERS or sign in _UNITS)
+        if len(sign) == 1 and (begins or follows):
+            desk.typed = (desk.typed + sign)[:40]
+            return True
+        return False

@@ -1,0 +1,321 @@
+"""The import dialog: options at the left, the map before and after at the right, the report below."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pygame
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from robocov.errors import RobocovError
+from robocov_app.editor.ui.importing import Imported, Wanted, options_of
+from robocov_app.importers import Importer, ReadOptions, Shaping
+from robocov_app.importers.report import square_metres
+from robocov_app.render.camera import Camera
+from robocov_app.render.fonts import label, shortened, text_width
+from robocov_app.render.layout import columns_for
+from robocov_app.render.theme import Colour, Theme
+from robocov_app.toolkit.overlay import wrapped
+from robocov_app.toolkit.text_edit import TextEdit
+from robocov_app.toolkit.ui import SMALL, Ui
+from robocov_app.toolkit.worker import Worker
+
+_COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
+"""Pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map."""
+
+_FEWEST_LINES = 7
+"""Of the report there is room for so many, and for more below maps that are wide."""
+
+_MARK = 150
+"""Opacity of what is marked, of 255."""
+
+_HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
+_DEFAULT = "default"
+
+
+class ImportDialog:
+    """Asks how a file is to be imported, with a live preview; `call` gets what is accepted.
+
+    `given`: what was typed or chosen, by the names of options. `imported`: of the newest settings that could
+    be imported. `accepted`: whether it is wanted as it is set, as soon as it is there.
+    """
+
+    width = 10_000.0  # all that the window has
+
+    def __init__(
+        self, path: Path, importer: Importer, worker: Worker[Imported], call: Callable[[Imported], object]
+    ) -> None:
+        self.path, self.importer, self.call = path, importer, call
+        self.options = options_of(importer)
+        self.given: dict[str, str] = {}
+        self.imported: Imported | None = None
+        self.accepted = self.done = False
+        self.cameras: list[Camera] = []
+        self._seen: Ui | None = None
+        self._worker = worker
+        self._mistake = ""
+        self._picture: tuple[tuple[object, ...], pygame.Surface] | None = None
+        self._ask()
+
+    # what is set
+
+    def set(self, name: str, text: str) -> None:
+        """Give an option a text; the default's or none takes it back."""
+        option = next(each for each in self.options if each.name == name)
+        if not text or text in (option.default, _DEFAULT):
+            self.given.pop(name, None)
+        else:
+            self.given[name] = text[:200]
+        self._ask()
+
+    def keep_inside(self, place: tuple[float, float]) -> None:
+        """Keep the part of the free space that holds a place, m."""
+        self.given.pop("keep", None)
+        self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
+
+    def settings(self) -> tuple[ReadOptions, Shaping]:
+        """Return what is set."""
+        options = [option for option in self.options if option.name in self.given]
+        values = {option.name: option.value(self.given[option.name]) for option in options}
+        of_reading = {field.name for field in fields(ReadOptions)}
+        read = {name: value for name, value in values.items() if name in of_reading}
+        return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
+
+    # what comes of it
+
+    def _ask(self) -> None:
+        self.accepted = False
+        try:
+            options, shaping = self.settings()
+        except RobocovError as error:
+            self._mistake = str(error)
+        else:
+            self._mistake = ""
+            self._worker.put(Wanted(self.path, self.importer.name, options, shaping))
+
+    def poll(self) -> Imported | None:
+        """Take what was imported, if it is there; return it if it is accepted."""
+        answer = self._worker.poll()
+        if answer is not None and not self._worker.busy:
+            self.imported = answer
+        if self.trouble:
+            self.accepted = False
+        return self.imported if self.accepted and self.ready else None
+
+    @property
+    def busy(self) -> bool:
+        """Whether it is being imported."""
+        return not self._mistake and self._worker.busy
+
+    @property
+    def trouble(self) -> str:
+        """Why it cannot be imported as it is set."""
+        return self._mistake or ("" if self._worker.busy else self._worker.trouble)
+
+    @property
+    def ready(self) -> bool:
+        """Whether what was imported is what is set."""
+        return self.imported is not None and not self.busy and not self.trouble
+
+    # the dialog
+
+    def key(self, name: str, ui: Ui) -> bool:
+        """Import by Enter; other keys are for the fields."""
+        if name in ("return", "enter") and ui.open_list is None:
+            self.accepted = True
+            return True
+        return False
+
+    def wheel(self, notches: float) -> None:
+        """Do nothing."""
+
+    def cancelled(self) -> None:
+        """End what works on it."""
+        self._worker.close()
+
+    def page(self, ui: Ui) -> None:
+        """Show options, maps and report."""
+        left, top, wide = ui.x, ui.y, ui.wide
+        high = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
+        ui.wide = _COLUMN
+        self._options(ui, top + high)
+        ui.x, ui.y, ui.wide = left + _COLUMN + _GAP, top, wide - _COLUMN - _GAP
+        below = _LINE * (_FEWEST_LINES + 1) + 14
+        ui.row(height=high - below, below=0)
+        rect, clicked = ui.area("maps")
+        if self.imported is not None:
+            maps = self._place(rect, self.imported, ui.scale)
+            if ui.surface is not None:
+                self._draw_maps(ui.surface, self.imported, ui.scale, ui.theme)
+            if clicked:
+                self._click(ui.at)
+            ui.y = top + maps / ui.scale + 14
+        else:
+            ui.end_row()
+            ui.y += 14
+            if ui.surface is not None:
+                words = label("nothing to show" if self.trouble else "reading…", ui.px(13), ui.theme.faint)
+                ui.surface.blit(words, words.get_rect(center=rect.center))
+        self._report(ui, top + high)
+        ui.x, ui.y, ui.wide = left, top + high, wide
+
+    def _options(self, ui: Ui, foot: float) -> None:
+        ui.words(f"Import {self.path.name}", size=16, bold=True)
+        ui.label(self.importer.title, style="unit")
+        ui.end_row()
+        if ui is not self._seen:  # letters go into the first field
+            self._seen = ui
+            first = next(option.name for option in self.options if not option.choices)
+            ui.focus, ui.edit = first, TextEdit.of(self.given.get(first, ""))
+        room = min((foot - 44 - ui.y) / len(self.options), 28.0)
+        ui.row(_NAME, 0, height=room - 4, below=4)
+        for option in self.options:
+            name, tip = option.name, option.help
+            now = self.given.get(name, option.default)
+            ui.label(name.replace("_", " "), tip=tip, style="bold" if name in self.given else "")
+            if option.choices:
+                choices = option.choices if option.default else (_DEFAULT, *option.choices)
+                text = ui.dropdown(name, choices, now or _DEFAULT, tip=tip)
+            else:
+                text = ui.text_entry(name, now, ghost=_DEFAULT, tip=tip, live=True)
+            if text is not None and text != now:
+                self.set(name, text)
+        ui.end_row()
+        said = next((option.help for option in self.options if option.name == ui.focus), "")
+        lines = wrapped(said, ui.px(SMALL), ui.px(ui.wide))[: max(int((foot - 40 - ui.y) / (SMALL + 5)), 0)]
+        ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
+        ui.y = foot - 30
+        ui.row(92, 92, height=30, below=0)
+        if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
+            self.accepted = True
+        if ui.button("Cancel", key="cancel"):
+            self.done = True
+            self.cancelled()
+        ui.end_row()
+
+    def _report(self, ui: Ui, foot: float) -> None:
+        said = self.imported.report.lines() if self.imported is not None else []
+        said = [self.trouble] if self.trouble else said
+        lines = [line for each in said for line in wrapped(each, ui.px(SMALL), ui.px(ui.wide))]
+        most = int((foot - ui.y) / _LINE) - 1
+        if len(lines) > most:
+            lines = [*lines[: most - 1], f"and {len(lines) - most + 1} lines more"]
+        ui.row(height=_LINE, below=0)
+        if ui.surface is not None:
+            for line in lines:
+                colour = ui.theme.trajectory if self.trouble else ui.theme.ink
+                ui.surface.blit(label(line, ui.px(SMALL), colour), ui.cell())
+        ui.end_row()
+        ui.y = foot - _LINE
+        ui.label("importing…" if self.busy and self.imported is not None else _HINT, style="unit")
+        ui.end_row()
+
+    # the maps
+
+    def _click(self, pixel: tuple[int, int]) -> None:
+        for camera in self.cameras:
+            if pygame.Rect(camera.view).collidepoint(pixel):
+                x, y = camera.to_world(np.array(pixel, dtype=float)).tolist()
+                digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
+                self.keep_inside((round(x, digits), round(y, digits)))
+
+    def _place(self, box: pygame.Rect, imported: Imported, scale: float) -> float:
+        """Place the two maps at the top of a box; return the height that they take, px."""
+        low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
+        aspect, above, gap = (high_x - low_x) / (high_y - low_y), round(_ABOVE * scale), round(20 * scale)
+        columns = columns_for(2, aspect, box.size, above)
+        wide = (box.width - (columns - 1) * gap) // columns
+        most = (box.height if columns == 2 else (box.height - gap) // 2) - above
+        high = min(most, round(wide / aspect))
+        corners = [box.topleft, (box.right - wide, box.top + (2 - columns) * (above + high + gap))]
+        map_wide = float(min(wide, round(high * aspect)))
+        views = [(float(x), float(y + above), map_wide, float(high)) for x, y in corners]
+        self.cameras, self._wide = [Camera.fit(bounds, view, 2 * scale) for view in views], wide
+        return corners[1][1] + above + high - box.top
+
+    def _draw_maps(self, screen: pygame.Surface, imported: Imported, scale: float, theme: Theme) -> None:
+        key = (imported, tuple(camera.view for camera in self.cameras), scale, theme)
+        if self._picture is None or self._picture[0] != key:
+            self._picture = key, _maps(screen.get_size(), imported, self.cameras, scale, theme)
+        screen.blit(self._picture[1], (0, 0))
+        self._draw_captions(screen, imported, scale, theme)
+        inside = next(option for option in self.options if option.name == "inside")
+        if inside.name in self.given and not self.trouble:
+            for camera in self.cameras:
+                x, y = camera.to_pixels(np.array(inside.value(self.given["inside"]))).tolist()
+                for width, ink in ((5, theme.background), (2, theme.final)):
+                    arm = 7 * scale + width / 2
+                    pygame.draw.line(screen, ink, (x - arm, y), (x + arm, y), round(width * scale))
+                    pygame.draw.line(screen, ink, (x, y - arm), (x, y + arm), round(width * scale))
+        for camera in self.cameras if self.trouble else ():  # of settings that are no more
+            veil = pygame.Surface(camera.view[2:], pygame.SRCALPHA)
+            veil.fill((*theme.panel, 140))
+            screen.blit(veil, camera.view[:2])
+
+    def _draw_captions(self, screen: pygame.Surface, imported: Imported, scale: float, theme: Theme) -> None:
+        compared, report = imported.comparison, imported.report
+        size, small = round(13 * scale), round(SMALL * scale)
+        lost = "" if compared.lost.is_empty else f"{square_metres(compared.lost.area, 3)} left out"
+        opened = "" if compared.opened.is_empty else f"{square_metres(compared.opened.area, 3)} opened"
+        passage = f", narrowest passage {compared.gap.width:.3g} m" if compared.gap is not None else ""
+        rows = (
+            ("as read", report.vertices_read, compared.before.area, "", lost, theme.trajectory),
+            ("as imported", report.vertices_kept, compared.after.area, passage, opened, theme.start),
+        )
+        for camera, (name, vertices, area, more, mark, colour) in zip(self.cameras, rows, strict=True):
+            x, y = round(camera.view[0]), round(camera.view[1] - _ABOVE * scale)
+            screen.blit(label(name, size, theme.ink, True), (x, y))
+            left = x + text_width(name, size, True) + round(10 * scale)
+            if mark:
+                square = pygame.Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
+                pygame.draw.rect(screen, colour, square)
+                screen.blit(label(mark, small, theme.ink), (left + round(14 * scale), y + round(2 * scale)))
+            facts = shortened(f"{vertices} vertices, {square_metres(area)} free{more}", small, self._wide)
+            screen.blit(label(facts, small, theme.faint), (x, y + round(20 * scale)))
+
+
+def _maps(
+    size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
+) -> pygame.Surface:
+    """Return a picture, else transparent, of the map as it was read and as it became."""
+    compared = imported.comparison
+    picture = pygame.Surface(size, pygame.SRCALPHA)
+    ways = (
+        (compared.before, compared.lost, theme.trajectory),
+        (compared.after, compared.opened, theme.start),
+    )
+    for camera, (free, marked, colour) in zip(cameras, ways, strict=True):
+        _fill(picture, camera, compared.region, theme.obstacle, theme.obstacle)
+        _fill(picture, camera, free, theme.background, theme.obstacle)
+        for ring in shapely.get_rings(shapely.get_parts(free)):
+            points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
+            pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
+        marks = pygame.Surface(size, pygame.SRCALPHA)
+        _fill(marks, camera, marked, (*colour, _MARK), (0, 0, 0, 0))
+        picture.blit(marks, (0, 0))
+    if compared.gap is not None:
+        ends = cameras[1].to_pixels(np.array(compared.gap.between))
+        pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), round(2 * scale))
+        reach = float(np.hypot(*(ends[1] - ends[0]))) / 2
+        if reach < 10 * scale:
+            pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, round(2 * scale))
+    return picture
+
+
+def _fill(
+    surface: pygame.Surface,
+    camera: Camera,
+    area: BaseGeometry,
+    inside: Colour | tuple[int, int, int, int],
+    holes: Colour | tuple[int, int, int, int],
+) -> None:
+    """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
+    parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]
+    for part in sorted(parts, key=lambda each: -shapely.Polygon(each.exterior).area):
+        for ring, colour in [(part.exterior, inside), *((hole, holes) for hole in part.interiors)]:
+            pygame.draw.polygon(surface, colour, camera.to_pixels(shapely.get_coordinates(ring)).tolist())
