@@ -24,18 +24,13 @@ from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
 
+# radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
-"""Radius of a robot where it has room and in the densest crowd, and least size of its number, in points."""
-
-_START, _AIM = 6.2, 8.0
-"""Sizes of marks where they have room, in points."""
+_START, _AIM = 6.2, 8.0  # sizes of marks where they have room, in points
 
 
-_ARROW = 16.0
-"""Length of the arrow on an obstacle that moves, in points."""
-
-_DOTS = 400
-"""Dots of the shading of a density along the longer side of a map."""
+_ARROW = 16.0  # length of the arrow on an obstacle that moves, in points
+_DOTS = 400  # dots of the shading of a density along the longer side of a map
 
 
 def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:

@@ -28,11 +28,8 @@ from robocov_app.render.distance_field import Field, levels, palette, round_limi
 from robocov_app.render.heatmaps import border_colour
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
-_FINE = 2
-"""Dots of a map's picture for each pixel of the page."""
-
-_LEAST = 720, 400
-"""Smallest page for curves and maps."""
+_FINE = 2  # dots of a map's picture for each pixel of the page
+_LEAST = 720, 400  # smallest page for curves and maps
 
 _BAR_LABEL = "distance to the nearest robot"
 

@@ -13,8 +13,8 @@ from robocov_app.figures.page import TEXT, even_ticks, figure_of, quiet_axes, to
 from robocov_app.figures.styles import CurveStyle, styles_of
 from robocov_app.render.theme import Theme
 
+# label, controller's name, times (T,) s and mean distances (T,) m
 Curve: TypeAlias = tuple[str, str, Array, Array]
-"""Label, controller's name, times (T,) s and mean distances (T,) m."""
 
 DISTANCE = "mean distance to the nearest robot (m)"
 TIME = "mean time until the first robot is there (s)"

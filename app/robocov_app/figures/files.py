@@ -15,12 +15,12 @@ from robocov.files.atomic import writable, written
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+# what would differ from one time, or one version of matplotlib, to the next is left out
 _METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "svg": {"Date": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-"""What would differ from one time, or one version of matplotlib, to the next is left out."""
 
 _STYLE: Any = {
     "savefig.bbox": None,

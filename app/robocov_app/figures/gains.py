@@ -22,17 +22,10 @@ from robocov_app.figures.rows import cut_to
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
-MOST_LEVELS = 15
-"""Different values of a gain up to which medians are drawn; more are a sample of a range."""
-
-MOST_LETTERS = 28
-"""Of a name on an axis or in a legend."""
-
-MOST_POINTS = 600
-"""Points that are drawn of a controller; of more, every so many-th."""
-
-_WIDE = 8.0
-"""An axis is logarithmic when its highest value is so many times its lowest."""
+MOST_LEVELS = 15  # different values of a gain up to which medians are drawn; more are a sample of a range
+MOST_LETTERS = 28  # of a name on an axis or in a legend
+MOST_POINTS = 600  # points that are drawn of a controller; of more, every so many-th
+_WIDE = 8.0  # an axis is logarithmic when its highest value is so many times its lowest
 
 
 class Dependence(NamedTuple):

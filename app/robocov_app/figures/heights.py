@@ -20,17 +20,11 @@ from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 
-PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))
-"""A cell without any symmetry, m."""
-
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
+# heights are written beside the path, rounded, where their places are so far apart, as a part of it
 _APART = 0.13
-"""Heights are written beside the path, rounded, where their places are so far apart, as a part of it."""
-
-_LOW, _HIGH = 0.01, 100.0
-"""The range of the plot for such a cell, m."""
-
-_LIMIT = 1e-7
-"""So high, relative to the cell's size, a sensor is as good as on the ground."""
+_LOW, _HIGH = 0.01, 100.0  # the range of the plot for such a cell, m
+_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
 
 
 class AtHeight(NamedTuple):

@@ -15,11 +15,8 @@ from robocov_app.figures.page import HEADING, Page
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
-MOST = 60
-"""Maps on a sheet: more would be too small to be seen."""
-
-_WIDTH, _HIGHEST = 1600, 1600
-"""Pixels of a sheet for which no size is asked, across and at most down."""
+MOST = 60  # maps on a sheet: more would be too small to be seen
+_WIDTH, _HIGHEST = 1600, 1600  # pixels of a sheet for which no size is asked, across and at most down
 
 
 @plain_style()

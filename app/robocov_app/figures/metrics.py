@@ -30,13 +30,13 @@ def share(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
     return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
 
 
+# label, unit and values of each panel
 PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
     ("sensed, in line of sight (% of the free area)", "%", share(lambda each: each.sensed_area)),
     ("in line of sight (% of the free area)", "%", share(lambda each: each.visible_area)),
     ("work |F v| (J)", "J", lambda each: each.work),
     ("way of a robot (m)", "m", lambda each: each.path_length),
 )
-"""Label, unit and values of each panel."""
 
 
 @plain_style()

@@ -17,14 +17,10 @@ from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.theme import Colour, Theme
 
-HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5
-"""Text sizes in points."""
-
-Box: TypeAlias = tuple[float, float, float, float]
-"""Left, top, width and height in pixels."""
-
+HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
+Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
+# which part of a legend is where it is put
 Place: TypeAlias = Literal["upper left", "upper center", "center right"]
-"""Which part of a legend is where it is put."""
 
 
 def tone(colour: Colour) -> tuple[float, float, float]:

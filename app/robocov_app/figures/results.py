@@ -31,11 +31,8 @@ from robocov_app.figures.statistics import Interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
-_REACH = 1.5
-"""So much farther than its pairs an axis of ratios goes for their intervals."""
-
-_USUAL = 700.0
-"""Width of a page in pixels from which on lines have their full width."""
+_REACH = 1.5  # so much farther than its pairs an axis of ratios goes for their intervals
+_USUAL = 700.0  # width of a page in pixels from which on lines have their full width
 
 
 class Band(NamedTuple):

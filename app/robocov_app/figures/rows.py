@@ -17,23 +17,13 @@ from robocov_app.figures.page import TEXT, Page, figure_of, quiet_axes, tone
 from robocov_app.figures.styles import CurveStyle
 from robocov_app.render.theme import Theme
 
-MOST_POINTS = 250
-"""Points that are drawn of a sample; of more, so many that stand evenly among them by rank."""
-
-FEW = 5
-"""Values from which on a box says more than its points."""
-
-_ROW, _HEADING = 30.0, 26.0
-"""Heights of a row and of a group's name above several, in pixels at scale 1."""
-
-_BESIDE = 13.0
-"""Points between a row's name and the axis, where its mark stands."""
-
-_HALF = 0.27
-"""Half of the height of a box, in rows."""
-
+MOST_POINTS = 250  # points that are drawn of a sample; of more, so many that stand evenly among them by rank
+FEW = 5  # values from which on a box says more than its points
+_ROW, _HEADING = 30.0, 26.0  # heights of a row and of a group's name above several, in pixels at scale 1
+_BESIDE = 13.0  # points between a row's name and the axis, where its mark stands
+_HALF = 0.27  # half of the height of a box, in rows
+# where an axis of ratios may have its marks; and beyond, powers of ten
 _RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0)
-"""Where an axis of ratios may have its marks; and beyond, powers of ten."""
 
 
 def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[float], float]:

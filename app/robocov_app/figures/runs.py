@@ -20,8 +20,7 @@ from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
-_SCALE = 1.3
-"""Of texts and lines on a page of the usual width: its legend stands beside the scale bar."""
+_SCALE = 1.3  # of texts and lines on a page of the usual width: its legend stands beside the scale bar
 
 
 @plain_style()

@@ -21,11 +21,8 @@ if TYPE_CHECKING:
 
 Statistic: TypeAlias = Literal["median", "mean"]
 
-LEVEL = 0.95
-"""Of all intervals."""
-
-RESAMPLES = 4000
-"""Bootstrap samples: the ends of a 95 % interval then vary by about a fortieth of its width."""
+LEVEL = 0.95  # of all intervals
+RESAMPLES = 4000  # bootstrap samples: the ends of a 95 % interval then vary by about a fortieth of its width
 
 
 @dataclass(frozen=True)
@@ -55,8 +52,7 @@ class Paired:
     pairs: int
 
 
-_AT_ONCE = 1_000_000
-"""Values that are looked at together."""
+_AT_ONCE = 1_000_000  # values that are looked at together
 
 
 def bootstrap(

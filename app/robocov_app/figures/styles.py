@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 from robocov_app.render.theme import Colour, Theme
 
+# dashes and end mark of the paper's controllers: the same in every picture
 _KNOWN: dict[str, tuple[Any, str]] = {
     "rapf": ("-", "o"),
     "rpf": ((0, (5, 1.6)), "s"),
     "lloyd": ((0, (1.6, 1.2)), "^"),
 }
-"""Dashes and end mark of the paper's controllers: the same in every picture."""
-
+# those of controllers that have none of their own, and of one controller's second, third, ... gains.
 VARIANTS: tuple[tuple[Any, str], ...] = (
     ((0, (6, 1.6, 1.6, 1.6)), "D"),
     ((0, (9, 2.5)), "v"),
@@ -22,10 +22,10 @@ VARIANTS: tuple[tuple[Any, str], ...] = (
     ((0, (2.5, 2.5)), "*"),
     ((0, (9, 1.4, 3, 1.4)), "X"),
 )
-"""Those of controllers that have none of their own, and of one controller's second, third, ... gains."""
 
 _LOOKS = (*_KNOWN.values(), *VARIANTS)
 
+# the marks as SVG paths round the origin, 10 to 13 across
 MARKS = {
     "o": "M0-5a5 5 0 1 0 .01 0z",
     "s": "M-4.6-4.6h9.2v9.2h-9.2z",
@@ -36,7 +36,6 @@ MARKS = {
     "*": "M0-6.6 1.8-2.1 6.6-1.8 2.9 1.3 4.1 6 0 3.4-4.1 6-2.9 1.3-6.6-1.8-1.8-2.1z",
     "X": "M-5.6-3-3-5.6 0-2.6 3-5.6 5.6-3 2.6 0 5.6 3 3 5.6 0 2.6-3 5.6-5.6 3-2.6 0z",
 }
-"""The marks as SVG paths round the origin, 10 to 13 across."""
 
 
 class CurveStyle(NamedTuple):

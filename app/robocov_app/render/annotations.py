@@ -20,8 +20,7 @@ EDGE = MARGIN + 2.0
 LEGEND_ROW = 22.0
 STRIP = 34.0
 _GLYPH = 28.0
-_GAP = 18.0
-"""Pixels at scale 1."""
+_GAP = 18.0  # pixels at scale 1
 
 
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:

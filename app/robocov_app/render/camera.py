@@ -8,8 +8,8 @@ import numpy as np
 
 from robocov.arrays import Array
 
+# limits of the zoom in pixels per metre: from a hundred times the largest map to a tenth of the smallest
 SMALLEST, LARGEST = 1e-4, 1e7
-"""Limits of the zoom in pixels per metre: from a hundred times the largest map to a tenth of the smallest."""
 
 
 @dataclass(frozen=True)

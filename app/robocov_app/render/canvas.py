@@ -19,8 +19,7 @@ from robocov_app.render.fonts import label, text_width
 from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme
 
-FAR = 20000.0
-"""Pixels. Products of twice this still fit 32 bits."""
+FAR = 20000.0  # pixels. Products of twice this still fit 32 bits.
 
 
 def bounded(points: Array) -> Array:
@@ -67,11 +66,10 @@ def clipped_segment(
     return (x1 + dx * first, y1 + dy * first), (x1 + dx * last, y1 + dy * last)
 
 
+# gives the sprite for a shift in quarters of a pixel
 Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
-"""Gives the sprite for a shift in quarters of a pixel."""
-
+# draws a sign around a pixel, within 22 x 14 px at scale 1
 Glyph: TypeAlias = Callable[["Canvas", float, float], None]
-"""Draws a sign around a pixel, within 22 x 14 px at scale 1."""
 
 
 def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:

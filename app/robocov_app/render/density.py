@@ -14,12 +14,11 @@ from robocov.density import Density, Gaussians
 from robocov.environment import Environment
 from robocov_app.render.theme import Theme
 
-_SAMPLES = 96
-"""Places along the longer side of a map at which the density is looked at for its range."""
+_SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
 
 
+# smallest x, smallest y, largest x, largest y in metres
 Bounds: TypeAlias = tuple[float, float, float, float]
-"""Smallest x, smallest y, largest x, largest y in metres."""
 
 
 def shading(density: Density, bounds: Bounds, x: Array, y: Array, theme: Theme) -> NDArray[np.uint8]:

@@ -14,18 +14,14 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov_app.render.theme import Theme
 
+# least angle in radians at which two distances are taken to grow apart, so that borders stay thin
 _SHALLOW = 0.05
-"""Least angle in radians at which two distances are taken to grow apart, so that borders stay thin."""
 
 
+# the squares beside a square: rows up and columns right, and the corners that the two share
 _BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
-"""The squares beside a square: rows up and columns right, and the corners that the two share."""
-
-_BLOCK = 4
-"""Pixels along the side of blocks that are looked at as a whole first."""
-
-_RIVALS = 5
-"""Different ways that a place may choose from."""
+_BLOCK = 4  # pixels along the side of blocks that are looked at as a whole first
+_RIVALS = 5  # different ways that a place may choose from
 
 
 class FieldLattice:
@@ -305,8 +301,7 @@ def _first_different(site: IntArray, source: IntArray) -> IntArray:
 
 _STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
-FARTHEST = 253
-"""Number of the colour at the limit of the scale and beyond."""
+FARTHEST = 253  # number of the colour at the limit of the scale and beyond
 
 
 def round_limit(distance: float) -> float:

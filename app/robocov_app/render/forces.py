@@ -14,11 +14,8 @@ from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
 
-FORCE_LENGTH = 46.0
-"""Longest arrow of a force in pixels at scale 1."""
-
-VELOCITY_LENGTH = 34.0
-"""Length of the arrow of a robot at its largest speed in pixels at scale 1."""
+FORCE_LENGTH = 46.0  # longest arrow of a force in pixels at scale 1
+VELOCITY_LENGTH = 34.0  # length of the arrow of a robot at its largest speed in pixels at scale 1
 
 
 def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width: float, head: str) -> None:

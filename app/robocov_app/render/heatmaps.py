@@ -21,8 +21,8 @@ from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, Theme, mix
 
+# on a surface the density is looked at in at most about so many places; between them it is interpolated
 _DOTS = 60_000
-"""On a surface the density is looked at in at most about so many places; between them it is interpolated."""
 
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:
@@ -108,17 +108,10 @@ class _Dots(NamedTuple):
         return np.asarray(before + self.part * (values[self.first + 1] - before))
 
 
-_BAR = 12.0
-"""Width of the scale of colours in pixels at scale 1."""
-
-_BESIDE = 8.0
-"""Pixels between it and what is beside it."""
-
-_BORDER = 1.6
-"""Width of the borders of geodesic cells."""
-
-_HATCH = 5
-"""Pixels of the coarse picture from one slanted line to the next."""
+_BAR = 12.0  # width of the scale of colours in pixels at scale 1
+_BESIDE = 8.0  # pixels between it and what is beside it
+_BORDER = 1.6  # width of the borders of geodesic cells
+_HATCH = 5  # pixels of the coarse picture from one slanted line to the next
 
 
 class FieldPicture:

@@ -25,8 +25,7 @@ from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
 
-_OPACITY = {UNKNOWN: 0.28, PRESUMED: 0.45, WALL: 0.85}
-"""Of the colours of cells; free ones are clear."""
+_OPACITY = {UNKNOWN: 0.28, PRESUMED: 0.45, WALL: 0.85}  # of the colours of cells; free ones are clear
 
 
 def discovered_map(scene: Scene) -> DiscoveredMap | None:
@@ -71,20 +70,12 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     canvas.surface.blit(scaled, (left, top), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-_FINE = 2
-"""Scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer."""
-
+_FINE = 2  # scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer
+# least distance between rays in pixels at scale 1: nearer to the robot every second one is left out
 _RAY_GAP = 5.0
-"""Least distance between rays in pixels at scale 1: nearer to the robot every second one is left out."""
-
-_PALE = 0.3
-"""How much of its colour is left of an obstacle that nobody has sensed."""
-
-_DOT = 2.1
-"""Radius of a sensed point in pixels at scale 1."""
-
-_HIT = 1.5
-"""Radius of the end of a ray in pixels at scale 1."""
+_PALE = 0.3  # how much of its colour is left of an obstacle that nobody has sensed
+_DOT = 2.1  # radius of a sensed point in pixels at scale 1
+_HIT = 1.5  # radius of the end of a ray in pixels at scale 1
 
 
 def _dots(canvas: Canvas, centers: Array, radius: float, colour: Colour) -> None:

@@ -18,11 +18,9 @@ from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.scene import MovingObstacle, Scene
 from robocov_app.render.theme import Colour
 
-GRID_GAP = 34.0
-"""Least distance between the lines of the grid in pixels at scale 1."""
-
+GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
+# width of cells in pixels at scale 1 below which edges between them are not smooth: they hardly show
 NARROW = 20.0
-"""Width of cells in pixels at scale 1 below which edges between them are not smooth: they hardly show."""
 
 Legend: TypeAlias = Callable[[Scene], list[LegendEntry]]
 

@@ -10,8 +10,7 @@ from scipy.spatial import KDTree
 
 from robocov.arrays import Array
 
-_FEW = 120
-"""Up to so many points all pairs are looked at faster than a tree is built."""
+_FEW = 120  # up to so many points all pairs are looked at faster than a tree is built
 
 
 def nearest_distance(points: Array, step: int = 1) -> Array:

@@ -19,14 +19,9 @@ from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, Scene, are_centroids
 from robocov_app.render.theme import mix
 
-READABLE = 9.0
-"""Radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it."""
-
-SMALLEST_NUMBER = 6.6
-"""Least size of a robot's number in pixels at scale 1."""
-
-SMALLEST = 2.4
-"""Radius below which no robot is drawn in pixels at scale 1."""
+READABLE = 9.0  # radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it
+SMALLEST_NUMBER = 6.6  # least size of a robot's number in pixels at scale 1
+SMALLEST = 2.4  # radius below which no robot is drawn in pixels at scale 1
 
 
 def drawn_radii(canvas: Canvas, scene: Scene) -> Array:

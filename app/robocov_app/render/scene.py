@@ -22,8 +22,8 @@ from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 from robocov_app.render.distance_field import Field, Fields
 
+# metres within which a goal is the centroid: a record's goals are those of a moment before its end
 SAME = 0.05
-"""Metres within which a goal is the centroid: a record's goals are those of a moment before its end."""
 
 CENTROID, GOAL = "cell centroid", "goal"
 
@@ -34,11 +34,8 @@ def are_centroids(goals: Array, centroids: Array) -> bool:
     return bool((np.hypot(*(goals - centroids)[known].T) <= SAME).all())
 
 
-CELL = 0.05
-"""Points that a robot senses within the same square of so many metres count once."""
-
-MOST = 20_000
-"""More are not remembered."""
+CELL = 0.05  # points that a robot senses within the same square of so many metres count once
+MOST = 20_000  # more are not remembered
 
 
 class Sensed:

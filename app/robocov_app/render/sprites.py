@@ -16,17 +16,10 @@ from robocov_app.render.fonts import label
 from robocov_app.render.surface_cache import kept
 from robocov_app.render.theme import Colour, readable_on
 
-FINE = 4
-"""Each sprite is drawn so many times larger; also the number of shifts within a pixel."""
-
-LARGE = 60.0
-"""Radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes."""
-
-STROKE_FINE = 3
-"""The same for strokes, which may span the whole picture."""
-
-Pixel: TypeAlias = Sequence[float]
-"""x to the right and y down from the surface's corner."""
+FINE = 4  # each sprite is drawn so many times larger; also the number of shifts within a pixel
+LARGE = 60.0  # radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes
+STROKE_FINE = 3  # the same for strokes, which may span the whole picture
+Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface's corner
 
 
 class Sketch:

@@ -14,14 +14,9 @@ from robocov.errors import ParameterError, unknown_name
 if TYPE_CHECKING:
     from robocov.arrays import IntArray
 
-Colour: TypeAlias = tuple[int, int, int]
-"""Red, green, blue, 0 to 255."""
-
-ONE_HUE_EACH = 9
-"""Up to so many robots each have a hue of their own; no eye tells more hues apart."""
-
-MAP_COLOURS = 6
-"""Hues for larger teams, where only cells that share an edge must differ."""
+Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
+ONE_HUE_EACH = 9  # up to so many robots each have a hue of their own; no eye tells more hues apart
+MAP_COLOURS = 6  # hues for larger teams, where only cells that share an edge must differ
 
 
 def rgb(code: str) -> Colour:
@@ -66,14 +61,9 @@ def readable_on(colour: Colour) -> Colour:
 # far apart as tints of cells, where sand and olive would be one, and serve as map colours.
 _MUTED = ("CC6677", "88CCEE", "DDCC77", "44AA99", "332288", "AA4499", "117733", "882255", "999933")
 
-HEAT_LEVELS = 12
-"""Steps of the scale of colours of a grid of numbers."""
-
-_QUIET_PART = 0.55
-"""Of the scale of heat, so much is used for them: on all of it the ink can be read."""
-
-TRAIL_CONTRAST = 2.4
-"""Least contrast of a robot's trajectory with its own cell."""
+HEAT_LEVELS = 12  # steps of the scale of colours of a grid of numbers
+_QUIET_PART = 0.55  # of the scale of heat, so much is used for them: on all of it the ink can be read
+TRAIL_CONTRAST = 2.4  # least contrast of a robot's trajectory with its own cell
 
 
 @dataclass(frozen=True)

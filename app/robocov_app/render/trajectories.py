@@ -14,23 +14,13 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.sprites import Sketch
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
 
-PIECE = 2.0
-"""Pixels between the corners of a drawn trajectory."""
-
-SECTION = 16.0
-"""Pixels of path that are added to the page at once; what is newer is drawn anew each time."""
-
-CROWD = 400
-"""From so many robots on what is drawn anew is not smooth."""
-
-FADE_STEPS = 24
-"""Shades of a trajectory that fades; its page is drawn anew as often while it fades."""
-
+PIECE = 2.0  # pixels between the corners of a drawn trajectory
+SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
+CROWD = 400  # from so many robots on what is drawn anew is not smooth
+FADE_STEPS = 24  # shades of a trajectory that fades; its page is drawn anew as often while it fades
+# pixels at scale 1 that the fastest robot goes between the corners of trajectories that fade
 FADE_PIECE = 4.0
-"""Pixels at scale 1 that the fastest robot goes between the corners of trajectories that fade."""
-
-_FADE_FINE = 2
-"""They are drawn so many times larger, and shrunk."""
+_FADE_FINE = 2  # they are drawn so many times larger, and shrunk
 
 
 class Trajectories:

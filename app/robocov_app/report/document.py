@@ -29,8 +29,8 @@ from robocov_app.report.facts import (
 from robocov_app.report.groups import (
     MOST_RUNS,
     chosen,
+    compared_groups,
     comparisons,
-    contenders,
     pairs_words,
     setting_label,
     settings,
@@ -67,16 +67,14 @@ if TYPE_CHECKING:
     from robocov_app.report.plots import Looks
     from robocov_app.report.results import Result
 
-MOST_MAPS = 12
-"""Maps that are drawn."""
+MOST_MAPS = 12  # maps that are drawn
 
 LEDE_NOTE = (
     "By the mean distance to the nearest robot at the end, in pairs of runs from the same starts; "
     "ratios below 1 are in favour of the first, with 95 % intervals."
 )
 
-MOST_LETTERS = 40
-"""A longer word is cut, and stands whole in a tooltip."""
+MOST_LETTERS = 40  # a longer word is cut, and stands whole in a tooltip
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     """Return all that the page says of a result."""
     looks = styles(result)
     choice = chosen(result, MOST_RUNS, MOST_PANES)
-    compared = contenders(result)
+    compared = compared_groups(result)
     pairs = comparisons(compared.groups)
     costs = list(cost_plots(result, Curves(result), looks, f"{key}c"))
     maps = list(result.maps.values())

@@ -22,8 +22,7 @@ from robocov_app.render.density import shading
 from robocov_app.render.theme import DARK, LIGHT, mix
 from robocov_app.runs.saved import roster_of
 
-_DOTS = 80
-"""Dots along the longer side of a map."""
+_DOTS = 80  # dots along the longer side of a map
 
 
 def density_picture(environment: Environment) -> str:
@@ -52,20 +51,12 @@ def density_picture(environment: Environment) -> str:
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
-RATE = 5.0
-"""Moments of a run per simulated second, where there is room."""
-
-BUDGET = 1_500_000
-"""Bytes that runs of one page take together; beyond, they are embedded at a lower rate."""
-
-NONE = 65535
-"""Stands for a number that is not there."""
-
+RATE = 5.0  # moments of a run per simulated second, where there is room
+BUDGET = 1_500_000  # bytes that runs of one page take together; beyond, they are embedded at a lower rate
+NONE = 65535  # stands for a number that is not there
+# seconds between the first moment and the last, if there are no others, above which they tell no path
 SPARSE = 1.5
-"""Seconds between the first moment and the last, if there are no others, above which they tell no path."""
-
-_VERTICES = 4000
-"""Vertices of a map's obstacles above which they are simplified."""
+_VERTICES = 4000  # vertices of a map's obstacles above which they are simplified
 
 
 @dataclass(frozen=True, eq=False)

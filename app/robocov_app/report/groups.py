@@ -18,16 +18,18 @@ from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Result
 from robocov_app.sweep.study import parameter_text
 
+# controllers with their gains up to which each is shown apart; of more, each controller as a whole
 MOST_GROUPS = 8
-"""Controllers with their gains up to which each is shown apart; of more, each controller as a whole."""
 
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
-TUNED = " (tuned)"
-"""Stands behind a controller's label where its gains were chosen on other runs than these."""
+TUNED = " (tuned)"  # stands behind a controller's label where its gains were chosen on other runs than these
+_DIRECT = 12  # letters that a gain and its value may take in a label
 
-_DIRECT = 12
-"""Letters that a gain and its value may take in a label."""
+
+Gains: TypeAlias = tuple[tuple[str, Value], ...]
+
+Scales: TypeAlias = Mapping[tuple[object, ...], float]  # by setting, what costs are divided by
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ class Group:
 
     label: str
     controller: str
-    gains: tuple[tuple[str, Value], ...] | None
+    gains: Gains | None
     entries: tuple[Entry, ...]
 
     @cached_property
@@ -46,12 +48,7 @@ class Group:
 
     def at(self, setting: tuple[object, ...]) -> Group:
         """Return the part of the group in one setting."""
-        return Group(
-            self.label,
-            self.controller,
-            self.gains,
-            tuple(entry for entry in self.entries if entry.setting == setting),
-        )
+        return replace(self, entries=tuple(entry for entry in self.entries if entry.setting == setting))
 
 
 def variants(result: Result) -> list[Group]:
@@ -59,7 +56,7 @@ def variants(result: Result) -> list[Group]:
 
     Of a controller with several sets of gains, each is called by the one gain that differs, else by a letter.
     """
-    found: dict[str, dict[tuple[tuple[str, Value], ...], list[Entry]]] = {}
+    found: dict[str, dict[Gains, list[Entry]]] = {}
     for entry in result.fine:
         found.setdefault(entry.controller, {}).setdefault(entry.gains, []).append(entry)
     groups = {
@@ -70,7 +67,7 @@ def variants(result: Result) -> list[Group]:
     return [groups[key] for key in dict.fromkeys((entry.controller, entry.gains) for entry in result.fine)]
 
 
-def _suffixes(sets: Sequence[tuple[tuple[str, Value], ...]]) -> list[str]:
+def _suffixes(sets: Sequence[Gains]) -> list[str]:
     """Return what tells sets of gains of one controller apart."""
     if len(sets) == 1:
         return [""]
@@ -105,9 +102,8 @@ def by_controller(result: Result) -> list[Group]:
     groups = []
     for controller, entries in found.items():
         gains = {entry.gains for entry in entries}
-        groups.append(
-            Group(entries[0].label, controller, gains.pop() if len(gains) == 1 else None, tuple(entries))
-        )
+        one = gains.pop() if len(gains) == 1 else None
+        groups.append(Group(entries[0].label, controller, one, tuple(entries)))
     return groups
 
 
@@ -144,14 +140,16 @@ def medians(result: Result) -> dict[tuple[object, ...], float]:
     return {setting: float(np.median(values)) for setting, values in found.items()}
 
 
-def relative(group: Group, scales: Mapping[tuple[object, ...], float]) -> Array:
+def relative(entries: Iterable[Entry], scales: Scales) -> Array:
     """Return final mean distances as multiples of their settings' medians, (m,); only the finite ones."""
-    values = [
-        entry.final / scales[entry.setting]
-        for entry in group.entries
-        if np.isfinite(entry.final) and scales[entry.setting] > 0
-    ]
-    return np.array(values)
+    parts = np.array([_part(entry, scales) for entry in entries])
+    return np.asarray(parts[np.isfinite(parts)])
+
+
+def _part(entry: Entry, scales: Scales) -> float:
+    """Return a final mean distance as a multiple of its setting's median; inf where that is not known."""
+    scale = scales.get(entry.setting, 0.0)
+    return entry.final / scale if np.isfinite(entry.final) and scale > 0.0 else np.inf
 
 
 def dependences(result: Result) -> dict[str, list[str]]:
@@ -188,17 +186,10 @@ def _letters(number: int) -> str:
 
 Verdict: TypeAlias = Literal["better", "worse", "undecided"]
 
-MOST_COMPARED = 4
-"""Groups up to which each is compared with each; of more, each with the first."""
-
-MOST_SAID = 6
-"""Comparisons that the first words tell."""
-
-FEW_MAPS = 5
-"""A bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)."""
-
-NEGLIGIBLE = 0.001
-"""Part by which a cost has to differ to be called better or worse."""
+MOST_COMPARED = 4  # groups up to which each is compared with each; of more, each with the first
+MOST_SAID = 6  # comparisons that the first words tell
+FEW_MAPS = 5  # a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
+NEGLIGIBLE = 0.001  # part by which a cost has to differ to be called better or worse
 
 
 class MapPairs(NamedTuple):
@@ -245,14 +236,10 @@ class Comparison:
         counts = Counter(each.verdict for each in self.maps)
         total = len(self.maps)
         if len(counts) == 1:
-            return f"{self.maps[0].verdict} on " + (
-                {1: "the map", 2: "both maps"}.get(total, f"all {total} maps")
-            )
-        words: list[str] = []
-        for verdict in ("better", "worse", "undecided"):
-            if counts[verdict]:
-                words.append(f"{verdict} on {counts[verdict]}" + ("" if words else f" of {total} maps"))
-        return ", ".join(words)
+            where = {1: "the map", 2: "both maps"}.get(total, f"all {total} maps")
+            return f"{self.maps[0].verdict} on {where}"
+        words = [f"{name} on {counts[name]}" for name in ("better", "worse", "undecided") if counts[name]]
+        return ", ".join([f"{words[0]} of {total} maps", *words[1:]])
 
     def headline(self) -> str:
         """Return what came of it in a sentence that does not hide where maps disagree."""
@@ -260,19 +247,15 @@ class Comparison:
         ratio, total = self.ratio, len(self.maps)
         if total > 1:
             # an interval over a few maps would be narrow where those maps happen to agree
-            few = total < FEW_MAPS
-            told = (
-                f"{ratio.estimate:.3f} over {total} maps only"
-                if few
-                else f"{ratio_text(ratio)} over {total} maps"
-            )
-            return f"{names}: {self.tally()}; ratio {told}."
+            few = f"{ratio.estimate:.3f} over {total} maps only"
+            text = few if total < FEW_MAPS else f"{ratio_text(ratio)} over {total} maps"
+            return f"{names}: {self.tally()}; ratio {text}."
         if self.pairs == 1:
             return f"{names}: ratio {ratio_text(ratio)} in the only pair."
         return f"{names}: {self.maps[0].verdict}, ratio {ratio_text(ratio)} over {self.pairs} pairs."
 
 
-class Contenders(NamedTuple):
+class Compared(NamedTuple):
     """The groups that are compared, and how their gains were chosen, in words."""
 
     groups: list[Group]
@@ -317,7 +300,7 @@ def compared(first: Group, second: Group) -> Comparison | None:
     return Comparison(first, second, tuple(maps), ratio, len(a.keys() ^ b.keys()))
 
 
-def contenders(result: Result) -> Contenders:
+def compared_groups(result: Result) -> Compared:
     """Return the groups that are compared: variants of one controller, or controllers with fair gains.
 
     Where controllers have several sets of gains, those for a map are chosen on the other maps (on one map,
@@ -329,7 +312,7 @@ def contenders(result: Result) -> Contenders:
         by.setdefault(group.controller, []).append(group)
     if len(by) < 2 or len(by) == len(apart):
         words = "Every set of gains is compared by itself; none was chosen. " if len(by) < len(apart) else ""
-        return Contenders(apart, words)
+        return Compared(apart, words)
     several_maps = len({entry.map for entry in result.fine}) > 1
 
     def part_of(entry: Entry) -> object:
@@ -338,13 +321,12 @@ def contenders(result: Result) -> Contenders:
     parts = list(dict.fromkeys(part_of(entry) for entry in result.fine))
     if len(parts) < 2:
         words = "There is one case only, too few to choose gains fairly: the first of each take part. "
-        return Contenders([groups[0] for groups in by.values()], words)
-    scales, groups, told = medians(result), [], []
+        return Compared([groups[0] for groups in by.values()], words)
+    scales, groups, chosen_gains = medians(result), [], []
     costs: dict[object, list[tuple[object, float]]] = {}
     for entry in result.entries:
-        scale = scales.get(entry.setting, 0.0)
-        cost = entry.final / scale if np.isfinite(entry.final) and scale > 0.0 else np.inf
-        costs.setdefault((entry.controller, entry.gains), []).append((part_of(entry), cost))
+        cost = part_of(entry), _part(entry, scales)
+        costs.setdefault((entry.controller, entry.gains), []).append(cost)
     for controller, own in by.items():
         if len(own) == 1:
             groups += own
@@ -359,15 +341,15 @@ def contenders(result: Result) -> Contenders:
         label = own[0].entries[0].label + TUNED
         groups.append(Group(label, controller, None, tuple(entries)))
         counts = Counter(choices).most_common(3)
-        told.append(", ".join(f"{name} in {count} of {len(parts)}" for name, count in counts))
-    where = "map are those with the lowest median on the other maps"
-    if not several_maps:
-        where = "start and seed are those with the lowest median from the others"
-    return Contenders(
-        groups,
-        f"Tuned: of a controller with several sets of gains, those for a {where}, so that no run is compared "
-        f"on which its gains were chosen; a failed run counts as the worst. Chosen: {'; '.join(told)}. ",
+        chosen_gains.append(", ".join(f"{name} in {count} of {len(parts)}" for name, count in counts))
+    other = "median on the other maps" if several_maps else "median from the others"
+    words = (
+        f"Tuned: of a controller with several sets of gains, those for a "
+        f"{'map' if several_maps else 'start and seed'} are those with the lowest {other}, so that no run is "
+        f"compared on which its gains were chosen; a failed run counts as the worst. "
+        f"Chosen: {'; '.join(chosen_gains)}. "
     )
+    return Compared(groups, words)
 
 
 def pairs_words(found: Sequence[Comparison], chosen: str) -> str:
@@ -407,8 +389,7 @@ def _exp(effect: Interval) -> Interval:
     return Interval(float(np.exp(effect.estimate)), low, high)
 
 
-MOST_RUNS = 50
-"""Runs of a result that a page shows as pictures."""
+MOST_RUNS = 50  # runs of a result that a page shows as pictures
 
 
 class Choice(NamedTuple):
@@ -456,14 +437,13 @@ def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
     scales = medians(result)
     by: dict[str, list[tuple[float, Entry]]] = {}
     for entry in entries:
-        scale = scales.get(entry.setting, 0.0)
-        if np.isfinite(entry.final) and scale > 0:
-            by.setdefault(entry.controller, []).append((entry.final / scale, entry))
-    found = set()
+        if np.isfinite(part := _part(entry, scales)):
+            by.setdefault(entry.controller, []).append((part, entry))
+    found = set(_middle_case(_best_variants(result, entries), scales))
     for ranked in by.values():
         values = [value for value, _ in ranked]
         found |= {ranked[int(np.argmin(values))][1], ranked[int(np.argmax(values))][1]}
-    return found | set(_middle_case(_best_variants(result, entries), scales))
+    return found
 
 
 def _best_variants(result: Result, entries: Iterable[Entry], few: int = 0) -> list[Group]:
@@ -471,17 +451,17 @@ def _best_variants(result: Result, entries: Iterable[Entry], few: int = 0) -> li
     among = set(entries)
     groups = variants(result)
     if len(groups) > few:
-        groups = contenders(result).groups
+        groups = compared_groups(result).groups
     return [replace(group, entries=tuple(e for e in group.entries if e in among)) for group in groups]
 
 
-def _middle_case(groups: Sequence[Group], scales: Mapping[tuple[object, ...], float]) -> tuple[Entry, ...]:
+def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
     """Return the runs of the case whose ranks are nearest to the middle, of those that most groups have."""
     ranks: dict[tuple[object, ...], list[float]] = {}
     runs: dict[tuple[object, ...], list[Entry]] = {}
     for group in groups:
-        known = [entry for entry in group.entries if np.isfinite(entry.final) and scales[entry.setting] > 0]
-        order = sorted(known, key=lambda entry: entry.final / scales[entry.setting])
+        known = [entry for entry in group.entries if np.isfinite(_part(entry, scales))]
+        order = sorted(known, key=lambda entry: _part(entry, scales))
         for rank, entry in enumerate(order):
             ranks.setdefault(entry.case, []).append(abs(rank - (len(order) - 1) / 2) / len(order))
             runs.setdefault(entry.case, []).append(entry)

@@ -26,14 +26,10 @@ if TYPE_CHECKING:
     from robocov.metrics import CostHistory
     from robocov.record import Record
 
-_MARGIN = 3.0
-"""Pixels round the region."""
-
-_FINE = 0.2
-"""Pixels by which a line may be simplified."""
-
+_MARGIN = 3.0  # pixels round the region
+_FINE = 0.2  # pixels by which a line may be simplified
+# robots up to which cells and trajectories are drawn: a larger team would make too large a picture
 MOST_ROBOTS = 400
-"""Robots up to which cells and trajectories are drawn: a larger team would make too large a picture."""
 
 
 class Frame:

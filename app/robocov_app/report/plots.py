@@ -45,25 +45,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# the styles of a result's groups by label (`robocov_app.report.groups.styles`)
 Looks: TypeAlias = Mapping[str, CurveStyle]
-"""The styles of a result's groups by label (`robocov_app.report.groups.styles`)."""
-
-MOST_PANELS = 24
-"""Settings up to which each has panels of its own."""
-
-PANEL = 420, 290
-"""Of a panel in pixels; on a telephone it is shown a little smaller."""
+MOST_PANELS = 24  # settings up to which each has panels of its own
+PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 
 SCALE = 1.0
 
-_MOMENTS = 121
-"""Moments of a cost curve: one every three pixels."""
+_MOMENTS = 121  # moments of a cost curve: one every three pixels
 
 RELATIVE = "final distance / median of map and team"
 
 
-WIDE = 860, 360
-"""Of a plot that stands alone, on a screen that is wide enough."""
+WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
 
 
 class Plot(NamedTuple):
@@ -126,7 +120,7 @@ def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     every = settings(result)
     if len(every) > 1:
         scales = medians(result)
-        samples = [_sample(group, relative(group, scales)) for group in groups]
+        samples = [_sample(group, relative(group.entries, scales)) for group in groups]
         yield from _sample_plot("All maps and teams together", samples, looks, f"{key}-all", RELATIVE, "")
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
         samples = [_sample(group, group.at(setting).finals) for group in groups]
@@ -397,14 +391,9 @@ def _same(values: Array, level: float) -> BoolArray:
     return np.isnan(values) if np.isnan(level) else values == level
 
 
-MOST_MEASURED = 4
-"""Runs up to which they are measured: what is in sight takes a while to know."""
-
-MOST_ROBOTS = 60
-"""Robots up to which they are."""
-
-_MEASURED = 30
-"""Moments of a run, besides its first."""
+MOST_MEASURED = 4  # runs up to which they are measured: what is in sight takes a while to know
+MOST_ROBOTS = 60  # robots up to which they are
+_MEASURED = 30  # moments of a run, besides its first
 
 
 class _Panel(NamedTuple):

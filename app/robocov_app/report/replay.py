@@ -27,8 +27,7 @@ __all__ = [
     "script",
 ]
 
-MOST_PANES = 4
-"""Runs side by side."""
+MOST_PANES = 4  # runs side by side
 
 _SCRIPTS = ("data.js", "arena.js", "chart.js", "replay.js")
 

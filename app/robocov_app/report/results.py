@@ -27,8 +27,7 @@ from robocov_app.runs.saved import Saved, load_saved, roster_of
 from robocov_app.sweep.study import UNITS, parameter_column
 from robocov_app.sweep.table import gain_column
 
-RESTARTS = 24
-"""Searches of which the best counts."""
+RESTARTS = 24  # searches of which the best counts
 
 
 class Reference(NamedTuple):
@@ -84,11 +83,11 @@ def _reference(
 
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 
+# what is known of a run in numbers, by the names of the columns of a sweep's table
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
     *("contacts", "min_clearance_m", "path_length_m", "stuck_robots", "mean_time_s"),
 )
-"""What is known of a run in numbers, by the names of the columns of a sweep's table."""
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": Non
 _SPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 
-_MANY = 8
-"""So many equal round marks are drawn as one dotted line."""
+_MANY = 8  # so many equal round marks are drawn as one dotted line
 
 _NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from robocov.controllers.gains import value_text
+from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
+from robocov_app.figures.styles import CurveStyle
 from robocov_app.report.groups import (
     Comparison,
     Group,
@@ -22,24 +23,14 @@ from robocov_app.report.groups import (
     shown_groups,
     variants,
 )
-from robocov_app.report.results import RESTARTS
+from robocov_app.report.results import RESTARTS, Entry, Result
 
-if TYPE_CHECKING:
-    from robocov.controllers.gains import Value
-    from robocov_app.figures.styles import CurveStyle
-    from robocov_app.report.results import Entry, Result
+NOTHING = "–"  # stands where there is no number
+MOST_ROWS = 60  # runs up to which each has a row of its own
+MOST_SETS = 200  # sets of gains up to which they are listed
+MOST_SETTINGS = 40  # settings up to which the summary is told for each
 
-NOTHING = "–"
-"""Stands where there is no number."""
-
-MOST_ROWS = 60
-"""Runs up to which each has a row of its own."""
-
-MOST_SETS = 200
-"""Sets of gains up to which they are listed."""
-
-MOST_SETTINGS = 40
-"""Settings up to which the summary is told for each."""
+Styles: TypeAlias = dict[str, CurveStyle]
 
 
 class Cell(NamedTuple):
@@ -60,18 +51,24 @@ class Table:
     notes: tuple[str, ...] = ()
 
 
-def controllers_table(result: Result, styles: dict[str, CurveStyle]) -> Table:
+class Column(NamedTuple):
+    """A column of figures: its head, and its text of one or several runs."""
+
+    head: str
+    text: Callable[[Sequence[Entry]], str]
+
+
+def controllers_table(result: Result, styles: Styles) -> Table:
     """Return the controllers with their gains, or between which values these are."""
     groups = shown_groups(result)
     known = {group.controller for group in groups}
-    lost: dict[str, Group] = {}
-    for entry in result.failed:
-        if entry.controller not in known:
-            lost.setdefault(entry.controller, Group(entry.label, entry.controller, None, (entry,)))
-    return _gains_table("Controllers and their gains", [*groups, *lost.values()], result, styles)
+    lost = {e.controller: Group(e.label, e.controller, None, (e,)) for e in reversed(result.failed)}
+    order = dict.fromkeys(entry.controller for entry in result.failed if entry.controller not in known)
+    caption = "Controllers and their gains"
+    return _gains_table(caption, [*groups, *(lost[name] for name in order)], result, styles)
 
 
-def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
+def gains_table(result: Result, styles: Styles) -> Table | None:
     """Return all sets of gains by letters, None where `controllers_table` has them or they are many."""
     apart = variants(result)
     if len(apart) == len(shown_groups(result)) or len(apart) > MOST_SETS:
@@ -79,43 +76,42 @@ def gains_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
     return _gains_table("Sets of gains", apart, result, styles)
 
 
-def _gains_table(
-    caption: str, groups: Sequence[Group], result: Result, styles: dict[str, CurveStyle]
-) -> Table:
+def _gains_table(caption: str, groups: Sequence[Group], result: Result, styles: Styles) -> Table:
     rows = []
     for group in groups:
         gains = _ranges_text(group, result) if group.gains is None else gain_text(group.gains, result.units)
-        cells = Cell(group.label, styles[group.label]), Cell(group.controller), Cell(gains or NOTHING)
-        rows.append(cells)
+        rows.append((_name(group.label, styles), Cell(group.controller), Cell(gains or NOTHING)))
     return Table(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}))
 
 
-def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]:
+def summary_tables(result: Result, styles: Styles) -> list[Table]:
     """Return what came of each group, over everything and in each setting."""
-    groups = shown_groups(result)
-    every = settings(result)
+    groups, every = shown_groups(result), settings(result)
+    distance, over_run, *others = _figure_columns(result)
+    gap = [Column("Above J_ref, %", lambda own: _quartiles(_gaps(result, own), 1))] * bool(result.references)
+    settled = Column("Settled", _settled)
+
+    def table(caption: str, columns: Sequence[Column], parts: Sequence[Group], *notes: str) -> Table:
+        columns = [Column("Runs", lambda own: str(len(own))), *columns]
+        rows = [
+            (_name(part.label, styles), *(Cell(column.text(part.entries)) for column in columns))
+            for part in parts
+        ]
+        return Table(caption, ("Controller", *(column.head for column in columns)), rows, notes=notes)
+
     tables = []
-    timed = any(_known(entry, TIME) for entry in result.fine)
-    gap = ("Above J_ref, %",) if result.references else ()
-    whole = (*_HEAD[:3], *gap, *_HEAD[3:], *(("Mean time, s",) if timed else ()))
     if len(every) > 1:
         scales = medians(result)
-        rows = []
-        for group in groups:
-            row = _summary_row(result, group, styles, timed)
-            # metres of different maps have no common median
-            parted = Cell(_quartiles(relative(group, scales).tolist(), 3))
-            rows.append((*row[:2], parted, *row[3 : 3 + len(gap)], *row[4 + len(gap) :]))
-        head = (*whole[:2], "Mean distance / median", *gap, *whole[4 + len(gap) :])
+        # metres of different maps have no common median
+        parted = Column("Mean distance / median", lambda own: _quartiles(relative(own, scales).tolist(), 3))
         note = (
             "Mean distance / median: divided by the median over all runs on the same map with the same team."
         )
-        tables.append(Table("All maps and teams together", head, rows, notes=(note,)))
+        tables.append(table("All maps and teams together", [parted, *gap, settled, *others], groups, note))
     for setting in every if len(every) <= MOST_SETTINGS else ():
-        parts = [group.at(setting) for group in groups]
-        rows = [_summary_row(result, part, styles, timed) for part in parts if part.entries]
         caption = setting_label(result, setting) if len(every) > 1 else "Final figures"
-        tables.append(Table(caption, whole, rows))
+        parts = [part for part in (group.at(setting) for group in groups) if part.entries]
+        tables.append(table(caption, [distance, *gap, over_run, settled, *others], parts))
     if tables and any(len(group.entries) > 1 for group in groups):
         note = (
             "Of several runs: the median, and quartiles in brackets; contacts: runs in which a robot touched "
@@ -131,23 +127,51 @@ def summary_tables(result: Result, styles: dict[str, CurveStyle]) -> list[Table]
     return tables
 
 
-TIME = "mean_time_s"
-"""Known where robots are not equally fast."""
+def runs_table(result: Result, styles: Styles) -> Table | None:
+    """Return every run in a row of its own, None where they are too many."""
+    if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
+        return None  # too many, or the summary tells all of them
+    columns = _figure_columns(result, unsettled="no")
+    rows = []
+    for group in variants(result):
+        for entry in group.entries:
+            where = setting_label(result, entry.setting), entry.start or NOTHING
+            texts = *where, NOTHING if entry.seed is None else str(entry.seed)
+            figures = (column.text([entry]) for column in columns)
+            rows.append((entry, (_name(group.label, styles), *map(Cell, (*texts, *figures)))))
+    order = {entry: number for number, entry in enumerate(result.fine)}
+    rows.sort(key=lambda row: order[row[0]])
+    head = ("Controller", "Map", "Start", "Seed", *(column.head for column in columns))
+    return Table("Every run", head, [row for _, row in rows], frozenset({1, 2}))
 
-_HEAD = (
-    *("Controller", "Runs", "Mean distance, m", "Over the run, m", "Settled", "Settled at, s"),
-    *("Contacts", "Clearance, m", "Path, m", "Stuck robots"),
-)
+
+def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
+    """Return the columns of figures; the time to come is known where robots are not equally fast."""
+
+    def spread(name: str, decimals: int, nothing: str = NOTHING) -> Callable[[Sequence[Entry]], str]:
+        return lambda entries: _quartiles(_values(entries, name), decimals, nothing)
+
+    timed = any(_known(entry, "mean_time_s") for entry in result.fine)
+    return [
+        Column("Mean distance, m", spread("mean_distance_m", 3)),
+        Column("Over the run, m", spread("mean_distance_over_run_m", 3)),
+        Column("Settled at, s", spread("settled_at_s", 1, unsettled)),
+        Column("Contacts", _contacts),
+        Column("Clearance, m", _clearance),
+        Column("Path, m", spread("path_length_m", 2)),
+        Column("Stuck robots", _stuck),
+        *([Column("Mean time, s", spread("mean_time_s", 3))] if timed else []),
+    ]
 
 
-def pairs_table(comparisons: Sequence[Comparison], styles: dict[str, CurveStyle]) -> Table:
+def pairs_table(comparisons: Sequence[Comparison], styles: Styles) -> Table:
     """Return how the groups compare over maps, one row a comparison."""
     rows = []
     for each in comparisons:
         lower = sum(int((own.a < own.b).sum()) for own in each.maps)
-        names = Cell(each.first.label, styles[each.first.label]), Cell(each.second.label)
         words = each.tally() if each.pairs > 1 else "one pair only"
-        rows.append((*names, Cell(ratio_text(each.ratio)), Cell(words), Cell(f"{lower} of {each.pairs}")))
+        texts = each.second.label, ratio_text(each.ratio), words, f"{lower} of {each.pairs}"
+        rows.append((_name(each.first.label, styles), *map(Cell, texts)))
     head = ("First", "Second", "Ratio", "First is", "First is lower in")
     return Table("Final mean distance of the first by that of the second", head, rows, frozenset({1, 3}))
 
@@ -157,63 +181,26 @@ def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
     head = ("Map", "Pairs", "First, m", "Second, m", "Ratio", "First is", "First is lower in")
     tables = []
     for each in comparisons:
-        if len(each.maps) < 2:
-            continue
         rows = []
         for own in each.maps:
-            means = [Cell(f"{np.mean(values):.3f}") for values in (own.a, own.b)]
+            means = [f"{np.mean(values):.3f}" for values in (own.a, own.b)]
             lower = f"{int((own.a < own.b).sum())} of {len(own.a)}"
-            how = Cell(ratio_text(own.ratio)), Cell(own.verdict), Cell(lower)
-            rows.append((Cell(own.name), Cell(str(len(own.a))), *means, *how))
-        tables.append(Table(each.label, head, rows, frozenset({5})))
+            texts = own.name, str(len(own.a)), *means, ratio_text(own.ratio), own.verdict, lower
+            rows.append(tuple(map(Cell, texts)))
+        if len(rows) > 1:
+            tables.append(Table(each.label, head, rows, frozenset({5})))
     return tables
 
 
-def runs_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
-    """Return every run in a row of its own, None where they are too many."""
-    if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
-        return None  # too many, or the summary tells all of them
-    labels = {entry: group.label for group in variants(result) for entry in group.entries}
-    timed = any(_known(entry, TIME) for entry in result.fine)
-    rows = []
-    for entry in result.fine:
-        figures = entry.figures
-        rows.append(
-            (
-                Cell(labels[entry], styles[labels[entry]]),
-                Cell(setting_label(result, entry.setting)),
-                Cell(entry.start or NOTHING),
-                Cell(NOTHING if entry.seed is None else str(entry.seed)),
-                Cell(_decimals(figures.get("mean_distance_m"), 3)),
-                Cell(_decimals(figures.get("mean_distance_over_run_m"), 3)),
-                Cell(_decimals(figures.get("settled_at_s"), 1, "no")),
-                Cell(_decimals(figures.get("contacts"), 0)),
-                Cell(_decimals(figures.get("min_clearance_m"), 3)),
-                Cell(_decimals(figures.get("path_length_m"), 2)),
-                Cell(_decimals(figures.get("stuck_robots"), 0)),
-                *([Cell(_decimals(figures.get(TIME), 3))] if timed else []),
-            )
-        )
-    head = ("Controller", "Map", "Start", "Seed", *_HEAD[2:4], "Settled at, s", "Contacts", *_HEAD[7:])
-    whole = (*head, "Mean time, s") if timed else head
-    return Table("Every run", whole, rows, frozenset({1, 2}))
-
-
-def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | None:
+def failures_table(result: Result, styles: Styles) -> Table | None:
     """Return the runs that failed, each with its error, and those that cannot be read; None without any."""
-    rows: list[tuple[Cell, ...]] = [
-        (
-            Cell(entry.label, styles[entry.label]),
-            Cell(setting_label(result, entry.setting)),
-            Cell(f"{entry.start}, {entry.seed}"),
-            Cell(gain_text(entry.gains, result.units)),
-            Cell(entry.error or ""),
-        )
-        for entry in result.failed
-    ]
+    rows: list[tuple[Cell, ...]] = []
+    for entry in result.failed:
+        gains = gain_text(entry.gains, result.units)
+        texts = setting_label(result, entry.setting), f"{entry.start}, {entry.seed}", gains, entry.error or ""
+        rows.append((_name(entry.label, styles), *map(Cell, texts)))
     # what cannot be read is known by its folder alone
-    nothing = [Cell(NOTHING)] * 3
-    rows += [(Cell(each.folder), *nothing, Cell(each.reason)) for each in result.damaged]
+    rows += [tuple(map(Cell, (each.folder, *3 * [NOTHING], each.reason))) for each in result.damaged]
     if not rows:
         return None
     left = len(rows) - MOST_ROWS
@@ -222,25 +209,8 @@ def failures_table(result: Result, styles: dict[str, CurveStyle]) -> Table | Non
     return Table("Runs that failed or cannot be read", head, rows[:MOST_ROWS], frozenset({1, 2, 3, 4}), notes)
 
 
-def _summary_row(
-    result: Result, group: Group, styles: dict[str, CurveStyle], timed: bool
-) -> tuple[Cell, ...]:
-    entries = group.entries
-    settled = [e for e in entries if _known(e, "settled_at_s")]
-    return (
-        Cell(group.label, styles[group.label]),
-        Cell(str(len(entries))),
-        Cell(_spread(entries, "mean_distance_m", 3)),
-        *([Cell(_quartiles(_gaps(result, entries), 1))] if result.references else []),
-        Cell(_spread(entries, "mean_distance_over_run_m", 3)),
-        Cell(_share(len(settled), len(entries))),
-        Cell(_spread(settled, "settled_at_s", 1)),
-        Cell(_contacts(entries)),
-        Cell(_least(entries, "min_clearance_m")),
-        Cell(_spread(entries, "path_length_m", 2)),
-        Cell(_stuck(entries)),
-        *([Cell(_spread(entries, TIME, 3))] if timed else []),
-    )
+def _name(label: str, styles: Styles) -> Cell:
+    return Cell(label, styles[label])
 
 
 def _gaps(result: Result, entries: Sequence[Entry]) -> list[float]:
@@ -257,28 +227,18 @@ def _values(entries: Sequence[Entry], name: str) -> list[float]:
     return [float(entry.figures[name] or 0.0) for entry in entries if _known(entry, name)]
 
 
-def _spread(entries: Sequence[Entry], name: str, decimals: int) -> str:
-    return _quartiles(_values(entries, name), decimals)
-
-
-def _quartiles(values: Sequence[float], decimals: int) -> str:
+def _quartiles(values: Sequence[float], decimals: int, nothing: str = NOTHING) -> str:
     """Return the median with the quartiles, of a single value the value."""
     if not values:
-        return NOTHING
+        return nothing
     low, middle, high = np.percentile(values, [25, 50, 75])
     text = f"{middle:.{decimals}f}"
     return text if len(values) == 1 else f"{text} ({low:.{decimals}f}–{high:.{decimals}f})"
 
 
-def _least(entries: Sequence[Entry], name: str) -> str:
-    values = _values(entries, name)
-    return _signed(f"{min(values):.3f}") if values else NOTHING
-
-
-def _share(count: int, total: int) -> str:
-    if total == 1:
-        return "yes" if count else "no"
-    return f"{count} of {total}"
+def _settled(entries: Sequence[Entry]) -> str:
+    count = len(_values(entries, "settled_at_s"))
+    return f"{count} of {len(entries)}" if len(entries) > 1 else "yes" if count else "no"
 
 
 def _contacts(entries: Sequence[Entry]) -> str:
@@ -288,20 +248,18 @@ def _contacts(entries: Sequence[Entry]) -> str:
     return f"{sum(value > 0 for value in values)} of {len(values)}" if values else NOTHING
 
 
+def _clearance(entries: Sequence[Entry]) -> str:
+    """Return the least gap, its minus as wide as a digit; none before nothing but zeros."""
+    values = _values(entries, "min_clearance_m")
+    number = f"{min(values):.3f}" if values else NOTHING
+    return number.replace("-", "\u2212" if number.strip("-0.") else "")
+
+
 def _stuck(entries: Sequence[Entry]) -> str:
     values = _values(entries, "stuck_robots")
     if not values:
         return NOTHING
     return f"{values[0]:.0f}" if len(entries) == 1 else f"{np.mean(values):.2g} per run"
-
-
-def _signed(number: str) -> str:
-    """Return a number with a minus that is as wide as a digit, and none before nothing but zeros."""
-    return number.replace("-", "\u2212" if number.strip("-0.") else "")
-
-
-def _decimals(value: Any, decimals: int, nothing: str = NOTHING) -> str:
-    return nothing if value is None or not np.isfinite(value) else _signed(f"{value:.{decimals}f}")
 
 
 def _ranges_text(group: Group, result: Result) -> str:
@@ -312,19 +270,15 @@ def _ranges_text(group: Group, result: Result) -> str:
             values.setdefault(name, []).append(value)
     parts = []
     for name, every in values.items():
-        if any(isinstance(value, str) for value in every):
-            parts.append(f"{name} {' or '.join(dict.fromkeys(map(value_text, every)))}")
-            continue
         finite = [value for value in every if isinstance(value, int | float)]
-        unit = result.units.get(name, "")
-        if not finite:
-            parts.append(f"{name} none")
-        elif min(finite) == max(finite) and len(finite) == len(every):
-            parts.append(f"{name} {finite[0]:.6g} {unit}".rstrip())
-        else:
-            also = " or none" if len(finite) < len(every) else ""
-            span = (
-                f"{min(finite):.4g} to {max(finite):.4g}" if min(finite) < max(finite) else f"{finite[0]:.6g}"
-            )
-            parts.append(f"{name} {span} {unit}".rstrip() + also)
+        words = [value for value in every if isinstance(value, str)]
+        span, also = "none", ""
+        if words:
+            span = " or ".join(dict.fromkeys(map(value_text, every)))
+        elif finite:
+            one = min(finite) == max(finite)
+            unit = result.units.get(name, "")
+            span = f"{finite[0]:.6g}" if one else f"{min(finite):.4g} to {max(finite):.4g}"
+            span, also = f"{span} {unit}".rstrip(), " or none" if len(finite) < len(every) else ""
+        parts.append(f"{name} {span}{also}")
     return ", ".join(parts)

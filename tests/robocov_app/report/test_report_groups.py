@@ -84,7 +84,7 @@ def test_relative_costs_do_not_depend_on_the_size_of_a_map(finals, factor) -> No
     large = [entry(seed=k, final=value * factor, map_name="large") for k, value in enumerate(finals)]
     result = result_of([*small, *large])
     (group,) = variants(result)
-    values = relative(group, medians(result))
+    values = relative(group.entries, medians(result))
     assert values[: len(finals)] == pytest.approx(values[len(finals) :])
     assert np.median(values) == pytest.approx(1.0)
 

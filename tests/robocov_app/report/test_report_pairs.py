@@ -5,11 +5,11 @@ import pytest
 from reported_results import entry, result_of
 
 from robocov_app.figures.statistics import bootstrap, mean_with_t_interval
-from robocov_app.report.groups import comparisons, contenders, pairs_words
+from robocov_app.report.groups import compared_groups, comparisons, pairs_words
 
 
 def found(entries):
-    return comparisons(contenders(result_of(entries)).groups)
+    return comparisons(compared_groups(result_of(entries)).groups)
 
 
 def maps_of(ratios: dict[str, float], seeds: int = 4, noise: float = 0.01):
@@ -134,13 +134,13 @@ def test_which_gains_were_chosen_is_told_and_failed_runs_count_as_the_worst() ->
                 for k, cost, bad in gains
             ]
             entries.append(entry("rpf", seed, 2.0, map_name=f"m{m}"))
-    groups, words = contenders(result_of(entries))
+    groups, words = compared_groups(result_of(entries))
     assert [group.label for group in groups] == ["RAPF (tuned)", "RPF"]
     assert {dict(each.gains)["k"] for each in groups[0].entries} == {2.0}
     assert "on the other maps" in words and "Chosen: RAPF k 2 in 3 of 3." in words
     one = [each for each in entries if each.map == "m0"]
-    assert "lowest median from the others" in contenders(result_of(one)).words
-    single = contenders(result_of([each for each in one if each.seed == 2]))
+    assert "lowest median from the others" in compared_groups(result_of(one)).words
+    single = compared_groups(result_of([each for each in one if each.seed == 2]))
     assert "too few to choose gains fairly" in single.words
 
 
@@ -148,5 +148,5 @@ def test_gains_of_a_single_controller_are_compared_each_by_itself() -> None:
     entries = [
         entry(seed=s, final=1.0 + k + 0.1 * s, gains=(("k", k),)) for s in range(3) for k in (1.0, 2.0)
     ]
-    groups, words = contenders(result_of(entries))
+    groups, words = compared_groups(result_of(entries))
     assert [group.label for group in groups] == ["RAPF k 1", "RAPF k 2"] and "none was chosen" in words

@@ -8,7 +8,7 @@ from reported_results import entry, result_of
 
 from robocov.errors import counted
 from robocov_app.report.facts import facts, gaps, lede, meanings, run_facts, run_title, title_of, troubles
-from robocov_app.report.groups import comparisons, contenders, styles
+from robocov_app.report.groups import compared_groups, comparisons, styles
 from robocov_app.report.results import Damaged, Reference
 from robocov_app.report.tables import (
     MOST_ROWS,
@@ -145,7 +145,7 @@ def test_pairs_are_told_over_maps_and_map_by_map() -> None:
         for name, base in (("rapf", 1.0 + 2.0 * m), ("rpf", 2.0))
     ]
     result = result_of(entries)
-    found = comparisons(contenders(result).groups)
+    found = comparisons(compared_groups(result).groups)
     table = pairs_table(found, styles(result))
     assert column(table, "First is") == ["better on 1 of 2 maps, worse on 1"]
     assert column(table, "First is lower in") == ["8 of 16"]
@@ -154,7 +154,7 @@ def test_pairs_are_told_over_maps_and_map_by_map() -> None:
     (by_map,) = map_pairs_tables(found)
     assert column(by_map, "Map") == ["m0", "m1"] and column(by_map, "First is") == ["better", "worse"]
     assert column(by_map, "First, m") == ["1.035", "3.105"] and column(by_map, "Pairs") == ["8", "8"]
-    one = comparisons(contenders(result_of(entries[:2])).groups)
+    one = comparisons(compared_groups(result_of(entries[:2])).groups)
     assert column(pairs_table(one, styles(result)), "First is") == ["one pair only"]
     assert map_pairs_tables(one) == []
 
@@ -193,7 +193,7 @@ def test_how_far_runs_stay_above_the_reference_is_told_where_it_is_known() -> No
 )
 def test_the_first_words(result, title, words) -> None:
     assert title_of(result) == title
-    assert lede(result, comparisons(contenders(result).groups)) == [words]
+    assert lede(result, comparisons(compared_groups(result).groups)) == [words]
 
 
 def test_what_is_missing_or_failed_is_said_first() -> None:
