@@ -22,6 +22,7 @@ from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
 SIZE = (900, 600)
@@ -98,8 +99,12 @@ class Driver:
 
     def __init__(self, window: Window) -> None:
         self.window = window
-        self.desk, self.session = window.desk, window.desk.session
+        self.desk = window.desk
         self.at = (5, 5)
+
+    @property
+    def session(self) -> Session:
+        return self.desk.session
 
     def frames(self, count: int = 1, seconds: float = FRAME) -> None:
         for _ in range(count):

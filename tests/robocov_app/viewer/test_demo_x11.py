@@ -31,7 +31,10 @@ def display() -> Iterator[str]:
 def shown(display: str, folder: Path, *words: str) -> Iterator[Hands]:
     command = [*COMMAND, "demo", "square", "--folder", str(folder), "--size", f"{SIZE[0]}x{SIZE[1]}"]
     options = ["--scale", "1", "--lattice", "16", "--robots", "3", "--paused", *words]
-    with run_window(display, folder, [*command, *options], **{FOLDER: str(folder / "settings")}) as hands:
+    settings = folder / "settings"
+    settings.mkdir(exist_ok=True)
+    (settings / "window.json").write_text("{}")  # not the first start, at which the lesson is offered
+    with run_window(display, folder, [*command, *options], **{FOLDER: str(settings)}) as hands:
         yield hands
 
 
