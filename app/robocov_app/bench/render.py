@@ -19,6 +19,7 @@ from robocov_app.bench.measure import Case, InTurn, Parameters, Row
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.film import iter_frames
+from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import png_bytes, save_film
 
 SIZE = (1280, 720)
@@ -51,12 +52,13 @@ def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
 
 def _films(quick: bool) -> Iterator[Row]:
     record = _travelled("rooms", 6)
+    look = FilmOptions(colours="robots")
     shown = np.linspace(0, len(record) - 1, 60 if quick else 240).astype(np.intp)
-    frames = list(iter_frames(record, size=SIZE, rows=shown))
+    frames = list(iter_frames(record, look, size=SIZE, rows=shown))
     with tempfile.TemporaryDirectory() as folder:
         film = Path(folder) / "film.mp4"
         calls = {
-            "draw": lambda: list(iter_frames(record, size=SIZE, rows=shown)),
+            "draw": lambda: list(iter_frames(record, look, size=SIZE, rows=shown)),
             "film": lambda: save_film(film, frames),
             "png": lambda: [png_bytes(frame) for frame in frames],
         }

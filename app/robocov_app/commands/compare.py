@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
@@ -13,7 +13,7 @@ from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.runs.run import Run
+    from robocov.environment import Environment
 
 
 @dataclass
@@ -33,20 +33,9 @@ class Arguments(RunOptions):
 
 def command(options: Arguments) -> int:
     """Run every controller, then draw them together."""
-    from robocov.compiled import compile_kernels
-    from robocov.files.result_folder import results
     from robocov.mapfile import load_map
-    from robocov_app.runs.compare import (
-        begin_comparison,
-        folder_names,
-        gains_for,
-        rows_of,
-        save_comparison,
-    )
-    from robocov_app.runs.cost import built_cost
-    from robocov_app.runs.film import check_layers, save_moving
-    from robocov_app.runs.run import saved_run
-    from robocov_app.terminal.interruption import Interruption
+    from robocov_app.runs.artifacts import gains_for, performed, rows_of
+    from robocov_app.runs.saved import folder_names
     from robocov_app.terminal.output import finite, listed
 
     names = options.controllers
@@ -58,43 +47,30 @@ def command(options: Arguments) -> int:
     # everything that the user gave is checked before a folder is made
     environment = load_map(options.map)
     specs = [options.spec(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)]
-    check_layers(options)
+    options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
-    compile_kernels()
-    cost = built_cost(environment, options.lattice, quiet=options.json)
-    runs: dict[str, Run] = {}
-    parts = folder_names(names)
-    with (
-        results(out, "comparison", overwrite=options.overwrite, parts=parts) as result,
-        Interruption() as stop,
-    ):
-        begin_comparison(result.new, parts)
-        for spec, part in zip(specs, parts, strict=True):
-            runs[part] = saved_run(spec, cost, result, part, options, stop)
-            if stop.requested:
-                break
-        save_comparison(runs, cost, result.new, options)
-        result.keep()
-        save_moving(list(runs.values()), cost, result.new, options, stop)
+    runs, stopped = performed(
+        dict(zip(folder_names(names), specs, strict=True)), out, options, comparison=True
+    )
+    rows = rows_of(runs)
     if options.json:
-        print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, "runs": rows_of(runs)})))
+        print(json.dumps(finite({"out": str(out), "interrupted": stopped, "runs": rows})))
     else:
-        print_table(runs)
-        done = "stopped; what was done is in" if stop.requested else "saved in"
+        print_rows(rows, next(iter(runs.values())).record.environment)
+        done = "stopped; what was done is in" if stopped else "saved in"
         print(f"{done} {out}/: {listed(out)}{options.record_words}")
-    return INTERRUPTED if stop.requested else 0
+    return INTERRUPTED if stopped else 0
 
 
-def print_table(runs: dict[str, Run]) -> None:
+def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
     """Print the comparison for people."""
     from robocov_app.render.density import weighed_lines
-    from robocov_app.runs.compare import rows_of
     from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
-    timed = all(run.history.mean_time is not None for run in runs.values())
+    timed = all("mean_time_s" in row for row in rows)
     titles = ["mean distance", *(["mean time"] if timed else []), "above best"]
     titles += ["cost", "settled", "contacts", "clearance", "path"]
-    rows = (
+    cells = (
         (
             row["label"],
             f"{row['mean_distance_m']:.3f} m",
@@ -106,8 +82,8 @@ def print_table(runs: dict[str, Run]) -> None:
             f"{row['min_clearance_m']:.3f} m",
             f"{row['mean_path_length_m']:.2f} m",
         )
-        for row in rows_of(runs)
+        for row in rows
     )
-    print_table([("", BOLD), *((title, RIGHT) for title in titles)], rows)
-    for line in weighed_lines(next(iter(runs.values())).record.environment):
+    print_table([("", BOLD), *((title, RIGHT) for title in titles)], cells)
+    for line in weighed_lines(environment):
         print(line)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from robocov.errors import InputError, ParameterError, listed
-from robocov_app.runs.options import RunOptions
+from robocov_app.runs.options import FilmOptions
 from robocov_app.terminal.arguments import window_size
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.runs.run import Run
     from robocov_app.runs.saved import Saved
-    from robocov_app.terminal.interruption import Interruption
     from robocov_app.viewer.session.session import Session
 
 
@@ -42,33 +40,15 @@ class Arguments:
     """The folder of a run or a comparison."""
     controller: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE.py:Class ...")] = ()
     """Controllers of your own that may be loaded to go on with their runs in the window."""
-    frames: bool = False
-    """Save every film frame as a PNG, and open no window."""
-    video: bool = False
-    """Save a film (H.264, MP4), and open no window."""
     out: Path | None = None
     """Folder for frames and film."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
-    fps: int = 30
-    """Film frames per second."""
-    film_speed: float = 4.0
-    """Simulated seconds per second of film."""
-    theme: Literal["light", "dark"] | None = None
-    """Colours; by default light in films, and in the window as the last time."""
-    colours: Literal["paper", "robots"] = "paper"
-    """Trajectories in films in the paper's red, or a colour for each robot."""
-    show: tuple[str, ...] = ()
-    """Layers to show besides the usual ones: distances, geodesic-cells, ..."""
-    hide: tuple[str, ...] = ()
-    """Layers not to show, as in --hide cells centroids."""
-    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size in pixels of the film or the window."""
+    film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
     json: bool = False
     """Print one JSON object and nothing else; with --frames or --video."""
 
     def __post_init__(self) -> None:
-        self.film()
         if self.headless and self.out is None:
             raise ParameterError("--out: a folder for frames and film was wanted")
         if self.headless and self.controller:
@@ -77,25 +57,19 @@ class Arguments:
             for name, given in (("--out", self.out is not None), ("--json", self.json)):
                 if given:
                     raise ParameterError(f"{name}: --frames or --video was wanted beside it")
-            window_size(self.size)
+            window_size(self.film.size)
 
     @property
     def headless(self) -> bool:
-        """Whether no window is wanted."""
-        return self.frames or self.video
-
-    def film(self) -> RunOptions:
-        """Return what `robocov run` would be told for such a film."""
-        same = ("frames", "video", "fps", "film_speed", "colours", "show", "hide", "size", "json")
-        return RunOptions(theme=self.theme or "light", **{name: getattr(self, name) for name in same})
+        """Whether frames or a film are wanted, and no window."""
+        return self.film.frames or self.film.video
 
 
 def command(options: Arguments) -> int:
     """Open the window, or make frames and a film."""
-    from robocov_app.runs.film import check_layers
     from robocov_app.runs.saved import load_saved
 
-    check_layers(options.film())
+    options.film.layers()
     story = options.run / "session.robocov" if (options.run / "story.json").is_file() else options.run
     if story.suffix == ".robocov":
         return told(options, story)
@@ -141,19 +115,20 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
 def shown(options: Arguments, session: Session, file: Path | None = None) -> int:
     """Open the window with a session, and the file that it is from."""
     from robocov.mapfile import bundled_maps, load_map
-    from robocov_app.render.picture import checked_layers
     from robocov_app.viewer.opening import NO_DISPLAY, Opening
 
     same = (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
+    film = options.film
+    also, without = film.layers()
     opening = Opening(
         session,
         name,
         Path(),
-        theme=options.theme,
-        size=window_size(options.size),
-        also=checked_layers("--show", options.show),
-        without=checked_layers("--hide", options.hide),
+        theme=film.theme,
+        size=window_size(film.size),
+        also=also,
+        without=without,
         laws=options.controller,
         file=file,
     )
@@ -169,47 +144,32 @@ def shown(options: Arguments, session: Session, file: Path | None = None) -> int
 
 def filmed(options: Arguments, saved: list[Saved]) -> int:
     """Make frames and a film of saved runs."""
+    import numpy as np
+
     from robocov.files.result_folder import results
+    from robocov.metrics import CostHistory
+    from robocov_app.runs.film import save_moving
+    from robocov_app.runs.run import Run
+    from robocov_app.runs.saved import roster_of
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import listed, write_json
 
     out = options.out
     assert out is not None
-    _spare(out, options.run, saved)
+    for folder in (options.run, *(each.folder for each in saved)):  # no run is replaced by its own film
+        if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
+            raise InputError(f"--out: {out}: another folder than that of the run was wanted")
+    runs = [Run(each.record, each.history or CostHistory(*np.empty((4, 0))), {}) for each in saved]
+    # robots may have failed at other places in each run: distances are to one map, that without them
+    bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
     with results(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
         content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
         write_json(result.new / "replay.json", content)
-        _save_moving(options.film(), saved, result.new, stop)
+        same = bare if len(runs) > 1 else None
+        save_moving(runs, None, result.new, options.film, stop, quiet=options.json, bare=same)
     if options.json:
         print(json.dumps({"out": str(out), "interrupted": stop.requested}))
     else:
         done = "stopped; what was done is in" if stop.requested else "saved in"
         print(f"{done} {out}/: {listed(out)}")
     return INTERRUPTED if stop.requested else 0
-
-
-def _spare(out: Path, source: Path, saved: list[Saved]) -> None:
-    """Make sure that no saved run is replaced by its own film."""
-    target = os.path.realpath(out)
-    for folder in (source, *(each.folder for each in saved)):
-        if Path(os.path.realpath(folder)).is_relative_to(target):
-            raise InputError(f"--out: {out}: another folder than that of the run was wanted")
-
-
-def _save_moving(options: RunOptions, saved: list[Saved], out: Path, stop: Interruption) -> None:
-    from robocov_app.runs.film import save_moving
-    from robocov_app.runs.saved import roster_of
-
-    runs = [_run_of(each) for each in saved]
-    # robots may have failed at other places in each run: distances are to one map, that without them
-    bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
-    save_moving(runs, None, out, options, stop, bare=bare if len(runs) > 1 else None)
-
-
-def _run_of(saved: Saved) -> Run:
-    import numpy as np
-
-    from robocov.metrics import CostHistory
-    from robocov_app.runs.run import Run
-
-    return Run(saved.record, saved.history or CostHistory(*np.empty((4, 0))), {})

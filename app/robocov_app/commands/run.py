@@ -37,37 +37,26 @@ class Arguments(RunOptions):
 
 def command(options: Arguments) -> int:
     """Simulate, evaluate, save and draw."""
-    from robocov.compiled import compile_kernels
-    from robocov.files.result_folder import results
-    from robocov.mapfile import load_map
-    from robocov_app.runs.compare import folder_names
-    from robocov_app.runs.cost import built_cost
-    from robocov_app.runs.film import check_layers, save_moving
-    from robocov_app.runs.run import save_pictures, saved_run
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.terminal.output import finite, listed
-
     if options.map.endswith(".robocov"):
         return remade(options)
+    from robocov.mapfile import load_map
+    from robocov_app.runs.artifacts import performed
+    from robocov_app.runs.saved import folder_names
+    from robocov_app.terminal.output import finite, listed
+
     # everything that the user gave is checked before a folder is made
-    gains = parsed_gains(options.gains)
-    spec = options.spec(load_map(options.map), options.controller, gains)
-    check_layers(options)
-    compile_kernels()
-    cost = built_cost(spec.environment, options.lattice, quiet=options.json)
+    spec = options.spec(load_map(options.map), options.controller, parsed_gains(options.gains))
+    options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
-    with results(out, overwrite=options.overwrite) as result, Interruption() as stop:
-        run = saved_run(spec, cost, result, "", options, stop)
-        save_pictures([run], cost, result.new, options)
-        result.keep()
-        save_moving([run], cost, result.new, options, stop)
+    runs, stopped = performed({"": spec}, out, options)
+    run = runs[""]
     if options.json:
-        print(json.dumps(finite({"out": str(out), "interrupted": stop.requested, **run.summary})))
+        print(json.dumps(finite({"out": str(out), "interrupted": stopped, **run.summary})))
     else:
         print_summary(run)
         end = f"stopped at {run.record.time[-1]:.1f} s; what was done is in"
-        print(f"{end if stop.requested else 'saved in'} {out}/: {listed(out)}{options.record_words}")
-    return INTERRUPTED if stop.requested else 0
+        print(f"{end if stopped else 'saved in'} {out}/: {listed(out)}{options.record_words}")
+    return INTERRUPTED if stopped else 0
 
 
 def remade(options: Arguments) -> int:

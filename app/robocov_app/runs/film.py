@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array, IntArray
 from robocov.cost import CoverageCost, MomentaryCost
-from robocov.environment import Environment
-from robocov.errors import ParameterError, shown
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
@@ -21,11 +19,11 @@ from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.distance_field import Fields, round_limit
 from robocov_app.render.layers import Layer
 from robocov_app.render.layout import columns_for, united
-from robocov_app.render.picture import Painter, checked_layers, pane_layers, scale_for, standard_layers
+from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import record_scene
-from robocov_app.render.theme import Colour, theme_named
+from robocov_app.render.theme import Colour
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
-from robocov_app.runs.options import RunOptions
+from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import Frame, save_moving_picture
 from robocov_app.runs.run import Run
 from robocov_app.terminal.interruption import Interruption
@@ -46,46 +44,16 @@ Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
 """Times, s, and mean distances, m; and mean times, s, where robots are not equally fast."""
 
 
-@dataclass(frozen=True, eq=False)
-class FilmStyle:
-    """How a film looks, and how fast it goes.
-
-    `colours`: a hue for each robot, or all trajectories in the "paper"'s red. `fps`: frames per second of the
-    film. `speed`: simulated seconds per second of it. `hold`, s: so long it stays on the last moment. `also`,
-    `without`: layers shown besides the usual ones, and not. `fields`: what layers of distances draw.
-    """
-
-    theme: str = "light"
-    colours: str = "robots"
-    fps: float = 30.0
-    speed: float = 1.0
-    hold: float = 0.0
-    also: frozenset[str] = frozenset()
-    without: frozenset[str] = frozenset()
-    fields: Fields | None = None
-
-    def rows(self, time: Array) -> IntArray:
-        """Return which row of a record of ascending times, (T,) s, each frame shows."""
-        return frame_rows(time, self.fps, self.speed, self.hold)
-
-
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Return which row of a record each frame shows.
+    """Return which row of a record of ascending times, (T,) s, each frame shows.
 
-    `time`, (T,) s: ascending. `fps`: frames per second of the film. `speed`: simulated seconds per second of
-    the film. `hold`, s: so long the film stays on the last row at its end. Raises
-    ParameterError when `fps` or `speed` is not positive.
+    `fps`: frames per second of the film. `speed`: simulated seconds per second of it. `hold`, s: so long it
+    stays on the last row.
 
-    Examples
-    --------
     >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
     [0, 2, 4]
     """
-    for name, value in (("fps", fps), ("speed", speed)):
-        if not (np.isfinite(value) and value > 0):
-            raise ParameterError(f"{name}: {shown(value)}, but a positive number was wanted")
-    duration = float(time[-1] - time[0])
-    count = int(np.ceil(duration / speed * fps - 1e-9)) + 1
+    count = int(np.ceil(float(time[-1] - time[0]) / speed * fps - 1e-9)) + 1
     at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
     # half a microsecond forgives the rounding of sums of steps
     rows = np.searchsorted(time, at + 5e-7, side="right") - 1
@@ -94,30 +62,40 @@ def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -
 
 def iter_frames(
     record: Record,
-    style: FilmStyle = FilmStyle(),
+    film: FilmOptions,
     *,
     size: tuple[int, int] = (1280, 720),
     layers: Sequence[Layer] | None = None,
     scale: float | None = None,
     cost: Costs | None = None,
     rows: IntArray | None = None,
+    fields: Fields | None = None,
 ) -> Iterator[Frame]:
     """Draw the frames of a saved run, one at a time; the arrays are the caller's own.
 
-    `size`: (width, height) in px. `layers`: from the lowest to the topmost; None for `standard_layers`.
-    `scale`: of text and lines; None for what suits the size. `cost`: of which each frame says the latest
-    known, see `told_costs`. `rows`: the rows to show, instead of those that the style gives.
+    `size`: (width, height) in px. `layers`: from the lowest to the topmost, `standard_layers` by default.
+    `scale`: of text and lines, by default what suits the size. `cost`: of which each frame tells the latest
+    known, see `told_costs`. `rows`: of the record, by default those of `frame_rows`. `fields`: what layers of
+    distances draw.
     """
-    layers = standard_layers(style.colours) if layers is None else layers
-    painter = Painter(record.environment, size, theme_named(style.theme), layers, scale)
-    painter.change(style.also, style.without)
+    painter = _painter(record, film, size, layers or standard_layers(film.colours), scale)
+    if rows is None:
+        rows = frame_rows(record.time, film.fps, film.film_speed)
     last, frame = -1, None
-    for row in (style.rows(record.time) if rows is None else rows).tolist():
+    for row in rows.tolist():
         if frame is None or row != last:
             text = _cost_text(mean_words(record.environment), float(record.time[row]), cost)
-            fields = style.fields if painter.needs_field else None
-            last, frame = row, painter.frame(record_scene(record, row, cost=text, fields=fields))
+            field = fields if painter.needs_field else None
+            last, frame = row, painter.frame(record_scene(record, row, cost=text, fields=field))
         yield frame
+
+
+def _painter(
+    record: Record, film: FilmOptions, size: tuple[int, int], layers: Sequence[Layer], scale: float | None
+) -> Painter:
+    painter = Painter(record.environment, size, film.colour_theme, layers, scale)
+    painter.change(*film.layers())
+    return painter
 
 
 def told_costs(history: CostHistory) -> Costs:
@@ -134,8 +112,7 @@ def _cost_text(what: str, time: float, cost: Costs | None) -> str:
     return cost_words(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
 
 
-@dataclass(frozen=True)
-class PaneLayout:
+class PaneLayout(NamedTuple):
     """How panes share a film: sizes in px of each and of all, and the legend, as wide as the film."""
 
     columns: int
@@ -146,19 +123,22 @@ class PaneLayout:
 
 
 def pane_layout(
-    records: Sequence[Record], style: FilmStyle = FilmStyle(), size: tuple[int, int] | None = None
+    records: Sequence[Record],
+    film: FilmOptions,
+    size: tuple[int, int] | None = None,
+    fields: Fields | None = None,
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
     `size`, (width, height) or None: of the whole film; None for what suits the map, within `USUAL_SIZE`.
     """
-    count = len(records)
-    aspect = max(_aspect(record.environment) for record in records)
+    bounds = [record.environment.region.bounds for record in records]
+    aspect = max((high_x - low_x) / (high_y - low_y) for low_x, low_y, high_x, high_y in bounds)
     width, height = size or USUAL_SIZE
     scale = scale_for((width, height))
     around = (6 + LEGEND_ROW + 6 + STRIP) * scale
-    columns = columns_for(count, aspect, (width, height - LEGEND_ROW * scale), around)
-    rows = -(-count // columns)
+    columns = columns_for(len(records), aspect, (width, height - LEGEND_ROW * scale), around)
+    rows = -(-len(records) // columns)
     scale = max(min(scale, width / columns / _NARROWEST), 0.75)
     around, beside = (6 + LEGEND_ROW + 6 + STRIP + 4) * scale, (2 * MARGIN + 4) * scale
     pane_width = (width - (columns - 1) * GAP) // columns
@@ -168,7 +148,7 @@ def pane_layout(
         needed = max(round((pane_height - around) * aspect + beside), round(_NARROWEST * scale))
         pane_width = min(pane_width, needed)
         width = columns * pane_width + (columns - 1) * GAP
-    header = _legend(records, style, width, scale)
+    header = _legend(records, film, width, scale, fields)
     if size is None:
         height = len(header) + rows * pane_height + (rows - 1) * GAP
         width, height = width + width % 2, height + height % 2
@@ -177,168 +157,132 @@ def pane_layout(
     return PaneLayout(columns, (pane_width, max(pane_height, 40)), scale, header, (width, height))
 
 
+def _legend(
+    records: Sequence[Record], film: FilmOptions, width: int, scale: float, fields: Fields | None
+) -> Frame:
+    """Draw one legend for all: of what any of them shows."""
+    found: list[list[LegendEntry]] = []
+    for record in records:
+        painter = _painter(record, film, (64, 64), pane_layers(film.colours), scale)
+        field = fields if painter.needs_field else None
+        # robots that fail are explained too
+        rows = (0, len(record) - 1) if record.conditions is not None else (0,)
+        found += [painter.legend_entries(record_scene(record, row, fields=field)) for row in rows]
+    # the longest first: its order is kept, and mostly nothing is missing
+    entries = united(sorted(found, key=len)[::-1], LegendEntry.key)
+    return legend_picture(entries, width, film.colour_theme, scale, film.layers()[0])
+
+
 def comparison_frames(
-    records: Sequence[Record], costs: Sequence[Costs], layout: PaneLayout, style: FilmStyle
+    records: Sequence[Record],
+    costs: Sequence[Costs],
+    layout: PaneLayout,
+    film: FilmOptions,
+    *,
+    hold: float = 0.0,
+    fields: Fields | None = None,
 ) -> Iterator[Frame]:
-    """Draw the frames of several saved runs side by side, each with what is told of its cost."""
-    look = theme_named(style.theme)
-    size, scale = layout.pane, layout.scale
+    """Draw the frames of several saved runs side by side; those that end before others stay as they are."""
+    look, top = film.colour_theme, len(layout.header)
     films = [
-        # layers keep what they have drawn: each film has its own
-        iter_frames(record, style, size=size, scale=scale, layers=pane_layers(style.colours), cost=cost)
+        iter_frames(
+            record,
+            film,
+            size=layout.pane,
+            scale=layout.scale,
+            layers=pane_layers(film.colours),  # layers keep what they have drawn: each film has its own
+            cost=cost,
+            rows=frame_rows(record.time, film.fps, film.film_speed, hold),
+            fields=fields,
+        )
         for record, cost in zip(records, costs, strict=True)
     ]
-    for body in side_by_side(films, layout.columns, GAP, look.grid, look.background):
-        frame = np.empty((layout.size[1], layout.size[0], 3), dtype=np.uint8)
-        frame[:] = look.background
-        top = len(layout.header)
+    panes: list[Frame] = []
+    for fresh in zip_longest(*films):
+        panes = [old if new is None else new for new, old in zip_longest(fresh, panes)]
+        body = tiled(panes, layout.columns, GAP, look.grid, look.background)
+        frame = np.full((layout.size[1], layout.size[0], 3), look.background, dtype=np.uint8)
         frame[:top, : layout.header.shape[1]] = layout.header
         part = frame[top : top + body.shape[0], : body.shape[1]]
         part[:] = body[: part.shape[0], : part.shape[1]]
         yield frame
 
 
-def side_by_side(
-    films: Sequence[Iterator[Frame]],
-    columns: int | None = None,
-    gap: int = GAP,
-    line: Colour = (128, 128, 128),
-    blank: Colour = (255, 255, 255),
-) -> Iterator[Frame]:
-    """Join the frames of several films of one size into frames that show them in rows.
-
-    Films that end before the others stay on their last frame. With `columns` None all are in one row, where
-    their widths may differ. `gap`, px, and `line` are between two; `blank` is what the last row leaves free.
-    """
-    columns = columns or len(films)
-    current: list[Frame | None] = [None] * len(films)
-    while True:
-        fresh = [next(film, None) for film in films]
-        if all(frame is None for frame in fresh):
-            return
-        current = [new if new is not None else old for new, old in zip(fresh, current, strict=True)]
-        shown = [frame for frame in current if frame is not None]
-        if len(shown) < len(films):
-            raise ParameterError("frames: none were given, but at least one was wanted")
-        rows = [_joined(shown[k : k + columns], 1, gap, line) for k in range(0, len(shown), columns)]
-        missing = rows[0].shape[1] - rows[-1].shape[1]
-        if missing > 0:
-            free = np.empty((rows[-1].shape[0], missing, 3), dtype=np.uint8)
-            free[:] = blank
-            rows[-1] = np.concatenate([rows[-1], free], axis=1)
-        yield _joined(rows, 0, gap, line)
+def tiled(frames: Sequence[Frame], columns: int, gap: int, line: Colour, blank: Colour) -> Frame:
+    """Join frames of one size in rows, with lines of `gap` px between; free places are `blank`."""
+    height, width, _ = frames[0].shape
+    rows, columns = -(-len(frames) // columns), min(columns, len(frames))
+    page = np.full((rows * (height + gap) - gap, columns * (width + gap) - gap, 3), blank, dtype=np.uint8)
+    for k, frame in enumerate(frames):
+        x, y = k % columns * (width + gap), k // columns * (height + gap)
+        page[y : y + height, x : x + width] = frame
+        page[y : y + height, max(x - gap, 0) : x] = page[max(y - gap, 0) : y] = line
+    return page
 
 
-def _joined(frames: Sequence[Frame], axis: int, gap: int, line: Colour) -> Frame:
-    """Put frames in a row (axis 1) or column (axis 0), with lines between."""
-    parts: list[Frame] = []
-    for frame in frames:
-        if parts:
-            shape = (gap, frame.shape[1], 3) if axis == 0 else (frame.shape[0], gap, 3)
-            between = np.empty(shape, dtype=np.uint8)
-            between[:] = line
-            parts.append(between)
-        parts.append(frame)
-    return np.concatenate(parts, axis=axis)
-
-
-def _aspect(environment: Environment) -> float:
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    return (high_x - low_x) / (high_y - low_y)
-
-
-def _legend(records: Sequence[Record], style: FilmStyle, width: int, scale: float) -> Frame:
-    """Draw one legend for all: of what any of them shows."""
-    look = theme_named(style.theme)
-    found: list[list[LegendEntry]] = []
-    for record in records:
-        painter = Painter(record.environment, (64, 64), look, pane_layers(style.colours), scale)
-        painter.change(style.also, style.without)
-        fields = style.fields if painter.needs_field else None
-        # robots that fail are explained too
-        for row in (0, -1) if record.conditions is not None else (0,):
-            scene = record_scene(record, row % len(record), fields=fields)
-            found.append(painter.legend_entries(scene))
-    # the longest first: its order is kept, and mostly nothing is missing
-    entries = united(sorted(found, key=len)[::-1], LegendEntry.key)
-    return legend_picture(entries, width, look, scale, style.also)
-
-
-def check_layers(options: RunOptions) -> None:
-    """Raise ParameterError, before anything is simulated, when films cannot show what is wanted."""
-    checked_layers("--show", options.show)
-    checked_layers("--hide", options.hide)
-
-
-def film_style(runs: Sequence[Run], cost: CoverageCost | None, options: RunOptions) -> FilmStyle:
-    """Return the style of films of runs on one map, all on one scale of colours.
+def film_fields(
+    runs: Sequence[Run], cost: CoverageCost | None, film: FilmOptions, *, quiet: bool
+) -> Fields | None:
+    """Return the distances that films of runs on one map show on one scale of colours, if they show any.
 
     The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
-    Where no `cost` of the map is there, it is made if it is needed.
+    Where no `cost` of the map is there, it is made.
     """
-    also, without = checked_layers("--show", options.show), checked_layers("--hide", options.hide)
-    look = options.theme, options.colours, options.fps, options.film_speed, FILM_HOLD
-    if not also & {"distances", "geodesic_cells"}:
-        return FilmStyle(*look, also, without)
+    if not film.layers()[0] & {"distances", "geodesic_cells"}:
+        return None
     environment = runs[0].record.environment
-    if cost is None:
-        cost = built_cost(environment, FILM_LATTICE, quiet=options.json)
-    cost = cost_for_pictures(environment, cost, FILM_LATTICE)
-    farthest = max((float(reached.max(initial=0.0)) for reached in _reached(runs, cost)), default=0.0)
-    return FilmStyle(*look, also, without, Fields(cost, round_limit(FILM_SCALE * farthest)))
-
-
-def _reached(runs: Sequence[Run], cost: CoverageCost) -> Iterator[Array]:
-    """Yield the distances at the end of each run that are finite."""
-    momentary = MomentaryCost(cost)
-    for run in runs:
-        record = run.record
+    cost = cost_for_pictures(
+        environment, cost or built_cost(environment, FILM_LATTICE, quiet=quiet), FILM_LATTICE
+    )
+    momentary, farthest = MomentaryCost(cost), 0.0
+    for record in (run.record for run in runs):
         result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])
         if result is not None:
-            yield result.distances[np.isfinite(result.distances)]
+            reached = result.distances[np.isfinite(result.distances)]
+            farthest = max(farthest, float(reached.max(initial=0.0)))
+    return Fields(cost, round_limit(FILM_SCALE * farthest))
 
 
 def save_moving(
     runs: Sequence[Run],
     cost: CoverageCost | None,
     folder: Path,
-    options: RunOptions,
+    film: FilmOptions,
     stop: Interruption,
     *,
+    quiet: bool,
     bare: Sequence[Run] | None = None,
 ) -> None:
     """Write ``frames/``, and ``run.mp4`` or of several runs ``comparison.mp4``, as the options say.
 
     Ctrl-C ends both early. `bare`: the same runs on one map, where distances are to one without robots that
-    failed. For `cost` see `film_style`.
+    failed. For `cost` see `film_fields`.
     """
-    if not (options.frames or options.video):
+    if not (film.frames or film.video):
         return
-    style = film_style(bare or runs, cost, options)
+    fields = film_fields(bare or runs, cost, film, quiet=quiet)
     records, costs = [run.record for run in runs], [told_costs(run.history) for run in runs]
-    total = len(style.rows(max(records, key=len).time))
-    layout = pane_layout(records, style, options.picture_size()) if len(runs) > 1 else None
-
-    def frames() -> Iterator[Frame]:
-        if layout is None:
-            return iter_frames(records[0], style, size=options.film_size(), cost=costs[0])
-        return comparison_frames(records, costs, layout, style)
-
-    write_moving(frames(), total, folder / FILMS[layout is not None], options, stop)
+    rows = frame_rows(max(records, key=len).time, film.fps, film.film_speed, FILM_HOLD)
+    if len(runs) == 1:
+        frames = iter_frames(records[0], film, size=film.film_size(), cost=costs[0], rows=rows, fields=fields)
+    else:
+        layout = pane_layout(records, film, film.picture_size(), fields)
+        frames = comparison_frames(records, costs, layout, film, hold=FILM_HOLD, fields=fields)
+    write_moving(frames, len(rows), folder / FILMS[len(runs) > 1], film, stop, quiet=quiet)
 
 
 def write_moving(
-    frames: Iterator[Frame], total: int, film: Path, options: RunOptions, stop: Interruption
+    frames: Iterator[Frame], total: int, path: Path, film: FilmOptions, stop: Interruption, *, quiet: bool
 ) -> None:
     """Write frames beside a film, as PNGs, and the film, as the options say; Ctrl-C ends both early."""
+    with progress("film" if film.video else "frames", total, quiet=quiet) as update:
 
-    def told() -> Iterator[Frame]:
-        for done, frame in enumerate(frames, start=1):
-            yield frame
-            update(done)
-            if stop.requested:
-                return
+        def told() -> Iterator[Frame]:
+            for done, frame in enumerate(frames, start=1):
+                yield frame
+                update(done)
+                if stop.requested:
+                    return
 
-    pictures = film.parent / "frames" if options.frames else None
-    with progress("film" if options.video else "frames", total, quiet=options.json) as update:
-        save_moving_picture(told(), pictures, film if options.video else None, options.fps)
+        folder = path.parent / "frames" if film.frames else None
+        save_moving_picture(told(), folder, path if film.video else None, film.fps)

@@ -1,4 +1,4 @@
-"""The options that `run` and `compare` share."""
+"""Options that commands share: what goes wrong in a run, what films look like, and what a run is."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robocov.conditions import Conditions
     from robocov.environment import Environment
     from robocov.robots import Team
+    from robocov_app.render.theme import Theme
     from robocov_app.runs.spec import RunSpec
 
 USUAL_ROWS = 4e6  # largest record where its rate is left open: about 320 MB
@@ -66,6 +67,56 @@ class ConditionOptions:
 
 
 @dataclass
+class FilmOptions:
+    """Frames and films, and the look of pictures."""
+
+    frames: bool = False
+    """Save every film frame as a PNG."""
+    video: bool = False
+    """Save a film (H.264, MP4)."""
+    fps: int = 30
+    """Film frames per second."""
+    film_speed: float = 4.0
+    """Simulated seconds per second of film."""
+    theme: Literal["light", "dark"] | None = None
+    """Colours; by default light, in a window as the last time."""
+    colours: Literal["paper", "robots"] = "paper"
+    """Trajectories in the paper's red, or a colour for each robot; in films too."""
+    show: tuple[str, ...] = ()
+    """Layers to show besides the usual ones: distances, geodesic-cells, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers not to show, as in --hide cells centroids."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
+
+    def __post_init__(self) -> None:
+        in_range("--fps", self.fps, 1, 240)
+        in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        self.picture_size()
+
+    def picture_size(self) -> tuple[int, int] | None:
+        """Return the size that was asked for (width, height), None when none was."""
+        return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
+
+    def film_size(self) -> tuple[int, int]:
+        """Return the size of film frames (width, height)."""
+        return self.picture_size() or (1280, 720)
+
+    @property
+    def colour_theme(self) -> Theme:
+        """The theme of pictures and films."""
+        from robocov_app.render.theme import theme_named
+
+        return theme_named(self.theme or "light")
+
+    def layers(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Return the layers that are shown besides the usual ones, and hidden; raises ParameterError."""
+        from robocov_app.render.picture import checked_layers
+
+        return checked_layers("--show", self.show), checked_layers("--hide", self.hide)
+
+
+@dataclass
 class RunOptions:
     """What a run is made of, and what is made of it."""
 
@@ -106,26 +157,9 @@ class RunOptions:
     """Folder for the results."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
-    frames: bool = False
-    """Save every film frame as a PNG too."""
-    video: bool = False
-    """Save a film (H.264, MP4)."""
-    fps: int = 30
-    """Film frames per second."""
-    film_speed: float = 4.0
-    """Simulated seconds per second of film."""
-    theme: Literal["light", "dark"] = "light"
-    """Colours of pictures and films."""
-    colours: Literal["paper", "robots"] = "paper"
-    """Trajectories in the paper's red, or a colour for each robot; in films too."""
-    show: tuple[str, ...] = ()
-    """Layers that films and frames show besides the usual ones: distances, geodesic-cells, ..."""
-    hide: tuple[str, ...] = ()
-    """Layers that they do not show, as in --hide cells centroids."""
-    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
     json: bool = False
     """Print one JSON object and nothing else."""
+    film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
     conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
     def __post_init__(self) -> None:
@@ -135,8 +169,6 @@ class RunOptions:
         in_range("--seed", self.seed, 0, 2**63 - 1)
         in_range("--duration", self.duration, 0.0, 1e6, "s")
         in_range("--lattice", self.lattice, 2, 2048)
-        in_range("--fps", self.fps, 1, 240)
-        in_range("--film-speed", self.film_speed, 0.01, 1e4)
         from robocov.simulation import check_dt  # asking for help must not load the physics
         from robocov_app.runs.spec import MOST_ROWS
 
@@ -149,7 +181,6 @@ class RunOptions:
                 f"--record-hz: {self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are "
                 f"{rows:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
             )
-        self.picture_size()
 
     @property
     def record_every(self) -> int:
@@ -201,14 +232,6 @@ class RunOptions:
         )
         spec.check()
         return spec
-
-    def picture_size(self) -> tuple[int, int] | None:
-        """Return the size that was asked for (width, height), None when none was."""
-        return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
-
-    def film_size(self) -> tuple[int, int]:
-        """Return the size of film frames (width, height)."""
-        return self.picture_size() or (1280, 720)
 
 
 def robots_of(team: Team, robots: int, default: int, path: Path) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import subprocess
 import tempfile
+from collections import deque
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import BinaryIO, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robocov.errors import OutputError, ParameterError, shown
+from robocov.errors import OutputError, ParameterError, reason, shown
 from robocov.files.atomic import written
 
 Frame: TypeAlias = NDArray[np.uint8]
@@ -32,22 +32,28 @@ def png_bytes(frame: Frame) -> bytes:
     return file.getvalue()
 
 
-def kept_frames(folder: Path | str, frames: Iterable[Frame]) -> Iterator[Frame]:
-    """Write frames as ``000000.png``, ``000001.png``, ..., and hand each on once it is written whole."""
-    folder = Path(folder)
+def save_moving_picture(
+    frames: Iterable[Frame], folder: Path | None, film: Path | None, fps: float = 30.0
+) -> None:
+    """Write frames as ``000000.png``, ``000001.png``, ... into a folder, as a film, or both."""
+    if folder is not None:
+        frames = _kept(folder, frames)
+    if film is not None:
+        save_film(film, frames, fps=fps)
+    else:
+        deque(frames, maxlen=0)
+
+
+def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
+    """Write frames as PNGs, and hand each on once it is written whole."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {_reason(error)}") from error
+        raise OutputError(f"{folder}: cannot be written: {reason(error)}") from error
     for number, frame in enumerate(frames):
         with written(folder / f"{number:06d}.png", durable=False) as part:
             part.write_bytes(png_bytes(frame))
         yield frame
-
-
-def save_frames(folder: Path | str, frames: Iterable[Frame]) -> int:
-    """Write frames as `kept_frames` does, and return how many."""
-    return sum(1 for _ in kept_frames(folder, frames))
 
 
 def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -> int:
@@ -65,7 +71,7 @@ def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be made ({_reason(error)})") from error
+        raise OutputError(f"{path.parent}: cannot be made ({reason(error)})") from error
     with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
         done = 0
         for frame in chain([first], source):
@@ -78,18 +84,10 @@ def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -
     return done
 
 
-def save_moving_picture(frames: Iterable[Frame], folder: Path | None, film: Path | None, fps: float) -> None:
-    """Write frames as PNGs into a folder, as a film, or both."""
-    if film is not None:
-        save_film(film, frames if folder is None else kept_frames(folder, frames), fps=fps)
-    elif folder is not None:
-        save_frames(folder, frames)
-
-
 def _even(frame: Frame) -> Frame:
     """Return the frame with its last row or column repeated where its size is odd."""
     height, width, _ = frame.shape
-    if height % 2 == 0 and width % 2 == 0:
+    if height % 2 == width % 2 == 0:
         return frame
     return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
 
@@ -121,8 +119,8 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
         if broken or status != 0:
             said.seek(0)
             lines = said.read().decode("utf-8", "replace").strip().splitlines()
-            reason = lines[-1].strip() if lines else f"status {status}"
-            raise OutputError(f"{path}: the film's encoder failed ({reason})")
+            why = lines[-1].strip() if lines else f"status {status}"
+            raise OutputError(f"{path}: the film's encoder failed ({why})")
 
 
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
@@ -130,9 +128,17 @@ def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: boo
 
     A `streamed` film can be played up to where it has come, whatever happens to the encoder.
     """
+    import imageio_ffmpeg
+
+    try:
+        ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise OutputError(
+            "film: no ffmpeg was found; set IMAGEIO_FFMPEG_EXE to one, or reinstall imageio-ffmpeg"
+        ) from error
     flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
     return [
-        *(_ffmpeg(), "-y", "-nostdin", "-loglevel", "error"),
+        *(ffmpeg, "-y", "-nostdin", "-loglevel", "error"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", f"{fps:g}", "-i", "-"),
         *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-tune", "animation"),
         # players take bt709 for high definition and bt601 otherwise unless the film says which
@@ -143,18 +149,3 @@ def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: boo
         # neither an option nor an address, whatever it looks like
         f"file:{path.absolute()}",
     ]
-
-
-def _ffmpeg() -> str:
-    import imageio_ffmpeg
-
-    try:
-        return str(imageio_ffmpeg.get_ffmpeg_exe())
-    except RuntimeError as error:
-        raise OutputError(
-            "film: no ffmpeg was found; set IMAGEIO_FFMPEG_EXE to one, or reinstall imageio-ffmpeg"
-        ) from error
-
-
-def _reason(error: OSError) -> str:
-    return os.strerror(error.errno) if error.errno is not None else str(error)

@@ -1,7 +1,9 @@
-"""Saved runs and comparisons, read back."""
+"""Saved runs and comparisons, read back; names of their folders."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -85,6 +87,22 @@ def roster_of(record: Record) -> Roster:
 def wreck_name(number: int) -> str:
     """Return what the obstacle is called that a robot has become by failing."""
     return f"failed robot {number}"
+
+
+def folder_names(names: Sequence[str]) -> list[str]:
+    """Return a folder name for each controller: its own name, made fit for a folder and different for all.
+
+    >>> folder_names(["rapf", "mine.py:Mine", "other/mine.py:Mine"])
+    ['rapf', 'Mine', 'Mine-2']
+    """
+    taken: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-")[:64] or "controller"
+        number = 1 + sum(
+            other == stem or re.fullmatch(re.escape(stem) + r"-\d+", other) is not None for other in taken
+        )
+        taken.append(stem if number == 1 else f"{stem}-{number}")
+    return taken
 
 
 def _parts(folder: Path) -> list[Path]:

@@ -13,7 +13,7 @@ from typing import IO, NamedTuple
 
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
-from robocov_app.runs.compare import folder_names
+from robocov_app.runs.saved import folder_names
 from robocov_app.terminal.output import free_name
 from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.document import Document

@@ -21,12 +21,11 @@ from robocov.record import Record, Recorder
 from robocov_app.render.density import cost_words, mean_words
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import theme_named
-from robocov_app.runs.compare import begin_comparison, folder_names, save_comparison
+from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
-from robocov_app.runs.film import FILM_HOLD, FILMS, side_by_side, write_moving
-from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers, save_pictures
-from robocov_app.runs.saved import wreck_name
+from robocov_app.runs.film import FILM_HOLD, FILMS, tiled, write_moving
+from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers
+from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.session.changes import Place, Restart
 from robocov_app.viewer.session.document import Document, Node
@@ -36,7 +35,7 @@ from robocov_app.viewer.session.map_edits import with_obstacle
 
 if TYPE_CHECKING:
     from robocov.files.result_folder import ResultFolder
-    from robocov_app.runs.options import RunOptions
+    from robocov_app.runs.options import FilmOptions, RunOptions
     from robocov_app.runs.recording import Frame
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.viewer.session.pane import Lane
@@ -231,10 +230,12 @@ def save_story(
             for row in cost_rows(history)
         )
         write_csv(result.new / "cost.csv", header, lines)
-    if options.video or options.frames:
+    look = options.film
+    if look.video or look.frames:
         film = result.new / FILMS[len(parts[-1].setups) > 1]
-        total = round((end * dt / options.film_speed + FILM_HOLD) * options.fps) + 1
-        write_moving(story_frames(document, node, end, histories, options), total, film, options, stop)
+        total = round((end * dt / look.film_speed + FILM_HOLD) * look.fps) + 1
+        frames = story_frames(document, node, end, histories, look)
+        write_moving(frames, total, film, look, stop, quiet=options.json)
     return {"parts": told, "runs": rows}
 
 
@@ -243,15 +244,15 @@ def story_frames(
     node: Node,
     end: int,
     histories: list[tuple[float, str, CostHistory]],
-    options: RunOptions,
+    film: FilmOptions,
 ) -> Iterator[Frame]:
     """Draw a branch from its beginning: trajectories go on through all touches."""
-    theme = theme_named(options.theme)
-    stride = options.film_speed / options.fps
+    theme = film.colour_theme
+    stride = film.film_speed / film.fps
     painters: dict[int, Painter] = {}
     frames: list[Frame] = []
     due, frame = 0.0, None
-    width, height = options.film_size()
+    width, height = film.film_size()
     for run, here in retold(document, node, end):
         last = here is node and run.step >= end
         if run.time + 1e-9 < due and not last:
@@ -268,18 +269,18 @@ def story_frames(
                 or painter.size != size
                 or painter.environment.boundary != run.scenario.environment.boundary
             ):
-                layers = standard_layers(options.colours) if count == 1 else pane_layers(options.colours)
+                layers = standard_layers(film.colours) if count == 1 else pane_layers(film.colours)
                 painter = painters[pane.number] = Painter(run.scenario.environment, size, theme, layers)
-                painter.change(frozenset(options.show), frozenset(options.hide))
+                painter.change(*film.layers())
             painter.environment = run.scenario.environment
             frames.append(painter.frame(_scene(pane, histories, name)))
         if count == 1:
             frame = frames[0]
         else:
-            (frame,) = side_by_side([iter([each]) for each in frames], 2, 8, theme.grid, theme.background)
+            frame = tiled(frames, 2, 8, theme.grid, theme.background)
         yield frame
     if frame is not None:
-        for _ in range(round(FILM_HOLD * options.fps)):
+        for _ in range(round(FILM_HOLD * film.fps)):
             yield frame
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 from touched_run import HALL, LLOYD, RAPF, RPF, begun, stepped
 
 from robocov_app.cli import main
-from robocov_app.runs.compare import begin_comparison
+from robocov_app.runs.artifacts import begin_comparison
 from robocov_app.terminal.output import write_csv
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window

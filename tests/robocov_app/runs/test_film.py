@@ -4,54 +4,29 @@ import numpy as np
 import pytest
 from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
-from robocov.errors import ParameterError
 from robocov_app.render.picture import pane_layers
 from robocov_app.render.theme import DARK, LIGHT
-from robocov_app.runs.film import (
-    FilmStyle,
-    comparison_frames,
-    frame_rows,
-    iter_frames,
-    pane_layout,
-    side_by_side,
-)
-
-
-def plain(count, width=64, height=48, start=0):
-    """Give frames of one grey each."""
-    for k in range(count):
-        yield np.full((height, width, 3), 20 * (k + start), dtype=np.uint8)
+from robocov_app.runs.film import comparison_frames, frame_rows, iter_frames, pane_layout, tiled
+from robocov_app.runs.options import FilmOptions
 
 
 def film(records, theme="light", colours="robots", size=None, speed=4.0):
-    style = FilmStyle(theme, colours, fps=5, speed=speed)
+    style = FilmOptions(theme=theme, colours=colours, fps=5, film_speed=speed)
     layout = pane_layout(records, style, size)
     costs = [(record.time[:1], np.array([1.0])) for record in records]
     return layout, comparison_frames(records, costs, layout, style)
 
 
-class TestSideBySide:
-    def test_it_waits_for_the_longest(self):
-        joined = list(side_by_side([plain(2), plain(4, width=32)], gap=3, line=(99, 98, 97)))
-        assert [frame.shape for frame in joined] == [(48, 64 + 3 + 32, 3)] * 4
-        assert [int(frame[0, 0, 0]) for frame in joined] == [0, 20, 20, 20]
-        assert [int(frame[0, 80, 0]) for frame in joined] == [0, 20, 40, 60]
-        assert (joined[0][:, 64:67] == (99, 98, 97)).all()
-
-    def test_rows_and_a_free_place(self):
-        films = [plain(1, start=k) for k in range(1, 6)]
-        (frame,) = side_by_side(films, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
-        assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
-        for k in range(5):
-            row, column = divmod(k, 3)
-            pane = frame[row * 50 : row * 50 + 48, column * 66 : column * 66 + 64]
-            assert (pane == 20 * (k + 1)).all()
-        assert (frame[48:50] == (99, 98, 97)).all()
-        assert (frame[50:, 132:] == (1, 2, 3)).all()
-
-    def test_a_film_without_frames(self):
-        with pytest.raises(ParameterError, match="frames: none"):
-            next(side_by_side([plain(1), plain(0)]))
+def test_frames_stand_in_rows_and_a_place_may_be_free():
+    greys = [np.full((48, 64, 3), 20 * k, dtype=np.uint8) for k in range(1, 6)]
+    frame = tiled(greys, 3, gap=2, line=(99, 98, 97), blank=(1, 2, 3))
+    assert frame.shape == (2 * 48 + 2, 3 * 64 + 2 * 2, 3)
+    for k in range(5):
+        row, column = divmod(k, 3)
+        pane = frame[row * 50 : row * 50 + 48, column * 66 : column * 66 + 64]
+        assert (pane == 20 * (k + 1)).all()
+    assert (frame[48:50] == (99, 98, 97)).all() and (frame[50:, 64:66] == (99, 98, 97)).all()
+    assert (frame[50:, 130:] == (1, 2, 3)).all()
 
 
 class TestLayout:
@@ -60,7 +35,7 @@ class TestLayout:
         [(ROOMS, 1, 1), (ROOMS, 2, 2), (ROOMS, 3, 3), (ROOMS, 4, 2), (CORRIDOR, 3, 1), (SHAFT, 4, 4)],
     )
     def test_wide_maps_stand_below_each_other(self, environment, count, columns):
-        layout = pane_layout([run_of(environment, 3)] * count)
+        layout = pane_layout([run_of(environment, 3)] * count, FilmOptions())
         assert layout.columns == columns
         assert layout.size[0] <= 1920 and layout.size[1] <= 1090
         assert layout.size[0] % 2 == layout.size[1] % 2 == 0
@@ -100,7 +75,7 @@ class TestFrames:
         second = replace(first, positions=first.positions[:, ::-1] + 0.4)
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
-            style, layers = FilmStyle(fps=5, speed=4.0), pane_layers("robots")
+            style, layers = FilmOptions(fps=5), pane_layers("robots")
             cost = records[1].time[:1], np.array([1.0])
             alone = iter_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale
@@ -112,12 +87,12 @@ class TestFrames:
     def test_one_legend_explains_what_any_of_them_shows(self):
         without = run_of(ROOMS, 3, controller="rpf")
         with_goals = replace(without, goals=without.positions + 0.1)
-        plain_header = pane_layout([without, without]).header
-        both = pane_layout([without, with_goals]).header
+        plain_header = pane_layout([without, without], FilmOptions()).header
+        both = pane_layout([without, with_goals], FilmOptions()).header
         assert plain_header.shape == both.shape
         ink = [int((header != 255).any(axis=2).sum()) for header in (plain_header, both)]
         assert ink[1] > ink[0] + 100  # the cell centroid
-        twice = pane_layout([with_goals, with_goals]).header
+        twice = pane_layout([with_goals, with_goals], FilmOptions()).header
         assert (twice == both).all()
 
     def test_trajectories_have_the_colours_asked_for(self):

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov.errors import ParameterError
-from robocov_app.runs.options import RunOptions
+from robocov_app.runs.options import FilmOptions, RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 
 
@@ -26,7 +26,7 @@ def test_any_texts_are_gains_or_refused_in_one_line(texts: list[str]) -> None:
 
 @pytest.mark.parametrize(("text", "size"), [("640x480", (640, 480)), ("800X600", (800, 600)), (None, None)])
 def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
-    options = RunOptions(size=text)
+    options = FilmOptions(size=text)  # type: ignore[arg-type]
     assert options.picture_size() == size
     assert options.film_size() == (size or (1280, 720))
 
@@ -34,13 +34,8 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"size": "640"},
-        {"size": "1x1"},
-        {"size": "99999x99999"},
         {"robots": 0},
         {"lattice": 5000},
-        {"fps": 0},
-        {"film_speed": 0.0},
         {"dt": 0.0},
         {"duration": 1e7},
         {"robots": 10_000, "duration": 100.0, "record_hz": 60.0},
@@ -49,6 +44,14 @@ def test_picture_sizes(text: str | None, size: tuple[int, int] | None) -> None:
 def test_values_out_of_range_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ParameterError, match="wanted"):
         RunOptions(**wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"size": "640"}, {"size": "1x1"}, {"size": "99999x99999"}, {"fps": 0}, {"film_speed": 0.0}]
+)
+def test_films_out_of_range_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(ParameterError, match="wanted"):
+        FilmOptions(**wrong)  # type: ignore[arg-type]
 
 
 def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() -> None:

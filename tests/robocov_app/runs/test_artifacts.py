@@ -1,7 +1,7 @@
 import pytest
 
 from robocov.errors import ParameterError
-from robocov_app.runs.compare import gains_for
+from robocov_app.runs.artifacts import gains_for
 
 NAMES = ("rapf", "rpf", "lloyd")
 

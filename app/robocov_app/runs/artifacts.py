@@ -1,0 +1,182 @@
+"""What is made of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from robocov.compiled import compile_kernels
+from robocov.controllers import controller_kind, gains_of
+from robocov.cost import CoverageCost, MomentaryCost
+from robocov.errors import ParameterError, unknown_name
+from robocov.files.result_folder import Kind, results
+from robocov_app.figures.coverage import Moment, plot_coverage
+from robocov_app.figures.curves import Curve
+from robocov_app.figures.files import save_figure
+from robocov_app.figures.runs import plot_comparison, plot_trajectories
+from robocov_app.render.distance_field import Field, FieldLattice
+from robocov_app.runs.cost import built_cost, cost_for_pictures
+from robocov_app.runs.film import save_moving
+from robocov_app.runs.options import RunOptions
+from robocov_app.runs.run import Run, saved_run
+from robocov_app.runs.spec import RunSpec
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.output import finite, write_csv, write_json
+from robocov_app.terminal.progress import counting, progress
+
+_HEAD = {"format": "robocov-comparison", "version": 1}
+_FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
+_TIMED = ("mean_time_s",)  # where robots are not equally fast
+
+
+def performed(
+    specs: Mapping[str, RunSpec], out: Path, options: RunOptions, *, comparison: bool = False
+) -> tuple[dict[str, Run], bool]:
+    """Do one run, or compare several on one map, by their folders' names; also tell if Ctrl-C ended it."""
+    compile_kernels()
+    cost = built_cost(next(iter(specs.values())).environment, options.lattice, quiet=options.json)
+    kind: Kind = "comparison" if comparison else "run"
+    parts = specs if comparison else ()
+    runs: dict[str, Run] = {}
+    with results(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
+        if comparison:
+            begin_comparison(result.new, list(specs))
+        for part, spec in specs.items():
+            runs[part] = saved_run(spec, cost, result, part if comparison else "", options, stop)
+            if stop.requested:
+                break
+        if comparison:
+            save_comparison(runs, cost, result.new, options)
+        else:
+            save_pictures(list(runs.values()), cost, result.new, options)
+        result.keep()
+        save_moving(list(runs.values()), cost, result.new, options.film, stop, quiet=options.json)
+    return runs, stop.requested
+
+
+def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the gains of each controller out of those given for the comparison.
+
+    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone. Raises
+    ParameterError when a gain belongs to none of the controllers.
+    """
+    known = {name: gains_of(controller_kind(name)) for name in names}
+    chosen: list[dict[str, Any]] = [{} for _ in names]
+    # what is said of one controller alone counts for more than what is said of all
+    for key, value in sorted(given.items(), key=lambda item: "." in item[0]):
+        owner, dot, gain = key.rpartition(".")
+        if dot and owner not in known:
+            raise ParameterError(f"--set {key}: {unknown_name('controller', owner, known)}")
+        takers = [k for k, name in enumerate(names) if gain in known[name] and (not dot or name == owner)]
+        if not takers:
+            every = known[owner] if dot else {gain for name in names for gain in known[name]}
+            raise ParameterError(f"--set {key}: {unknown_name('gain', gain, every)}")
+        for k in takers:
+            chosen[k][gain] = value
+    return chosen
+
+
+def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
+    """Return one row for each run: its figures, and the excess of its mean distance over the best."""
+    best = min(run.summary["mean_distance_m"] for run in runs.values())
+    return [
+        {
+            "controller": name,
+            "label": run.record.label,
+            "gains": dict(run.record.gains),
+            **{figure: run.summary[figure] for figure in _FIGURES},
+            **{figure: run.summary[figure] for figure in _TIMED if figure in run.summary},
+            "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
+            "above_best": run.summary["mean_distance_m"] / best - 1.0,
+        }
+        for name, run in runs.items()
+    ]
+
+
+def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
+    """Write which folders belong to the comparison, so that also one that is killed can be read."""
+    write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
+
+
+def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, options: RunOptions) -> None:
+    """Write ``comparison.json|csv``, and ``trajectories`` and ``cost`` as PNG and SVG."""
+    rows = rows_of(runs)
+    content = {**_HEAD, "lattice": options.lattice, "folders": list(runs), "runs": rows}
+    write_json(folder / "comparison.json", finite(content))
+    columns = [name for name in rows[0] if name not in ("label", "gains")]
+    write_csv(folder / "comparison.csv", ",".join(columns), ([row[name] for name in columns] for row in rows))
+    save_pictures(list(runs.values()), cost, folder, options, comparison=True)
+
+
+def save_pictures(
+    runs: Sequence[Run], cost: CoverageCost, folder: Path, options: RunOptions, *, comparison: bool = False
+) -> None:
+    """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison."""
+    records, times = [run.record for run in runs], [run.final_time for run in runs]
+    finals = [float(run.history.mean_distance[-1]) for run in runs]
+    film = options.film
+    theme, size = film.colour_theme, film.picture_size()
+    curves = [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
+    ]
+
+    def trajectories() -> Figure:
+        if comparison:
+            return plot_comparison(records, theme, film.colours, size, finals, times)
+        return plot_trajectories(records[0], None, theme, film.colours, size, finals[0], times[0])
+
+    def costs() -> Figure:
+        n = len(records[0].team)
+        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
+        return plot_coverage(curves, last_moments(runs, cost), theme, size, title, time_curves(runs))
+
+    save_figures(folder, {"trajectories": trajectories, "cost": costs}, quiet=options.json)
+
+
+def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
+    """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
+
+    The others are on the same map, but for robots that failed at other places.
+    """
+    drawn, moments = runs[0].record.environment, []
+    cost = cost_for_pictures(drawn, cost)
+    for run in runs:
+        record = run.record
+        if record.environment != drawn:
+            drawn = record.environment
+            cost = built_cost(drawn, cost.lattice, quiet=True)
+        momentary, time = MomentaryCost(cost), float(record.time[-1])
+        counted = momentary.counted(time, record.positions[-1], record.working[-1])
+        if not counted.any():
+            continue
+        now, rows = momentary.at(time), np.flatnonzero(counted)
+        field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
+        some = None if counted.all() else rows
+        moments.append(
+            Moment.last_of(record, field, float(run.history.mean_distance[-1]), some, run.final_time)
+        )
+    return moments
+
+
+def time_curves(runs: Sequence[Run]) -> list[Curve]:
+    """Return the curves of the mean time of runs; none where robots are equally fast, or none worked."""
+    return [
+        (run.record.label, run.record.controller, run.history.time, run.history.mean_time)
+        for run in runs
+        if run.history.mean_time is not None and np.isfinite(run.history.mean_time).any()
+    ]
+
+
+def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
+    """Draw each figure and write it as PNG and SVG under its name."""
+    with progress("pictures", 2 * len(figures), quiet=quiet) as update:
+        done = counting(update)
+        for stem, draw in figures.items():
+            figure = draw()
+            for suffix in (".png", ".svg"):
+                save_figure(figure, folder / (stem + suffix))
+                done()
