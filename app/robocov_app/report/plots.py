@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.metrics import share
 from robocov_app.figures.results import (
     Band,
     Pairs,
@@ -24,40 +26,23 @@ from robocov_app.figures.results import (
     quartiles,
 )
 from robocov_app.figures.styles import CurveStyle, curve_styles
+from robocov_app.report import groups as grouped
 from robocov_app.report.embedding import ReplayRun, has_path
-from robocov_app.report.groups import (
-    Comparison,
-    Group,
-    by_controller,
-    dependences,
-    medians,
-    ratio_text,
-    relative,
-    setting_label,
-    settings,
-    shown_groups,
-)
+from robocov_app.report.groups import Comparison, Group, ratio_text, setting_label, settings, shown_groups
 from robocov_app.report.results import Entry, Result
 from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.study import UNITS, WORDS
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups by label (`groups.styles`)
 
-
-# the styles of a result's groups by label (`robocov_app.report.groups.styles`)
-Looks: TypeAlias = Mapping[str, CurveStyle]
 MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
-
-SCALE = 1.0
-
-_MOMENTS = 121  # moments of a cost curve: one every three pixels
-
-RELATIVE = "final distance / median of map and team"
-
-
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
+SCALE = 1.0
+_MOMENTS = 121  # moments of a cost curve: one every three pixels
+TOGETHER = "All maps and teams together"
+METRES = "final mean distance (m)"
+RELATIVE = "final distance / median of map and team"
 
 
 class Plot(NamedTuple):
@@ -72,60 +57,56 @@ class Curves:
     """Mean distances over time of all runs of a result, at common moments."""
 
     def __init__(self, result: Result) -> None:
-        longest = 0.0
         histories = {}
         for entry in result.fine:
             history = result.history(entry)
-            if history is None or not np.isfinite(history.mean_distance).any():
-                continue
-            time = history.time - history.time[0]
-            longest = max(longest, float(time[-1]))
-            histories[entry] = time, history.mean_distance
+            if history is not None and np.isfinite(history.mean_distance).any():
+                histories[entry] = history.time - history.time[0], history.mean_distance
+        longest = max([float(time[-1]) for time, _ in histories.values()], default=0.0)
         self.time: Array = np.linspace(0.0, longest, _MOMENTS if longest > 0.0 else 1)
         self.values: dict[Entry, Array] = {
             entry: np.interp(self.time, time, values, right=np.nan)
             for entry, (time, values) in histories.items()
         }
 
-    def band(self, group: Group, *, parts: bool = False) -> Band | None:
-        """Return the curves of a group, as multiples of their first values where so wanted."""
-        rows = [self.values[entry] for entry in group.entries if entry in self.values]
-        if parts:
-            rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
-        if not rows:
-            return None
-        return Band(group.label, group.controller, self.time, np.array(rows))
+    def bands(self, groups: Sequence[Group], *, parts: bool = False) -> list[Band]:
+        """Return the curves of groups, as multiples of their first values where so wanted."""
+        found = []
+        for group in groups:
+            rows = [self.values[entry] for entry in group.entries if entry in self.values]
+            if parts:
+                rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
+            if rows:
+                found.append(Band(group.label, group.controller, self.time, np.array(rows)))
+        return found
+
+
+def _each_setting(result: Result, key: str) -> Iterator[tuple[str, str, list[Group]]]:
+    """Yield title, key and groups of each setting; nothing of very many."""
+    every = settings(result)
+    for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
+        title = setting_label(result, setting) if len(every) > 1 else ""
+        yield title, f"{key}-{k}", [group.at(setting) for group in shown_groups(result)]
 
 
 def cost_plots(result: Result, curves: Curves, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the cost curves: over all settings, as parts of the first value, then of each setting."""
-    groups = shown_groups(result)
-    every = settings(result)
-    if len(every) > 1:
-        bands = [band for group in groups if (band := curves.band(group, parts=True)) is not None]
-        if bands:
-            what = "mean distance / that of the start"
-            yield _band_plot("All maps and teams together", bands, looks, f"{key}-all", what, "")
-    for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
-        bands = [band for group in groups if (band := curves.band(group.at(setting))) is not None]
-        if bands:
-            what = "mean distance to the nearest robot (m)"
-            title = setting_label(result, setting) if len(every) > 1 else ""
-            yield _band_plot(title, bands, looks, f"{key}-{k}", what, "m")
+    if len(settings(result)) > 1 and (bands := curves.bands(shown_groups(result), parts=True)):
+        yield _band_plot(TOGETHER, bands, looks, f"{key}-all", "mean distance / that of the start", "")
+    for title, own, groups in _each_setting(result, key):
+        if bands := curves.bands(groups):
+            yield _band_plot(title, bands, looks, own, "mean distance to the nearest robot (m)", "m")
 
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
-    groups = shown_groups(result)
-    every = settings(result)
-    if len(every) > 1:
-        scales = medians(result)
-        samples = [_sample(group, relative(group.entries, scales)) for group in groups]
-        yield from _sample_plot("All maps and teams together", samples, looks, f"{key}-all", RELATIVE, "")
-    for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
-        samples = [_sample(group, group.at(setting).finals) for group in groups]
-        title = setting_label(result, setting) if len(every) > 1 else ""
-        yield from _sample_plot(title, samples, looks, f"{key}-{k}", "final mean distance (m)", " m")
+    if len(settings(result)) > 1:
+        scales, groups = grouped.medians(result), shown_groups(result)
+        values = [grouped.relative(group.entries, scales) for group in groups]
+        yield from _sample_plot(TOGETHER, groups, values, looks, f"{key}-all", RELATIVE, "")
+    for title, own, groups in _each_setting(result, key):
+        values = [group.finals[np.isfinite(group.finals)] for group in groups]
+        yield from _sample_plot(title, groups, values, looks, own, METRES, " m")
 
 
 def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> Iterator[Plot]:
@@ -133,25 +114,17 @@ def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> I
     for k, each in enumerate(comparisons):
         if each.pairs < 2:
             continue
-        name, rows = each.first.controller, []
-        if 1 < len(each.maps) <= MOST_PANELS:
-            rows = [Pairs(own.name, name, own.a / own.b, own.ratio) for own in each.maps]
-        several = len(each.maps) > 1
-        label = f"all {len(each.maps)} maps" if several else f"{each.pairs} pairs"
-        ratios = (
-            np.array([own.ratio.estimate for own in each.maps])
-            if several
-            else each.maps[0].a / each.maps[0].b
-        )
-        rows.append(Pairs(label, name, ratios, each.ratio))
+        name, rows, maps = each.first.controller, [], each.maps
+        if 1 < len(maps) <= MOST_PANELS:
+            rows = [Pairs(own.name, name, own.a / own.b, own.ratio) for own in maps]
+        if len(maps) > 1:
+            ratios = np.array([own.ratio.estimate for own in maps])
+            rows.append(Pairs(f"all {len(maps)} maps", name, ratios, each.ratio))
+        else:
+            rows.append(Pairs(f"{each.pairs} pairs", name, maps[0].a / maps[0].b, each.ratio))
         words = "; ".join(f"{row.label}: ratio {ratio_text(row.interval)}" for row in rows)
-        figure = plot_paired(
-            rows,
-            size=(PANEL[0], None),
-            scale=SCALE,
-            label="ratio of final mean distances (log)",
-            styles=[looks[each.first.label]] * len(rows),
-        )
+        styles, label = [looks[each.first.label]] * len(rows), "ratio of final mean distances (log)"
+        figure = plot_paired(rows, size=(PANEL[0], None), scale=SCALE, label=label, styles=styles)
         yield Plot(each.label, inline_svg(figure, f"{key}-{k}", f"{each.label}, pair by pair. {words}."))
 
 
@@ -179,14 +152,11 @@ def _alone(title: str, figures: Sequence[Figure], key: str, sentence: str) -> Pl
     return Plot(title, *(inline_svg(figure, f"{key}{k or ''}", sentence) for k, figure in enumerate(figures)))
 
 
-def _sample(group: Group, values: Array) -> Sample:
-    return Sample(group.label, group.controller, values[np.isfinite(values)])
-
-
 def _sample_plot(
-    title: str, samples: list[Sample], looks: Looks, key: str, what: str, unit: str
+    title: str, groups: list[Group], values: list[Array], looks: Looks, key: str, what: str, unit: str
 ) -> Iterator[Plot]:
-    samples = [sample for sample in samples if len(sample.values)]
+    each = zip(groups, values, strict=True)
+    samples = [Sample(group.label, group.controller, own) for group, own in each if len(own)]
     if not samples or max(len(sample.values) for sample in samples) < 2:
         return
     own = [looks[sample.label] for sample in samples]
@@ -195,200 +165,157 @@ def _sample_plot(
         for width in ((PANEL[0],) if title else (WIDE[0], PANEL[0]))
     ]
     words = []
-    for sample in samples:
-        low, middle, high = np.percentile(sample.values, [25, 50, 75])
-        words.append(
-            f"{sample.label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}, "
-            f"{counted(len(sample.values), 'run')}"
-        )
+    for label, _, found in samples:
+        low, middle, high = np.percentile(found, [25, 50, 75])
+        text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
+        words.append(f"{text}, {counted(len(found), 'run')}")
     sentence = f"{f'{title}: {what}' if title else what}. {'; '.join(words)}."
     yield _alone(title, figures, key, sentence)
 
 
+@dataclass(frozen=True)
+class _Parameter:
+    """What a result may depend on: a gain, or a property of the team; `choices` are the words it may be."""
+
+    title: str
+    value_of: Callable[[Entry], Value]
+    choices: tuple[str, ...] = ()
+
+    def place(self, entry: Entry) -> float:
+        """Return where a run stands: nan for no limit, of a word its number."""
+        value = self.value_of(entry)
+        if isinstance(value, str):
+            return float(self.choices.index(value))
+        return np.nan if value is None else value
+
+    def level(self, place: float) -> Value:
+        if np.isnan(place):
+            return None
+        return self.choices[int(place)] if self.choices else place
+
+    def text(self, place: float) -> str:
+        return value_text(self.level(place), digits=4)
+
+
+_Scale: TypeAlias = Callable[[Entry], float]  # what the final cost of a run is divided by, 0 where not known
+
+
 def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     """Yield the final cost against every gain and limit that varies, then grids of gains."""
-    groups = by_controller(result)
-    one = len(settings(result)) == 1
-    label = "final mean distance (m)" if one else RELATIVE
-    scales = medians(result)
-    for k, (name, controllers) in enumerate(dependences(result).items()):
+    groups, varying = grouped.by_controller(result), grouped.dependences(result)
+    scale, label = _scale_by(result, RELATIVE, lambda entry: entry.setting)
+    gains = {name: _gain(result, name) for name in varying}
+    for k, (name, controllers) in enumerate(varying.items()):
         some = [group for group in groups if group.controller in controllers]
-        words = _words(result, name)
-        value = partial(_gain, name, words)
-        rows = [_dependence(group, value, _scale(None if one else scales)) for group in some]
-        yield from _gain_plot(_named(name, result.units), rows, groups, f"{key}-{k}", label, words)
-    yield from _team_plots(result, groups, f"{key}-team")
-    yield from _grid_plots(result, groups, None if one else scales, f"{key}-grid")
+        yield from _dependence_plot(gains[name], some, groups, scale, f"{key}-{k}", label)
+    # teams differ in their settings: by the medians of the maps alone
+    by_map, of_map = _scale_by(result, "final distance / median of map", lambda entry: entry.map)
+    for k, parameter in enumerate(_team_parameters(result)):
+        if len({parameter.value_of(entry) for entry in result.fine}) > 1:
+            yield from _dependence_plot(parameter, groups, groups, by_map, f"{key}-team-{k}", of_map)
+    count = 0
+    for group in groups:
+        own = [name for name, controllers in varying.items() if group.controller in controllers]
+        for names in combinations(own, 2):
+            both = gains[names[0]], gains[names[1]]
+            number = f"{key}-grid-{count + 1}"
+            for plot in _grid_plot(group, names, both, scale, number, label):
+                count += 1
+                yield plot
 
 
-def _team_plots(result: Result, groups: Sequence[Group], key: str) -> Iterator[Plot]:
-    """Yield the final cost against the team's size and limits, by the medians of the maps alone."""
-    values: dict[str, list[float]] = {}
+def _scale_by(result: Result, label: str, part_of: Callable[[Entry], object]) -> tuple[_Scale, str]:
+    """Return a scale by the medians of parts of a result, with the label of the axis; none for one part."""
+    finals: dict[object, list[float]] = {}
     for entry in result.fine:
-        if np.isfinite(entry.final):
-            values.setdefault(entry.map, []).append(entry.final)
-    by_map = {name: float(np.median(each)) for name, each in values.items()}
-    one = len(by_map) == 1
-    label = "final mean distance (m)" if one else "final distance / median of map"
-
-    def scale(entry: Entry) -> float:
-        return 1.0 if one else by_map.get(entry.map, 0.0)
-
-    parameters = (
-        {"robots": ""} | {name: UNITS[name] for name, _ in result.fine[0].team if name not in WORDS}
-        if result.fine
-        else {}
-    )
-    for k, (name, unit) in enumerate(parameters.items()):
-        if len({_team_value(name, entry) for entry in result.fine}) < 2:
-            continue
-        rows = [_dependence(group, partial(_team_value, name), scale) for group in groups]
-        words = name.replace("_", " ") + (f" ({unit})" if unit else "")
-        yield from _gain_plot(words, rows, groups, f"{key}-{k}", label)
+        finals.setdefault(part_of(entry), []).append(entry.final)
+    if len(finals) == 1:
+        return lambda entry: 1.0, METRES
+    medians = {
+        part: np.median(np.extract(np.isfinite(own), own))
+        for part, own in finals.items()
+        if np.isfinite(own).any()
+    }
+    return lambda entry: float(medians.get(part_of(entry), 0.0)), label
 
 
-def _words(result: Result, name: str) -> tuple[str, ...]:
-    """Return the values of a gain that is a word; none of one that is a number."""
+def _gain(result: Result, name: str) -> _Parameter:
     values = dict.fromkeys(dict(entry.gains).get(name) for entry in result.fine)
-    return tuple(value for value in values if isinstance(value, str))
+    unit = result.units.get(name, "")
+    choices = tuple(value for value in values if isinstance(value, str))
+    return _Parameter(f"{name} ({unit})" if unit else name, lambda entry: dict(entry.gains)[name], choices)
 
 
-def _gain(name: str, words: tuple[str, ...], entry: Entry) -> float | None:
-    """Return the value of a gain, of a word its number."""
-    value = dict(entry.gains)[name]
-    return words.index(value) if isinstance(value, str) else value
+def _team_parameters(result: Result) -> Iterator[_Parameter]:
+    yield _Parameter("robots", lambda entry: entry.robots)
+    for name, _ in result.fine[0].team if result.fine else ():
+        if name not in WORDS:
+            title = f"{name.replace('_', ' ')} ({UNITS[name]})"
+            yield _Parameter(title, lambda entry, name=name: dict(entry.team)[name])  # type: ignore[misc]
 
 
-def _team_value(name: str, entry: Entry) -> float | None:
-    return entry.robots if name == "robots" else dict(entry.team)[name]
+def _dependence(group: Group, parameter: _Parameter, scale: _Scale) -> Dependence:
+    known = [entry for entry in group.entries if np.isfinite(entry.final) and scale(entry) > 0.0]
+    places = np.array([parameter.place(entry) for entry in known], dtype=float)
+    values = np.array([entry.final / scale(entry) for entry in known])
+    return Dependence(group.label, group.controller, places, values)
 
 
-def _scale(scales: Mapping[tuple[object, ...], float] | None) -> Callable[[Entry], float]:
-    """Return what the final cost of an entry is divided by, 0 where that is not known."""
-    return lambda entry: 1.0 if scales is None else scales.get(entry.setting, 0.0)
-
-
-def _dependence(
-    group: Group, value_of: Callable[[Entry], float | None], scale_of: Callable[[Entry], float]
-) -> Dependence:
-    places, values = [], []
-    for entry in group.entries:
-        scale = scale_of(entry)
-        if np.isfinite(entry.final) and scale > 0.0:
-            place = value_of(entry)
-            places.append(np.nan if place is None else place)
-            values.append(entry.final / scale)
-    return Dependence(group.label, group.controller, np.array(places), np.array(values))
-
-
-def _gain_plot(
-    name: str,
-    rows: list[Dependence],
-    groups: Sequence[Group],
-    key: str,
-    label: str,
-    choices: tuple[str, ...] = (),
+def _dependence_plot(
+    parameter: _Parameter, some: Sequence[Group], groups: Sequence[Group], scale: _Scale, key: str, label: str
 ) -> Iterator[Plot]:
-    rows = [row for row in rows if len(row.values)]
+    rows = [row for row in (_dependence(group, parameter, scale) for group in some) if len(row.values)]
     if not rows:
         return
     known = curve_styles(group.controller for group in groups)
-    looks = [known[row.controller] for row in rows]
-    figure = plot_gains(rows, name, size=PANEL, scale=SCALE, styles=looks, label=label, words=choices)
+    looks, title, choices = [known[row.controller] for row in rows], parameter.title, parameter.choices
+    figure = plot_gains(rows, title, size=PANEL, scale=SCALE, styles=looks, label=label, words=choices)
     words = []
     for row in rows:
         levels = np.unique(row.gains)
         if len(levels) <= MOST_LEVELS:
-            parts = [
-                f"{_level(level, choices)}: {np.median(row.values[_same(row.gains, level)]):.3f}"
-                for level in levels.tolist()
-            ]
+            places = np.nan_to_num(row.gains, nan=np.inf)
+            medians = [np.median(row.values[places == level]) for level in np.nan_to_num(levels, nan=np.inf)]
+            each = zip(levels.tolist(), medians, strict=True)
+            parts = [f"{parameter.text(level)}: {median:.3f}" for level, median in each]
             words.append(f"{row.label}, medians at {', '.join(parts)}")
         else:
-            low, high = np.nanmin(row.gains), np.nanmax(row.gains)
-            best = row.gains[int(np.argmin(row.values))]
-            span = f"from {low:.3g} to {high:.3g}"
-            words.append(f"{row.label}, {len(row.values)} runs {span}, the lowest value at {_level(best)}")
-    yield Plot(name, inline_svg(figure, key, f"{label} against {name}. {'; '.join(words)}."))
-
-
-def _grid_plots(
-    result: Result, groups: Sequence[Group], scales: Mapping[tuple[object, ...], float] | None, key: str
-) -> Iterator[Plot]:
-    """Yield medians over every two gains of a controller that were tried on a grid."""
-    varying, count = dependences(result), 0
-    for group in groups:
-        own = [name for name, controllers in varying.items() if group.controller in controllers]
-        for first, second in combinations(own, 2):
-            choices = _words(result, first), _words(result, second)
-            values_of = (partial(_gain, *each) for each in zip((first, second), choices, strict=True))
-            pair = [_dependence(group, value, _scale(scales)) for value in values_of]
-            columns, rows = (np.unique(each.gains) for each in pair)
-            if not (1 < len(columns) <= MOST_LEVELS and 1 < len(rows) <= MOST_LEVELS):
-                continue
-            values = np.full((len(rows), len(columns)), np.nan)
-            for i, row in enumerate(rows):
-                for j, column in enumerate(columns):
-                    here = _same(pair[0].gains, column) & _same(pair[1].gains, row)
-                    if here.any():
-                        values[i, j] = np.median(pair[0].values[here])
-            if np.isnan(values).mean() > 0.5:
-                continue  # no grid: a sample of a range
-            count += 1
-            names = first, second
-            levels = tuple(
-                [_level_value(x, known) for x in each.tolist()]
-                for each, known in zip((columns, rows), choices, strict=True)
-            )
-            yield _grid_plot(
-                result, group, names, (levels[0], levels[1]), values, f"{key}-{count}", scales is None
-            )
+            span = f"from {np.nanmin(row.gains):.3g} to {np.nanmax(row.gains):.3g}"
+            best = parameter.text(row.gains[int(np.argmin(row.values))])
+            words.append(f"{row.label}, {len(row.values)} runs {span}, the lowest value at {best}")
+    yield Plot(title, inline_svg(figure, key, f"{label} against {title}. {'; '.join(words)}."))
 
 
 def _grid_plot(
-    result: Result,
     group: Group,
     names: tuple[str, str],
-    levels: tuple[list[Value], list[Value]],
-    values: Array,
+    gains: tuple[_Parameter, _Parameter],
+    scale: _Scale,
     key: str,
-    metres: bool,
-) -> Plot:
-    columns, rows = levels
-    both = _named(names[0], result.units), _named(names[1], result.units)
-    figure = plot_gain_grid(columns, rows, values, both, size=PANEL, scale=SCALE)
-    i, j = np.unravel_index(int(np.nanargmin(values)), values.shape)
+    label: str,
+) -> Iterator[Plot]:
+    """Yield medians over two gains of a controller that were tried on a grid."""
+    first, second = (_dependence(group, gain, scale) for gain in gains)
+    columns, i = np.unique(first.gains, return_inverse=True)
+    rows, j = np.unique(second.gains, return_inverse=True)
+    if not (1 < len(columns) <= MOST_LEVELS and 1 < len(rows) <= MOST_LEVELS):
+        return
+    values = np.full((len(rows), len(columns)), np.nan)
+    for row, column in set(zip(j.tolist(), i.tolist(), strict=True)):
+        values[row, column] = np.median(first.values[(j == row) & (i == column)])
+    if np.isnan(values).mean() > 0.5:
+        return  # no grid: a sample of a range
+    levels = [
+        [gain.level(place) for place in each] for gain, each in zip(gains, (columns, rows), strict=True)
+    ]
+    titles = gains[0].title, gains[1].title
+    figure = plot_gain_grid(levels[0], levels[1], values, titles, size=PANEL, scale=SCALE)
+    row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {names[0]} and {names[1]}"
-    what = "final distance in m" if metres else RELATIVE
-    sentence = (
-        f"{title}: medians of the {what}, from {np.nanmin(values):.3g} at {both[0]} {_text(columns[j])} "
-        f"and {both[1]} {_text(rows[i])} to {np.nanmax(values):.3g}."
-    )
-    return Plot(title, inline_svg(figure, key, sentence))
-
-
-def _named(name: str, units: Mapping[str, str]) -> str:
-    unit = units.get(name, "")
-    return f"{name} ({unit})" if unit else name
-
-
-def _level_value(level: float, words: tuple[str, ...]) -> Value:
-    """Return the value of a gain at a level: nan is null, and a word's is its number."""
-    if np.isnan(level):
-        return None
-    return words[int(level)] if words else level
-
-
-def _level(level: float, words: tuple[str, ...] = ()) -> str:
-    return _text(_level_value(level, words))
-
-
-def _text(value: Value) -> str:
-    return value_text(value, digits=4)
-
-
-def _same(values: Array, level: float) -> BoolArray:
-    return np.isnan(values) if np.isnan(level) else values == level
+    what = "final distance in m" if label == METRES else RELATIVE
+    best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
+    span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"
+    yield Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
 
 
 MOST_MEASURED = 4  # runs up to which they are measured: what is in sight takes a while to know
@@ -403,24 +330,23 @@ class _Panel(NamedTuple):
     of: Callable[[RunMetrics], Array]
 
 
-def _part(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
-    return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
-
-
 def _in_contact(gaps: Array) -> Array:
     """Return gaps in whole millimetres: what is below is the solver's slop, which has no sign."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 
 _PANELS = (
-    _Panel("Sensed", "in range and in sight (% of the free area)", "%", _part(lambda m: m.sensed_area)),
-    _Panel("Seen", "in line of sight (% of the free area)", "%", _part(lambda m: m.visible_area)),
+    _Panel("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
+    _Panel("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
     _Panel("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
     _Panel("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
     _Panel("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
     _Panel("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
     _Panel(
-        "Connectivity", "parts of the team that hear each other", "", lambda m: m.components.astype(float)
+        "Connectivity",
+        "parts of the team that hear each other",
+        "",
+        lambda m: np.asarray(m.components, float),
     ),
 )
 
@@ -437,8 +363,7 @@ def measure_plots(
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):
         return []
-    groups = shown_groups(result)
-    group_of = {entry: group for group in groups for entry in group.entries}
+    label_of = {entry: group.label for group in shown_groups(result) for entry in group.entries}
     measured = [_measured(run) for run in runs]
     curves = [
         (panel, [(metrics.time, panel.of(metrics)) for metrics in measured])
@@ -453,26 +378,22 @@ def measure_plots(
     plots = []
     for panel, found in curves:
         bands = [
-            Band(
-                group_of[entry].label, entry.controller, time - time[0], np.where(known, values, np.nan)[None]
-            )
+            Band(label_of[entry], entry.controller, time - time[0], np.where(known, values, np.nan)[None])
             for entry, (time, values) in zip(entries, found, strict=True)
-            if entry in group_of and (known := np.isfinite(values)).any()
+            if entry in label_of and (known := np.isfinite(values)).any()
         ]
         if bands:
-            own = [looks[band.label] for band in bands]
+            own, name = [looks[band.label] for band in bands], panel.title.lower().replace(" ", "-")
             figure = plot_cost_bands(
                 bands, size=PANEL, scale=SCALE, title="", styles=own, label=panel.label, unit=panel.unit
             )
-            name = f"{key}-{panel.title.lower().replace(' ', '-')}"
-            plots.append(Plot(panel.title, inline_svg(figure, name, _sentence(panel, bands))))
+            plots.append(Plot(panel.title, inline_svg(figure, f"{key}-{name}", _sentence(panel, bands))))
     return plots
 
 
 def _measured(run: ReplayRun) -> RunMetrics:
-    record = run.record
-    seconds = float(record.time[-1] - record.time[0])
-    return run_metrics(record, _MEASURED / seconds if seconds > 0.0 else 0.0)
+    seconds = float(run.record.time[-1] - run.record.time[0])
+    return run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)
 
 
 def _sentence(panel: _Panel, bands: Sequence[Band]) -> str:
