@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robocov.errors import counted
 from robocov_app.render.density import density_words
-from robocov_app.report.groups import MOST_SAID, gain_text, setting_label, variants
+from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, setting_label, variants
+from robocov_app.report.results import Entry, Result, printable
 from robocov_app.sweep.study import UNITS, parameter_text
-
-if TYPE_CHECKING:
-    from robocov_app.report.groups import Comparison
-    from robocov_app.report.results import Entry, Result
 
 
 def title_of(result: Result) -> str:
     """Return what a result is called."""
-    labels = list(dict.fromkeys(entry.label for entry in result.entries))
-    maps = list(result.maps)
     if result.kind == "sweep":
-        from robocov_app.report.results import printable
-
         return f"Sweep {printable(result.folder.resolve().name)}"
-    return f"{_listed(labels)} on {_listed(maps)}"
+    labels = list(dict.fromkeys(entry.label for entry in result.entries))
+    return f"{_listed(labels)} on {_listed(list(result.maps))}"
 
 
 def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
@@ -39,12 +33,13 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
         words = [each.headline() for each in pairs[:MOST_SAID]]
         if len(pairs) > MOST_SAID:
             words.append(f"{counted(len(pairs) - MOST_SAID, 'more comparison')} below.")
-        return words or [f"{counted(len(fine), 'run')}, median final distance {_median(fine):.3f} m."]
+        median = np.median([entry.final for entry in fine])
+        return words or [f"{counted(len(fine), 'run')}, median final distance {median:.3f} m."]
     if len(fine) == 1:
-        entry = fine[0]
-        at = entry.figures.get("settled_at_s")
+        (entry,) = fine
+        at, gap = entry.figures.get("settled_at_s"), result.gap(entry)
         rest = "not settled by the end" if at is None else f"settled after {at:.1f} s"
-        above = _above(result, entry)
+        above = f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
         return [f"At the end the nearest robot is {entry.final:.3f} m away on average{above}; {rest}."]
     lowest = min(entry.final for entry in fine)
     labels = {entry: group.label for group in variants(result) for entry in group.entries}
@@ -59,10 +54,9 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
 def facts(result: Result) -> list[tuple[str, str]]:
     """Return what was run, as terms and descriptions."""
     known = result.facts
-    entries = result.entries
-    starts = list(dict.fromkeys(entry.start for entry in entries))
-    seeds = sorted({entry.seed for entry in entries if entry.seed is not None})
-    sizes = sorted({entry.robots for entry in entries})
+    starts = list(dict.fromkeys(entry.start for entry in result.entries))
+    sizes = sorted({entry.robots for entry in result.entries})
+    versions = known.get("versions")
     rows = [
         ("Runs", _runs_text(result)),
         ("Maps", ", ".join(result.maps)),
@@ -70,13 +64,22 @@ def facts(result: Result) -> list[tuple[str, str]]:
         ("Robots", ", ".join(map(str, sizes))),
         ("Team", _team_text(result)),
         ("Starts", ", ".join("given positions" if start is None else start for start in starts)),
-        ("Seeds", _seeds_text(seeds)),
-        ("Duration", _number(known.get("duration_s"), " s")),
-        ("Control period", _milliseconds(known.get("dt_s"))),
-        ("Cost evaluated on", _lattice(known.get("lattice"))),
-        ("Versions", _versions_text(known.get("versions"))),
+        ("Seeds", _seeds_text(result)),
+        ("Duration", _known_text("{:.6g} s", known.get("duration_s"))),
+        ("Control period", _known_text("{:.4g} ms", known.get("dt_s"), 1000)),
+        ("Cost evaluated on", _known_text("a lattice of {0} × {0} sites", known.get("lattice"))),
+        (
+            "Versions",
+            ", ".join(f"{name} {number}" for name, number in versions.items())
+            if isinstance(versions, dict)
+            else "",
+        ),
     ]
     return [(term, text) for term, text in rows if text]
+
+
+def _known_text(form: str, value: Any, factor: int = 1) -> str:
+    return "" if value is None else form.format(factor * value)
 
 
 def meanings(result: Result) -> list[tuple[str, str]]:
@@ -124,22 +127,17 @@ def _firsts(texts: Sequence[str], most: int = 3) -> str:
 
 def troubles(result: Result) -> list[str]:
     """Return sentences on what did not go well in runs: contacts, robots that got stuck, no rest."""
-    fine = len(result.fine)
-    words: list[str] = []
-    unsettled = sum(_known(e, "mean_distance_m") and not _known(e, "settled_at_s") for e in result.fine)
-    for count, what in (
-        (
-            sum((e.figures.get("contacts") or 0) > 0 for e in result.fine),
-            "a robot touched a wall or another one",
-        ),
-        (sum((e.figures.get("stuck_robots") or 0) > 0 for e in result.fine), "a robot was stuck at the end"),
-        (unsettled, "the team had not settled by the end"),
-    ):
-        if fine == 1:
-            words += [f"{what[0].upper()}{what[1:]}."] if count else []
-        elif count:
-            words.append(f"In {count} of {fine} runs {what}.")
-    return words
+    fine = result.fine
+    found = {
+        "a robot touched a wall or another one": [(e.figures.get("contacts") or 0) > 0 for e in fine],
+        "a robot was stuck at the end": [(e.figures.get("stuck_robots") or 0) > 0 for e in fine],
+        "the team had not settled by the end": [
+            e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine
+        ],
+    }
+    if len(fine) == 1:
+        return [f"{what[0].upper()}{what[1:]}." for what, (here,) in found.items() if here]
+    return [f"In {sum(where)} of {len(fine)} runs {what}." for what, where in found.items() if any(where)]
 
 
 def run_title(result: Result, entry: Entry, label: str) -> str:
@@ -159,7 +157,7 @@ def run_facts(result: Result, entry: Entry) -> str:
     """Return the figures of a run as a sentence."""
     figures = entry.figures
     words = [f"Gains: {gain_text(entry.gains, result.units)}"] if entry.gains else []
-    if _known(entry, "mean_time_s"):
+    if entry.has("mean_time_s"):
         words.append(f"mean time {figures['mean_time_s']:.3f} s")
     at = figures.get("settled_at_s")
     words.append("not settled" if at is None else f"settled at {at:.1f} s")
@@ -177,32 +175,6 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
-def _median(entries: Sequence[Entry]) -> float:
-    return float(np.median([entry.final for entry in entries]))
-
-
-def _above(result: Result, entry: Entry) -> str:
-    gap = result.gap(entry)
-    return f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
-
-
-def _known(entry: Entry, name: str) -> bool:
-    value = entry.figures.get(name)
-    return value is not None and bool(np.isfinite(value))
-
-
-def _number(value: Any, unit: str) -> str:
-    return "" if value is None else f"{value:.6g}{unit}"
-
-
-def _milliseconds(value: Any) -> str:
-    return "" if value is None else f"{1000 * value:.4g} ms"
-
-
-def _lattice(value: Any) -> str:
-    return "" if value is None else f"a lattice of {value} × {value} sites"
-
-
 def _runs_text(result: Result) -> str:
     done = len(result.fine)
     words = [str(done) if done == result.wanted else f"{done} done"]
@@ -215,17 +187,12 @@ def _runs_text(result: Result) -> str:
     return ", ".join(words)
 
 
-def _seeds_text(seeds: Sequence[int]) -> str:
+def _seeds_text(result: Result) -> str:
+    seeds = sorted({entry.seed for entry in result.entries if entry.seed is not None})
     if len(seeds) > 2 and seeds[-1] - seeds[0] == len(seeds) - 1:
         return f"{seeds[0]} to {seeds[-1]}"
     shown = ", ".join(map(str, seeds[:12]))
     return shown if len(seeds) <= 12 else f"{shown}, … ({len(seeds)})"
-
-
-def _versions_text(versions: Any) -> str:
-    if not isinstance(versions, dict):
-        return ""
-    return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
 def _team_text(result: Result) -> str:
@@ -248,12 +215,13 @@ def _parameter(key: str, value: Any) -> str:
         value = value[0] if value and same else value
     for name, unit in UNITS.items():
         if key == name or key.startswith(f"{name}_"):
+            words = name.replace("_", " ")
             if isinstance(value, str):
-                return f"{name.replace('_', ' ')} {parameter_text(name, value)}"
+                return f"{words} {parameter_text(name, value)}"
             if value is None:
-                return f"{name.replace('_', ' ')} without limit"
+                return f"{words} without limit"
             if isinstance(value, int | float):
-                return f"{name.replace('_', ' ')} {value:.4g} {unit}"
+                return f"{words} {value:.4g} {unit}"
             if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
-                return f"{name.replace('_', ' ')} {min(value):.4g} to {max(value):.4g} {unit}"
+                return f"{words} {min(value):.4g} to {max(value):.4g} {unit}"
     return ""

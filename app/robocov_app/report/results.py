@@ -116,6 +116,11 @@ class Entry:
         value = self.figures.get("mean_distance_m")
         return float("nan") if value is None else float(value)
 
+    def has(self, name: str) -> bool:
+        """Whether a figure is known, and finite."""
+        value = self.figures.get(name)
+        return value is not None and bool(np.isfinite(value))
+
     @property
     def setting(self) -> tuple[object, ...]:
         """What costs can be compared on: map, number of robots, team."""

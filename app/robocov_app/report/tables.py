@@ -151,7 +151,7 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
     def spread(name: str, decimals: int, nothing: str = NOTHING) -> Callable[[Sequence[Entry]], str]:
         return lambda entries: _quartiles(_values(entries, name), decimals, nothing)
 
-    timed = any(_known(entry, "mean_time_s") for entry in result.fine)
+    timed = any(entry.has("mean_time_s") for entry in result.fine)
     return [
         Column("Mean distance, m", spread("mean_distance_m", 3)),
         Column("Over the run, m", spread("mean_distance_over_run_m", 3)),
@@ -218,13 +218,8 @@ def _gaps(result: Result, entries: Sequence[Entry]) -> list[float]:
     return [100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))]
 
 
-def _known(entry: Entry, name: str) -> bool:
-    value = entry.figures.get(name)
-    return value is not None and bool(np.isfinite(value))
-
-
 def _values(entries: Sequence[Entry], name: str) -> list[float]:
-    return [float(entry.figures[name] or 0.0) for entry in entries if _known(entry, name)]
+    return [float(entry.figures[name] or 0.0) for entry in entries if entry.has(name)]
 
 
 def _quartiles(values: Sequence[float], decimals: int, nothing: str = NOTHING) -> str:
