@@ -112,7 +112,7 @@ def plot_result(
     """
     from robocov.robots import Team
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
-    from robocov_app.render.density import mean_words
+    from robocov_app.render.density import mean_label
     from robocov_app.render.distance_field import Field, FieldLattice
     from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
 
@@ -123,7 +123,7 @@ def plot_result(
     team = Team.homogeneous(n)
     if radius is not None:
         team = replace(team, radius=np.broadcast_to(np.asarray(radius, dtype=float), (n,)))
-    facts = f"{counted(n, 'robot')}, {mean_words(environment)} {result.mean_distance:.3f} m"
+    facts = f"{counted(n, 'robot')}, {mean_label(environment)} {result.mean_distance:.3f} m"
     if sites.lattice < PICTURE_LATTICE:
         finer = built_cost(environment, PICTURE_LATTICE, quiet=True)
         sites, result = finer.sites, finer(result.positions)

@@ -14,7 +14,7 @@ from robocov.density import Gaussian, Gaussians, Uniform
 from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
-from robocov_app.render.density import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, density_lines
 from robocov_app.report.embedding import density_picture, embedded_map
 
 PLAIN = Environment("plain", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)))
@@ -36,8 +36,8 @@ def told(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_the_line() -> None:
-    assert list(weighed_lines(PLAIN)) == list(weighed_lines(PLAIN.with_density(Uniform(2.0)))) == []
-    assert list(weighed_lines(HEAVY)) == ["weighed by φ    gaussians, 0.5 to 4.5"]
+    assert list(density_lines(PLAIN)) == list(density_lines(PLAIN.with_density(Uniform(2.0)))) == []
+    assert list(density_lines(HEAVY)) == ["weighed by φ    gaussians, 0.5 to 4.5"]
     assert density_kind(PLAIN) is None and density_kind(HEAVY) == "gaussians"
 
 

@@ -64,7 +64,7 @@ def command(options: Arguments) -> int:
 
 def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
     """Print the comparison for people."""
-    from robocov_app.render.density import weighed_lines
+    from robocov_app.render.density import density_lines
     from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
     timed = all("mean_time_s" in row for row in rows)
@@ -85,5 +85,5 @@ def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
         for row in rows
     )
     print_table([("", BOLD), *((title, RIGHT) for title in titles)], cells)
-    for line in weighed_lines(environment):
+    for line in density_lines(environment):
         print(line)

@@ -14,7 +14,7 @@ from robocov.arrays import Array
 from robocov.errors import InputError, ParameterError, shown
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
-from robocov_app.render.density import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, density_lines
 from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
 from robocov_app.terminal.output import finite
 
@@ -76,9 +76,9 @@ def command(options: Arguments) -> None:
                 arrays["times"] = timed.times
             np.savez(file, **arrays)
     if options.plot is not None:
-        from robocov_app.render.density import mean_words
+        from robocov_app.render.density import mean_label
 
-        mean = f"{mean_words(environment)} {result.mean_distance:.3f} m"
+        mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"
         if timed is not None:
             mean = f"mean time {timed.mean_time:.3f} s"
         fine = cost_for_pictures(environment, cost)
@@ -102,7 +102,7 @@ def command(options: Arguments) -> None:
         print(f"mean time       {timed.mean_time:.4f} s")
     print(f"coverage cost   {result.value:.3f} m³")
     print(f"uncovered area  {result.uncovered_area:.3f} m²")
-    for line in weighed_lines(environment):
+    for line in density_lines(environment):
         print(line)
     print(f"on {len(cost.points)} sites, {len(robots)} robots")
 

@@ -16,7 +16,7 @@ from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.render.density import density_kind, weighed_lines
+from robocov_app.render.density import density_kind, density_lines
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.terminal.output import finite, require_fresh
 from robocov_app.terminal.progress import late_progress
@@ -98,10 +98,10 @@ def command(options: Arguments) -> None:
         with written(options.positions) as part:
             part.write_text(f"[{rows}]\n", encoding="utf-8")
     if options.plot is not None:
-        from robocov_app.render.density import mean_words
+        from robocov_app.render.density import mean_label
 
         cost = built_cost(environment, PICTURE_LATTICE, quiet=True)
-        mean = f"{mean_words(environment)} {best.mean_distance:.3f} m"
+        mean = f"{mean_label(environment)} {best.mean_distance:.3f} m"
         title, theme = "Best positions found", options.theme
         draw_distances(options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius)
     if options.json:
@@ -188,7 +188,7 @@ def _print(
     print(f"mean distance   {best.mean_distance:.4f} m")
     print(f"coverage cost   {best.value:.3f} m³")
     print(f"uncovered area  {best.uncovered_area:.3f} m²")
-    for line in weighed_lines(environment):
+    for line in density_lines(environment):
         print(line)
     print(f"{robots} robot{'s' if robots > 1 else ''}, {count} restarts in {seconds:.1f} s, of these")
     for within in _WITHIN:

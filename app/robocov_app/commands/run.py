@@ -100,7 +100,7 @@ def remade(options: Arguments) -> int:
 
 def print_summary(run: Run) -> None:
     """Print what is worth knowing of a run."""
-    from robocov_app.render.density import weighed_lines
+    from robocov_app.render.density import density_lines
 
     summary, record = run.summary, run.record
     settled = summary["settled_at_s"]
@@ -112,7 +112,7 @@ def print_summary(run: Run) -> None:
         at_first = f"(at the start {run.history.mean_time[0]:.3f} s)"
         print(f"  mean time       {summary['mean_time_s']:.3f} s   {at_first}")
     print(f"  coverage cost   {summary['cost_m3']:.2f} m³")
-    for line in weighed_lines(record.environment):
+    for line in density_lines(record.environment):
         print(f"  {line}")
     if summary["uncovered_area_m2"] > 0:
         print(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")

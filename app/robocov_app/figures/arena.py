@@ -19,7 +19,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov_app.figures.page import tone
-from robocov_app.render.density import density_words, shading
+from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_on, robot_hues
@@ -256,7 +256,7 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
         mark: Any = {"marker": "s", "markersize": 7.0, "markerfacecolor": tone(theme.moving_obstacle)}
         mark["markeredgecolor"] = tone(theme.obstacle_edge)
         handles.append(Line2D([], [], label="moving obstacle and its path", **mark, **_path_style(theme)))
-    if density and (words := density_words(environment)):
+    if density and (words := density_label(environment)):
         colour = mix(theme.background, theme.density, 0.7 * theme.density_strength)
         handles.append(Patch(facecolor=tone(colour), linewidth=0.0, label=words))
     return handles

@@ -23,7 +23,7 @@ from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curv
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Box, Page, tone
 from robocov_app.figures.runs import plot_cost
-from robocov_app.render.density import cost_words, density_words, mean_words
+from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
 from robocov_app.render.heatmaps import border_colour
 from robocov_app.render.theme import LIGHT, Theme, theme_named
@@ -58,7 +58,7 @@ class Moment:
 
         `counted` are the rows of the robots that count, all by default.
         """
-        cost = cost_words(mean_words(record.environment), mean_distance, mean_time)
+        cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
         cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
         facts = f"{cost} after {record.time[-1]:.1f} s".lstrip()
         environment = record.environment.at(float(record.time[-1]))
@@ -112,7 +112,7 @@ def plot_coverage(
     free = page.size[0] if rooms.bar > 40 * s else bar_left
     page.title(title, 26, free - 2 * page.margin)
     if rooms.curves is not None:
-        weighed = any(density_words(moment.environment) for moment in moments)
+        weighed = any(density_label(moment.environment) for moment in moments)
         _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
     panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
     for moment, (box, slot) in zip(moments, panels, strict=True):

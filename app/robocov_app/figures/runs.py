@@ -16,7 +16,7 @@ from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles,
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, figure_of
-from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
@@ -256,4 +256,4 @@ def _time(record: Record) -> str:
 def _cost(environment: Environment, mean_distance: float | None, mean_time: float | None) -> str:
     if mean_distance is None:
         return ""
-    return cost_words(mean_words(environment), mean_distance, mean_time)
+    return cost_label(mean_label(environment), mean_distance, mean_time)

@@ -73,34 +73,34 @@ def _inside(density: Density, bounds: Bounds) -> Array:
     return np.asarray(centers[((low <= centers) & (centers <= high)).all(axis=1)])
 
 
-def density_words(environment: Environment) -> str:
+def density_label(environment: Environment) -> str:
     """Return the words of the legend, empty where every place counts the same."""
     if environment.density is None or environment.density.uniform:
         return ""
-    return range_words(density_range(environment))
+    return range_label(density_range(environment))
 
 
-def range_words(span: tuple[float, float]) -> str:
+def range_label(span: tuple[float, float]) -> str:
     """Return the words of the legend for a range of values.
 
-    >>> range_words((0.25, 10.0))
+    >>> range_label((0.25, 10.0))
     'density φ, 0.25 to 10'
     """
     low, high = span
     return f"density φ, {low:.3g} to {high:.3g}"
 
 
-def mean_words(environment: Environment) -> str:
+def mean_label(environment: Environment) -> str:
     """Return what the mean distance to the nearest robot is called, whether weighed or not."""
-    return "mean distance by φ" if density_words(environment) else "mean distance"
+    return "mean distance by φ" if density_label(environment) else "mean distance"
 
 
-def cost_words(what: str, mean_distance: float, mean_time: float | None = None) -> str:
+def cost_label(what: str, mean_distance: float, mean_time: float | None = None) -> str:
     """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
 
     What is not finite is left out: a team of which no robot works covers nothing.
 
-    >>> cost_words("mean distance", 1.25), cost_words("mean distance by φ", 1.25, 3.0)
+    >>> cost_label("mean distance", 1.25), cost_label("mean distance by φ", 1.25, 3.0)
     ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
     """
     known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
@@ -116,7 +116,7 @@ def density_kind(environment: Environment) -> str | None:
     return None if environment.density is None else environment.density.kind
 
 
-def weighed_lines(environment: Environment) -> Iterator[str]:
+def density_lines(environment: Environment) -> Iterator[str]:
     """Yield the line that says by what the figures above it are weighed; none where nothing weighs them."""
     density = environment.density
     if density is None or density.uniform:

@@ -15,7 +15,7 @@ from robocov.density import Density
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import length_label
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density import colours, density_words, parts
+from robocov_app.render.density import colours, density_label, parts
 from robocov_app.render.distance_field import Field, levels, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
@@ -38,7 +38,7 @@ def draw_density(canvas: Canvas, scene: Scene) -> None:
 
 def density_legend(scene: Scene) -> list[LegendEntry]:
     """Return the entry of the density with its range."""
-    words = density_words(scene.environment)
+    words = density_label(scene.environment)
     return [density_entry(words)] if words else []
 
 

@@ -108,7 +108,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "pairs": tables.pairs_table(pairs, looks) if pairs else None,
         "pairs_plots": list(plots.paired_plots(pairs, looks, f"{key}p")),
         "map_pairs": tables.map_pairs_tables(pairs),
-        "pairs_words": grouped.pairs_words(pairs, compared.words),
+        "pairs_method": grouped.pairs_method(pairs, compared.words),
         "dependences": list(plots.dependence_plots(result, f"{key}d")),
         "failures": tables.failures_table(result, looks),
         "settings": len(every),

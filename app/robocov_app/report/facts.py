@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from robocov.errors import counted
-from robocov_app.render.density import density_words
+from robocov_app.render.density import density_label
 from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, setting_label, variants
 from robocov_app.report.results import Entry, Result, printable
 from robocov_app.sweep.study import UNITS, parameter_text
@@ -90,7 +90,7 @@ def meanings(result: Result) -> list[tuple[str, str]]:
 
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
-    words = {name: density_words(environment) for name, environment in result.maps.items()}
+    words = {name: density_label(environment) for name, environment in result.maps.items()}
     some = {name: each for name, each in words.items() if each}
     if len(result.maps) == 1:
         return "".join(some.values())

@@ -352,7 +352,7 @@ def compared_groups(result: Result) -> Compared:
     return Compared(groups, words)
 
 
-def pairs_words(found: Sequence[Comparison], chosen: str) -> str:
+def pairs_method(found: Sequence[Comparison], chosen: str) -> str:
     """Return how the pairs were made, how gains were chosen, and what the intervals mean."""
     words = f"A pair is two runs on the same map, with the same team, start and seed. {chosen}"
     if not found or max(each.pairs for each in found) < 2:

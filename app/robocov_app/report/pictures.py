@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from robocov_app.render.density import density_words
+from robocov_app.render.density import density_label
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import MovingObstacle, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
@@ -135,7 +135,7 @@ def map_sentence(environment: Environment) -> str:
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
     count = len(environment.obstacles)
-    weighed = density_words(environment)
+    weighed = density_label(environment)
     moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
     obstacles += f" ({moving} moving)" if moving else ""
@@ -160,7 +160,7 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
         first, final = history.mean_distance[[0, -1]]
         word = "falls" if final < first else "goes"
-        weighed = ", weighed by φ," if density_words(record.environment) else ""
+        weighed = ", weighed by φ," if density_label(record.environment) else ""
         text += (
             f" The mean distance to the nearest robot{weighed} {word} from {first:.3f} m to {final:.3f} m."
         )

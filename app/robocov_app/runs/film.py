@@ -15,7 +15,7 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP, legend_picture
 from robocov_app.render.canvas import LegendEntry
-from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.distance_field import Fields, round_limit
 from robocov_app.render.layers import Layer
 from robocov_app.render.layout import columns_for, united
@@ -84,7 +84,7 @@ def iter_frames(
     last, frame = -1, None
     for row in rows.tolist():
         if frame is None or row != last:
-            text = _cost_text(mean_words(record.environment), float(record.time[row]), cost)
+            text = _cost_text(mean_label(record.environment), float(record.time[row]), cost)
             field = fields if painter.needs_field else None
             last, frame = row, painter.frame(record_scene(record, row, cost=text, fields=field))
         yield frame
@@ -109,7 +109,7 @@ def _cost_text(what: str, time: float, cost: Costs | None) -> str:
     if cost is None:
         return ""
     known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
-    return cost_words(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
+    return cost_label(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
 
 
 class PaneLayout(NamedTuple):

@@ -13,7 +13,7 @@ from robocov_app.render import sprites
 from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.distance_field import round_limit
 from robocov_app.render.layout import united
 from robocov_app.render.marks import drawn_radii
@@ -230,8 +230,8 @@ class Arena:
         _, times = compared(session, TIME)
         if lane.number not in distances:
             return ""
-        what = mean_words(session.circumstances(lane).environment)
-        words = cost_words(what, distances[lane.number], times.get(lane.number))
+        what = mean_label(session.circumstances(lane).environment)
+        words = cost_label(what, distances[lane.number], times.get(lane.number))
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
     def _scale_colours(self, largest: float) -> None:

@@ -11,7 +11,7 @@ import pygame
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import Canvas
-from robocov_app.render.density import density_words
+from robocov_app.render.density import density_label
 from robocov_app.render.theme import mix
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.layout import inside
@@ -190,7 +190,7 @@ class Chart:
         left, right, end = self._span
         height = self.layout.chart[3]
         top, bottom = TOP * scale, height - BOTTOM * scale
-        weighed = ", weighed by φ" if density_words(session.environment) else ""
+        weighed = ", weighed by φ" if density_label(session.environment) else ""
         what = self.plotted
         title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)

@@ -18,7 +18,7 @@ from robocov.controllers import remembers
 from robocov.environment import CircleObstacle, Environment
 from robocov.metrics import CostHistory, summarise
 from robocov.record import Record, Recorder
-from robocov_app.render.density import cost_words, mean_words
+from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
@@ -294,7 +294,7 @@ def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: st
         for time, value in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True)
     ]
     values = [value for time, value in known if time <= pane.time + 1e-9]
-    cost = cost_words(mean_words(setup.environment), values[-1], None) if values else ""
+    cost = cost_label(mean_label(setup.environment), values[-1], None) if values else ""
     trail, times = pane.trail.until(pane.time)
     scene = Scene.of(
         setup.environment.at(snapshot.time),

@@ -135,10 +135,10 @@ class TestEdits:
         assert sketch.environment().density == sketch.density
 
     def test_in_words(self):
-        assert density_edits.density_words(None) == "none: every place counts the same"
-        assert density_edits.density_words(ONE) == "1 hot spot, floor 0.5"
-        assert density_edits.density_words(KINDS["bilinear"]) == "picture, 13 x 11"
-        assert density_edits.density_words(KINDS["rooms"]) == "2 areas, 0.3 to 4"
+        assert density_edits.density_label(None) == "none: every place counts the same"
+        assert density_edits.density_label(ONE) == "1 hot spot, floor 0.5"
+        assert density_edits.density_label(KINDS["bilinear"]) == "picture, 13 x 11"
+        assert density_edits.density_label(KINDS["rooms"]) == "2 areas, 0.3 to 4"
 
 
 def test_with_the_mouse_and_by_typing(tmp_path):
@@ -177,7 +177,7 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         hands.command("floor 0.2")
         hands.command("weight 3")
         assert hands.sketch.density.floor == 0.2 and hands.desk.tool.weight == 3.0
-        assert density_edits.density_words(hands.sketch.density) == "2 hot spots, floor 0.2"
+        assert density_edits.density_label(hands.sketch.density) == "2 hot spots, floor 0.2"
         hands.command("density none")
         assert hands.sketch.density is None
         hands.command("density some")

@@ -6,7 +6,7 @@ from density_cases import GAUSSIANS, POLYGONS
 
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import Environment
-from robocov_app.render.density import colours, density_range, density_words, mean_words, shading, value_range
+from robocov_app.render.density import colours, density_label, density_range, mean_label, shading, value_range
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 BOUNDS = (0.0, 0.0, 8.0, 8.0)
@@ -15,10 +15,10 @@ SQUARE = Environment("square", ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0)))
 
 def test_words_are_there_only_where_places_differ():
     for density in (None, Uniform(3.0), Gaussians((), 2.0), Raster(np.ones((2, 2)), BOUNDS)):
-        assert density_words(SQUARE.with_density(density)) == ""
-        assert mean_words(SQUARE.with_density(density)) == "mean distance"
-    assert density_words(SQUARE.with_density(POLYGONS["rooms"])) == "density φ, 0.3 to 4"
-    assert mean_words(SQUARE.with_density(POLYGONS["rooms"])) == "mean distance by φ"
+        assert density_label(SQUARE.with_density(density)) == ""
+        assert mean_label(SQUARE.with_density(density)) == "mean distance"
+    assert density_label(SQUARE.with_density(POLYGONS["rooms"])) == "density φ, 0.3 to 4"
+    assert mean_label(SQUARE.with_density(POLYGONS["rooms"])) == "mean distance by φ"
 
 
 def test_the_range_finds_narrow_hot_spots():

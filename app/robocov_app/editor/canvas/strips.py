@@ -18,7 +18,7 @@ from robocov_app.render.annotations import (
     legend_rows,
     legend_strip,
 )
-from robocov_app.render.density import range_words, value_range
+from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import density_entry
 
@@ -77,7 +77,7 @@ class Strips:
         if density is not None and not density.uniform and sketch.boundary:
             x, y = zip(*sketch.boundary, strict=True)
             span = value_range(density, (min(x), min(y), max(x), max(y)))
-            found.append(density_entry(range_words(span)))
+            found.append(density_entry(range_label(span)))
         return found
 
     def draw(self, screen: pygame.Surface, canvas: Canvas, arena: Box) -> None:

@@ -149,7 +149,7 @@ def weight_of(text: str) -> float:
     return _weight(weight, least=LIGHTEST)
 
 
-def density_words(density: Density | None) -> str:
+def density_label(density: Density | None) -> str:
     """Return what a density is, in a few words."""
     if density is None:
         return "none: every place counts the same"

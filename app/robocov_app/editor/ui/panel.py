@@ -9,7 +9,7 @@ import pygame
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.overlay import draw_badge
-from robocov_app.editor.edits.density import density_words
+from robocov_app.editor.edits.density import density_label
 from robocov_app.editor.edits.fixes import TITLES
 from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
@@ -421,7 +421,7 @@ def facts(desk: Editor) -> tuple[str, ...]:
         xs, ys = [x for x, _ in ring], [y for _, y in ring]
         size = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
     if measurement is None:
-        return (size, "…", "…", "…", "…", density_words(sketch.density))
+        return (size, "…", "…", "…", "…", density_label(sketch.density))
     parts, reached = len(measurement.components), len(measurement.reached)
     gap, diameter = measurement.gap, 2 * measurement.radius
     count = len(sketch.obstacles)
@@ -433,5 +433,5 @@ def facts(desk: Editor) -> tuple[str, ...]:
         if gap is None
         else f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m",
         f"{count} obstacle{'' if count == 1 else 's'}, {measurement.vertices} vertices",
-        density_words(sketch.density),
+        density_label(sketch.density),
     )
