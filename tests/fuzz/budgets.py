@@ -212,7 +212,7 @@ def read(place: Path, seconds: float) -> Cost:
     import resource
 
     from robocov.errors import RobocovError
-    from robocov_app.importers import ReadOptions, Shaping, detect, import_map, shaped
+    from robocov_app.formats import ReadOptions, Shaping, detect, import_map, shaped
 
     # what imports need is the fault of no file
     options = {"wkt": ReadOptions(), "pgm": ReadOptions(cell=1.0), "dxf": ReadOptions(scale=1.0)}

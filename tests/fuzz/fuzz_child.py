@@ -90,7 +90,7 @@ def _require_map(environment: Any) -> str:
 
 
 def _import(path: Path, job: dict[str, Any]) -> str:
-    from robocov_app.importers import ReadOptions, Shaping, import_map
+    from robocov_app.formats import ReadOptions, Shaping, import_map
 
     options = {
         key: tuple(value) if isinstance(value, list) else value for key, value in job["options"].items()
@@ -163,7 +163,7 @@ _READ = {"import": _import, "map": _map, "study": _study, "check": _check, "misb
 def _load() -> None:
     """Load what reading needs, so that neither time nor memory for that counts."""
     import robocov_app.commands.check
-    import robocov_app.importers
+    import robocov_app.formats
     import robocov_app.sweep.study_file  # noqa: F401
 
 

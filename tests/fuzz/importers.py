@@ -73,7 +73,7 @@ _MOSTLY = {"picture": "cell", "svg": "scale"}
 
 def targets() -> list[str]:
     """Return what can be fuzzed: every importer, and what the project's own formats are read by."""
-    from robocov_app.importers import IMPORTERS
+    from robocov_app.formats import IMPORTERS
 
     return ["map", "study", "check", *IMPORTERS]
 
@@ -91,7 +91,7 @@ def drawn_job(target: str, random: Random) -> Job:
         return Job(target)
     if target == "check":
         return Job(target, options={"words": ["--json"]} if random.random() < 0.3 else {})
-    from robocov_app.importers import IMPORTERS
+    from robocov_app.formats import IMPORTERS
 
     options = {
         name: random.choice(_OPTIONS[name])

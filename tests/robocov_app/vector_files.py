@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from robocov_app.importers import IMPORTERS, ForeignMap, ReadOptions
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions
 
 
 def read(folder: Path, kind: str, content: Any, **options: Any) -> ForeignMap:

@@ -13,7 +13,7 @@ import tyro
 from robocov.errors import InputError, one_line
 from robocov.files.atomic import writable
 from robocov.mapfile import load_map
-from robocov_app.exporters import EXPORTERS, WriteOptions, export_map, exporter
+from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
 
 
 @dataclass

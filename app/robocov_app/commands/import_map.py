@@ -14,7 +14,7 @@ from robocov.errors import InputError, one_line
 from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.figures.files import check_figure_path
-from robocov_app.importers import IMPORTERS, ReadOptions, Shaping, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
 from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
@@ -131,7 +131,7 @@ def command(options: Arguments) -> None:
         save_map(environment, out)
         done(2)
         if options.preview is not None:
-            from robocov_app.importers.preview import preview
+            from robocov_app.formats.preview import preview
 
             preview(foreign, environment, report, options.preview)
         done(3)

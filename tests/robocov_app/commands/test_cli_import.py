@@ -10,7 +10,7 @@ from raster_files import PLAN, drawn, pgm, ros_map
 
 from robocov.mapfile import load_map
 from robocov_app.cli import main
-from robocov_app.importers import IMPORTERS, ReadOptions
+from robocov_app.formats import IMPORTERS, ReadOptions
 
 GRID = "type octile\nheight 4\nwidth 5\nmap\n@@@@@\n@..T@\n@...@\n@@@@@\n"
 

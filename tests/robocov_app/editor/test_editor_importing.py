@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 from robocov_app.editor.edits.properties import titled
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Importing, options_of
-from robocov_app.importers import IMPORTERS, ReadOptions, Shaping
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping
 from robocov_app.toolkit.dialogs import Question
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from robocov_app.editor.model.autosave import Autosave
     from robocov_app.editor.ui.editor import Editor
-    from robocov_app.importers import Importer
+    from robocov_app.formats import Importer
 
 _PATIENCE = 2.0
 """Seconds after which an import with settings that have changed since is given up."""
@@ -108,7 +108,7 @@ class FileCommands:
 
     def ask_file(self) -> None:
         """Ask which file to open."""
-        from robocov_app.importers import IMPORTERS
+        from robocov_app.formats import IMPORTERS
 
         foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
         self._ask_path("Open a map", self.open, [SUFFIX, *foreign])
@@ -229,7 +229,7 @@ class FileCommands:
 
     def ask_export(self) -> None:
         """Ask where to write the map in a foreign format, which goes by the suffix."""
-        from robocov_app.exporters import EXPORTERS
+        from robocov_app.formats import EXPORTERS
 
         self.desk.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
@@ -239,7 +239,7 @@ class FileCommands:
         self._ask_path(title, self._export, suffixes, f"{name}.svg", saves=True)
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
-        from robocov_app.exporters import export_map
+        from robocov_app.formats import export_map
 
         if path.exists() and not over:
             over_it = ("Replace it", "r", lambda: self._export(path, over=True))
@@ -334,7 +334,7 @@ def opened(path: Path, drafts: Path | None) -> Document | Importer:
         return Document.opened(path, drafts)
     except MapError as error:
         if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
-            from robocov_app.importers import detect
+            from robocov_app.formats import detect
 
             try:
                 return detect(path)

@@ -14,8 +14,8 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
 from robocov_app.editor.ui.importing import Imported, Wanted, options_of
-from robocov_app.importers import Importer, ReadOptions, Shaping
-from robocov_app.importers.report import square_metres
+from robocov_app.formats import Importer, ReadOptions, Shaping
+from robocov_app.formats.foreign import square_metres
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_h
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
-from robocov_app.importers import ForeignMap, ImportReport, ReadOptions, Shaping, read_map, shaped
-from robocov_app.importers.comparison import Comparison, compare
+from robocov_app.formats import ForeignMap, ImportReport, ReadOptions, Shaping, read_map, shaped
+from robocov_app.formats.geometry.shaping import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from robocov_app.importers import Importer
+    from robocov_app.formats import Importer
 
 Kind = Literal["number", "place", "words", "text", "choice"]
 

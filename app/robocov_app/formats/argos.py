@@ -1,0 +1,160 @@
+"""Arenas of the simulator ARGoS: https://www.argos-sim.info/user_manual.php.
+
+C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for multi-robot systems, Swarm
+Intelligence 6 (2012), 271-295.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from robocov.arrays import Array
+from robocov.errors import one_line, shown
+from robocov.mapfile.models import LARGEST
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.shapes import Shapes
+from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.xml_tree import Element, read_xml_tree
+
+MOST_PLACED = 4_000
+"""Entities that a file places in a grid or at one place."""
+
+_UPRIGHT = 1e-6
+"""Bodies that are turned about other axes than z by more are tilted, in degrees."""
+
+
+def is_argos(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like an experiment of ARGoS."""
+    return b"<argos-configuration" in head
+
+
+def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the arena of an ARGoS experiment.
+
+    Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose
+    places are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
+    distributed at random is left out and counted: only ARGoS itself can tell from the seed where it puts
+    them, and the walls of the arena are a map without.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood; with the line.
+    """
+    root, where = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
+    arena = next((child for child in root.children if child.tag == "arena"), None)
+    if arena is None:
+        root.refuse(where, "no <arena>, but one was wanted")
+    shapes = Shapes(where, options)
+    size, centre = (
+        _lengths(arena, "size", where)[:2],
+        arena.numbers(where, "center", count=3, default="0,0,0")[:2],
+    )
+    corner = centre - size / 2
+    robots: list[tuple[float, float]] = []
+    for child in arena.children:
+        if child.tag == "distribute":
+            _distribute(child, shapes, robots)
+        else:
+            body = child.child("body")
+            if body is not None:
+                position = body.numbers(where, "position", count=3, default="0,0,0")
+                _place(
+                    child,
+                    position,
+                    body.numbers(where, "orientation", count=3, default="0,0,0"),
+                    shapes,
+                    robots,
+                )
+    foreign = foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=path.stem,
+        description="An arena of ARGoS, imported.",
+        solid=True,
+        world=MultiPolygon([shapely.box(*corner, *(corner + size))]),
+    )
+    return replace(foreign, robots=tuple(robots))
+
+
+def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, float]]) -> None:
+    """Place what ARGoS would, where that is no matter of chance."""
+    where = shapes.where
+    parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
+    position, orientation, entity = parts.values()
+    if position is None or orientation is None or entity is None or not entity.children:
+        element.refuse(where, "<position>, <orientation> and <entity> with something in it were wanted")
+    quantity = int(entity.numbers(where, "quantity", count=1)[0])
+    thing = entity.children[0]
+    methods = [part.attributes.get("method", "") for part in (position, orientation)]
+    if methods[0] not in ("grid", "constant") or methods[1] != "constant":
+        shapes.leave_out(one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
+        return
+    if not 0 <= quantity <= MOST_PLACED:
+        entity.refuse(where, f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
+    turn = orientation.numbers(where, "values", count=3)
+    if methods[0] == "constant":
+        places = [position.numbers(where, "values", count=3)] * quantity
+    else:
+        layout = position.numbers(where, "layout", count=3).astype(int)
+        if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
+            position.refuse(where, f"layout {layout.tolist()}, but one for {quantity} was wanted")
+        gaps = position.numbers(where, "distances", count=3)
+        first = position.numbers(where, "center", count=3) + (layout - 1) * gaps / 2
+        k = np.arange(quantity)
+        steps = [k % layout[0], k // layout[0] % layout[1], k // (layout[0] * layout[1])]
+        places = [*(first - np.column_stack(steps) * gaps)]
+    for place in places:
+        _place(thing, place, turn, shapes, robots)
+
+
+def _place(
+    element: Element, position: Array, turn: Array, shapes: Shapes, robots: list[tuple[float, float]]
+) -> None:
+    """Add a body at a position, m, turned about z, y, x, degrees."""
+    where, tag = shapes.where, element.tag
+    labels = [element.attributes.get("id", tag), tag]
+    if tag not in ("box", "cylinder"):
+        if shapes.wants(labels):
+            robots.append((float(position[0]), float(position[1])))
+    elif not shapes.wants(labels):
+        return
+    elif (np.abs((turn[1:] + 90) % 180 - 90) > _UPRIGHT).any():
+        shapes.leave_out(tag, "that is tilted")
+    elif tag == "box":
+        x, y = _lengths(element, "size", where)[:2] / 2
+        cos, sin = math.cos(math.radians(turn[0])), math.sin(math.radians(turn[0]))
+        ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) @ np.array([[cos, sin], [-sin, cos]])
+        shapes.add_outline([ring + position[:2]], labels, at=f"line {element.line}")
+    else:
+        radius = float(_lengths(element, "radius", where, count=1)[0])
+        shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")
+
+
+def _lengths(element: Element, name: str, where: str, count: int = 3) -> Array:
+    values = element.numbers(where, name, count=count)
+    if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
+        element.refuse(where, f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
+    return values
+
+
+IMPORTER = Importer(
+    name="argos",
+    title="ARGoS: the arena of an experiment (.argos)",
+    suffixes=(".argos",),
+    sniff=is_argos,
+    read=read_argos,
+    options=frozenset({"only", "skip"}),
+)

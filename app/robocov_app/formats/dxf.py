@@ -1,0 +1,470 @@
+"""DXF drawings."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+from collections.abc import Iterable, Sequence
+from itertools import islice, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from robocov.arrays import Array
+from robocov.errors import MapError, RobocovError, one_line, shown
+from robocov.extras import extra
+from robocov.mapfile.models import FARTHEST
+from robocov_app.formats import files
+from robocov_app.formats.files import MAX_DEPTH
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.options import Importer, ReadOptions
+
+_BULGE = 1e-9
+"""Edges of polylines that are bent less are straight."""
+
+
+def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
+    """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
+
+    A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
+
+    Parameters
+    ----------
+    points : (k, 2)
+    bulges : (k,)
+        The last one is not used.
+    tolerance : float
+
+    Raises
+    ------
+    ValueError
+        When there would be more than `MOST_POINTS`.
+    """
+    arcs = extra("ezdxf.math", "dxf")
+    drawn = [points[:1]]
+    left = float(MOST_POINTS)
+    for (a, b), bulge in zip(pairwise(points), bulges[:-1].tolist(), strict=True):
+        if abs(bulge) > _BULGE and (a != b).any():
+            centre, begin, end, radius = arcs.bulge_to_arc(a, b, bulge)
+            left -= 4 * math.atan(abs(bulge)) * math.sqrt(radius / tolerance / 8)
+            if not left > 0.0:
+                raise ValueError(f"more than {MOST_POINTS} points, but fewer were wanted")
+            arc = arcs.ConstructionArc(centre, radius, *np.degrees([begin, end]))
+            curve = flat(list(arc.flattening(min(tolerance, radius / 8))))
+            drawn.append((curve if bulge > 0.0 else curve[::-1])[1:-1])
+        drawn.append(b[None])
+    return np.concatenate(drawn)
+
+
+def spline(entity: Any, tolerance: float) -> Array:
+    """Return points of an ezdxf spline: a rational B-spline, between the knots where it is defined.
+
+    Its own `flattening` goes on to where it is not, which spoils closed ones (ezdxf 1.4).
+    L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2.
+
+    Raises
+    ------
+    ValueError
+        When knots and control points do not fit together.
+    """
+    tool = entity.construction_tool()
+    control, knots, degree = flat(tool.control_points), np.array(tool.knots(), dtype=float), tool.degree
+    weights = np.array(tool.weights() or np.ones(len(control)), dtype=float)
+    if not np.isfinite(knots).all() or not (np.isfinite(weights).all() and (weights > 0.0).all()):
+        raise ValueError("knots and weights of a spline, but finite ones were wanted")
+    rational = BSpline(knots, np.column_stack([control, np.ones(len(control))]) * weights[:, None], degree)
+    breaks = np.unique(knots[degree : len(control) + 1])
+
+    def curve(t: Array) -> Array:
+        found = rational(t)
+        return np.asarray(found[:, :2] / found[:, 2:])
+
+    return sampled(curve, breaks, tolerance)
+
+
+def flat(points: Sequence[Any]) -> Array:
+    """Return ezdxf vectors as (k, 2)."""
+    return np.array([(point[0], point[1]) for point in points], dtype=float).reshape(-1, 2)
+
+
+MOST_ENTITIES = 200_000
+"""That are drawn, blocks and all."""
+
+_FRAME = 16
+"""Flag of a vertex that only shapes the spline of an old polyline."""
+
+_LEVEL = 1.0 - 1e-9
+"""Upward part of the direction, of length 1, that a circle is seen from as one."""
+
+_CLOSED = 1e-9
+"""Curves whose ends are nearer, in parts of their coordinates, are closed."""
+
+
+class DxfDrawing:
+    """Goes through the entities and adds them to the shapes.
+
+    Parameters
+    ----------
+    document : ezdxf drawing
+    where : str
+        What messages call the file.
+    shapes : Shapes
+    scale : float, m
+        Of a unit.
+    """
+
+    def __init__(self, document: Any, where: str, shapes: Shapes, scale: float) -> None:
+        self.document = document
+        self.where = where
+        self.shapes = shapes
+        self.scale = scale
+        self.drawn = 0
+        self.curved = False
+        self._hidden = {
+            str(layer.dxf.name).casefold() for layer in document.layers if layer.is_off() or layer.is_frozen()
+        }
+
+    def draw(self) -> None:
+        """Add all that is drawn.
+
+        Raises
+        ------
+        MapError
+            When a block is inserted within itself, or too much is drawn.
+        """
+        space = self.document.modelspace()
+        self._require_few(space)
+        self._draw(space, "0", ())
+
+    def notes(self) -> list[str]:
+        """Return what is worth knowing of how things were taken."""
+        return [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.curved else []
+
+    def _require_few(self, space: Iterable[Any]) -> None:
+        """Count what will be drawn, blocks and all, without drawing it: a few kB may stand for billions."""
+        counted: dict[str, int] = {}
+        inside: list[str] = []
+
+        def count(entities: Iterable[Any]) -> int:
+            return sum(count_insert(entity) if entity.dxftype() == "INSERT" else 1 for entity in entities)
+
+        def count_insert(insert: Any) -> int:
+            name = str(insert.dxf.get("name", "")).casefold()
+            if name in inside:
+                what = f"block {shown(name)} is inserted within itself, but an end was wanted"
+                raise MapError(f"{self.where}: {what}")
+            if len(inside) >= MAX_DEPTH:
+                raise MapError(f"{self.where}: blocks nested deeper than {MAX_DEPTH}, but less was wanted")
+            if name not in counted:
+                block = self.document.blocks.get(name)
+                inside.append(name)
+                counted[name] = 0 if block is None else count(block)
+                inside.pop()
+            rows, columns = (int(insert.dxf.get(key, 1)) for key in ("row_count", "column_count"))
+            return max(rows, 1) * max(columns, 1) * (1 + counted[name])
+
+        total = count(space)
+        if total > MOST_ENTITIES:
+            # of blocks in blocks it may be too many for a float
+            what = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
+            raise MapError(f"{self.where}: {what}, but at most {MOST_ENTITIES} were wanted")
+
+    def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
+        """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""
+        for entity in entities:
+            self.drawn += 1
+            if self.drawn > MOST_ENTITIES:
+                raise MapError(f"{self.where}: more than {MOST_ENTITIES} entities, but fewer were wanted")
+            try:
+                self._one(entity, layer, blocks)
+            except RobocovError:
+                raise
+            except Exception as error:  # of ezdxf, which raises what it likes on nonsense
+                self.shapes.leave_out(
+                    "damaged shape", f"({one_line(entity.dxftype())[:20]}: {type(error).__name__})"
+                )
+
+    def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
+        """Add an entity, or what a block holds; see `_draw`."""
+        own = str(entity.dxf.get("layer", "0"))
+        own = layer if own == "0" and blocks else own
+        kind = entity.dxftype()
+        if own.casefold() in self._hidden or entity.dxf.get("invisible", 0):
+            self.shapes.leave_out("shape", "hidden, or on layers that are off")
+        elif kind == "INSERT":
+            self._insert(entity, own, blocks)
+        elif kind == "MLINE":
+            self._draw(entity.virtual_entities(), own, blocks)
+        elif self.shapes.wants(labels := (own, *reversed(blocks))):
+            self._add(kind, entity, labels)
+
+    def _insert(self, insert: Any, layer: str, blocks: tuple[str, ...]) -> None:
+        """Add what a block holds, wherever it is inserted."""
+        block = insert.block()
+        if block is None or block.block.is_xref:
+            self.shapes.leave_out("block", "missing from the file")
+            return
+        for single in insert.multi_insert() if insert.mcount > 1 else (insert,):
+            self._draw(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
+
+    def _add(self, kind: str, entity: Any, labels: tuple[str, ...]) -> None:
+        """Add one entity that is no block."""
+        at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
+        if kind == "LINE":
+            ends = self._metres([entity.dxf.start, entity.dxf.end])
+            self.shapes.add_line(Line(ends, self.shapes.thickness, labels), at=at)
+        elif kind == "POINT":
+            self.shapes.add_point(self._metres([entity.dxf.location])[0], at=at)
+        elif kind in ("CIRCLE", "ARC"):
+            self._arc(kind, entity, labels, at)
+        elif kind == "ELLIPSE":
+            self._require_near(flat([entity.dxf.center, entity.dxf.major_axis]))
+            self._curve(flat(list(entity.flattening(self._tolerance))), labels, at)
+        elif kind == "SPLINE":
+            self._spline(entity, labels, at)
+        elif kind in ("LWPOLYLINE", "POLYLINE"):
+            self._polyline(kind, entity, labels, at)
+        elif kind in ("SOLID", "TRACE"):
+            self._outline([self._metres(entity.wcs_vertices())], labels, at)
+        elif kind == "HATCH" and self.shapes.options.hatches:
+            self._hatch(entity, labels, at)
+        elif kind == "HATCH":
+            self.shapes.leave_out("HATCH", "(--hatches takes them as areas)")
+        else:
+            self.shapes.leave_out(one_line(kind)[:40])
+
+    @property
+    def _tolerance(self) -> float:
+        return TOLERANCE / self.scale
+
+    def _metres(self, points: Sequence[Any]) -> Array:
+        """Return points of the drawing as (k, 2) m; third coordinates are told of."""
+        heights = np.array([point[2] if len(point) > 2 else 0.0 for point in points])
+        self.shapes.leave_heights(heights[heights != 0.0])
+        return flat(points) * self.scale
+
+    def _require_near(self, points: Array) -> None:
+        """Make sure that a curve ends, by its (k, 2) control points."""
+        if not (np.abs(points) * self.scale <= FARTHEST).all():
+            raise MapError(f"{self.where}: a curve beyond {FARTHEST:.0f} m, but a nearer one was wanted")
+
+    def _outline(self, rings: list[Array], labels: tuple[str, ...], at: str) -> None:
+        if not self.shapes.add_outline(rings, labels, rule="evenodd", at=at):
+            self.shapes.leave_out("outline", "without an area")
+
+    def _curve(self, points: Array, labels: tuple[str, ...], at: str) -> None:
+        self.curved = True
+        self._require_near(points)
+        self._line(points * self.scale, labels, at)
+
+    def _line(self, points: Array, labels: tuple[str, ...], at: str, width: float = 0.0) -> None:
+        """Add (k, 2) m: an outline where they close and have no width, else a wall."""
+        near = bool((np.abs(points[0] - points[-1]) <= _CLOSED * np.abs(points).max()).all())
+        closed = len(points) > 3 and near
+        if closed and not width > 0.0:
+            self._outline([points[:-1]], labels, at)
+            return
+        if closed:
+            points = np.concatenate([points[:-1], points[:1]])
+        given = self.shapes.options.thickness
+        drawn = width * self.scale if width > 0.0 and given is None else self.shapes.thickness
+        self.shapes.add_line(Line(points, drawn, labels), at=at)
+
+    def _arc(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        centre, radius = entity.dxf.center, abs(float(entity.dxf.radius))
+        self._require_near(np.array([[centre[0], centre[1]], [radius, radius]]))
+        if kind == "CIRCLE" and radius > 0.0 and abs(entity.ocs().uz.z) > _LEVEL:
+            self.curved = True
+            (middle,) = self._metres([entity.ocs().to_wcs(centre)])
+            self.shapes.add_circle(middle, radius * self.scale, labels, at=at)
+            return
+        self._curve(flat(list(entity.flattening(min(self._tolerance, radius / 8)))), labels, at)
+
+    def _spline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        self._require_near(flat([*entity.control_points, *entity.fit_points]))
+        self._curve(spline(entity, self._tolerance), labels, at)
+
+    def _polyline(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        """Add a polyline with its bulges: columns are x, y, bulge and the widths at both ends of an edge."""
+        plane, height = entity.ocs(), 0.0
+        if kind == "LWPOLYLINE":
+            rows = np.array(entity.get_points("xybse"), dtype=float).reshape(-1, 5)
+            closed, width = bool(entity.closed), float(entity.dxf.get("const_width", 0.0))
+            height = float(entity.dxf.get("elevation", 0.0))
+        elif entity.is_2d_polyline or entity.is_3d_polyline:
+            rows = _rows(entity)
+            closed, width = bool(entity.is_closed), float(entity.dxf.get("default_start_width", 0.0))
+            plane = plane if entity.is_2d_polyline else None
+        else:
+            self.shapes.leave_out("mesh")
+            return
+        if closed:
+            rows = np.concatenate([rows, rows[:1]])
+        if len(rows) < 2:
+            self.shapes.leave_out("line", "without a length")
+            return
+        self._require_near(rows[:, :2])
+        points = polyline(rows[:, :2], rows[:, 2], self._tolerance)
+        self.curved |= len(points) > len(rows)
+        if plane is not None and plane.transform:
+            points = flat(list(plane.points_to_wcs([(x, y, height) for x, y in points.tolist()])))
+        self._require_near(points)
+        width = max(width, float(rows[:, 3:].max()))
+        self._line(points * self.scale, labels, at, width)
+
+    def _hatch(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
+        """Add the area within the boundary paths of a hatch, as ezdxf approximates them."""
+        from ezdxf.path import from_hatch
+
+        rings = []
+        for path in from_hatch(entity):
+            self._require_near(flat(path.control_vertices()))
+            rings.append(self._metres(list(path.flattening(self._tolerance))))
+        self._outline(rings, labels, at)
+
+
+def _rows(entity: Any) -> Array:
+    """Return the vertices of an old polyline as rows of x, y, bulge, and widths; not its spline's frame."""
+    found = []
+    for vertex in entity.vertices:
+        place = vertex.dxf.location
+        if not int(vertex.dxf.get("flags", 0)) & _FRAME:
+            others = (float(vertex.dxf.get(key, 0.0)) for key in ("bulge", "start_width", "end_width"))
+            found.append((place.x, place.y, *others))
+    return np.array(found, dtype=float).reshape(-1, 5)
+
+
+MOST_LINES = 8_000_000
+"""Of text: a line of the drawing takes about 24, a vertex 4."""
+
+MOST_ENTITIES = 50_000
+"""In the file, on whatever layer: ezdxf takes an eighth of a millisecond and 5 kB for each."""
+
+UNITS = {
+    1: ("inches", 0.0254),
+    2: ("feet", 0.3048),
+    3: ("miles", 1609.344),
+    4: ("millimetres", 0.001),
+    5: ("centimetres", 0.01),
+    6: ("metres", 1.0),
+    7: ("kilometres", 1000.0),
+    9: ("mils", 2.54e-5),
+    10: ("yards", 0.9144),
+    13: ("micrometres", 1e-6),
+    14: ("decimetres", 0.1),
+    15: ("decametres", 10.0),
+    16: ("hectometres", 100.0),
+    21: ("US survey feet", 1200 / 3937),
+}
+"""What the header's $INSUNITS stands for, with its metres."""
+
+_BINARY = b"AutoCAD Binary DXF"
+_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
+_ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
+_POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
+
+
+def is_dxf(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like DXF."""
+    return head.startswith(_BINARY) or _TEXT.match(head) is not None
+
+
+def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the map that the model space of a DXF file draws.
+
+    Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
+    the boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option
+    ``thickness``. Names are those of layers and blocks: see `enclosing.foreign_map`.
+    Blocks are carried out wherever they are inserted. Layers that are off or frozen, texts, dimensions and
+    what has a third dimension are left out; so are hatches without the option ``hatches``. Curves become
+    lines that stay within a millimetre.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+        ``scale`` overrules the unit of the file's header; without either the file is refused.
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood, has no unit, or ezdxf is not installed.
+    """
+    where = one_line(path)
+    _check(path, where)
+    document = _document(path, where)
+    code = document.header.get("$INSUNITS", 0)
+    if options.scale is not None:
+        unit, scale = f"a unit is {options.scale:g} m", options.scale
+    elif code in UNITS:
+        unit, scale = f"in {UNITS[code][0]}", UNITS[code][1]
+    else:
+        raise MapError(
+            f"{where}: $INSUNITS: {code}, but a unit was wanted: --scale METRES says what it is, as in "
+            f"--scale 0.001 for millimetres"
+        )
+    shapes = Shapes(where, options)
+    drawing = DxfDrawing(document, where, shapes, scale)
+    drawing.draw()
+    shapes.join_lines()
+    files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
+    return foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=one_line(path.stem)[:60] or "map",
+        description="Imported from DXF.",
+        solid=True,
+        notes=[unit, *drawing.notes()],
+    )
+
+
+def _check(path: Path, where: str) -> None:
+    """Refuse what would take long, before ezdxf sees it."""
+    content = files.content(path, files.MAX_TEXT_BYTES)
+    if not content.startswith(_BINARY):
+        if not _TEXT.match(content):
+            raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")
+        entities = sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1))
+        if entities > MOST_ENTITIES:
+            raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
+        points = islice(_POINT.finditer(content), files.MAX_VERTICES + 1)
+        files.require_vertices(sum(1 for _ in points), where)
+    lines = content.count(b"\n")
+    if lines > MOST_LINES:
+        raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")
+
+
+def _document(path: Path, where: str) -> Any:
+    """Return the drawing as ezdxf has it; one with faults as far as it can be recovered."""
+    try:
+        ezdxf = extra("ezdxf", "dxf")
+    except RobocovError as error:
+        raise MapError(f"{where}: {error}") from None
+    recover = extra("ezdxf.recover", "dxf")
+    logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # what it notes is no answer of ours
+    for read in (ezdxf.readfile, lambda file: recover.readfile(file)[0]):
+        try:
+            return read(path)
+        except OSError as error:
+            raise MapError(f"{where}: cannot be read: {error.strerror or error}") from None
+        except Exception as error:  # it raises what it likes on nonsense
+            reason = one_line(error) or type(error).__name__
+    raise MapError(f"{where}: no DXF that can be read: {reason[:200]}")
+
+
+IMPORTER = Importer(
+    name="dxf",
+    title="DXF drawings (with ezdxf): closed outlines, lines as walls, blocks",
+    suffixes=(".dxf",),
+    sniff=is_dxf,
+    read=read_dxf,
+    options=frozenset(
+        {"scale", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip", "hatches"}
+    ),
+)

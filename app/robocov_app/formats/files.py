@@ -1,0 +1,435 @@
+"""Foreign files: size limits, text, JSON, YAML, and files that they name.
+
+Tags, anchors and aliases are refused, so that no text can stand for more than what is written, nor for
+anything but text: what a value is, who asks for it decides.
+"""
+
+from __future__ import annotations
+
+import codecs
+import math
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PureWindowsPath
+from typing import Any, TypeAlias
+
+import numpy as np
+import yaml
+
+from robocov.arrays import Array
+from robocov.errors import JsonPath as Steps
+from robocov.errors import MapError, Mistake, one_line, shown, shown_json
+from robocov.files.strictjson import located, parse
+from robocov.mapfile.models import FARTHEST, LARGEST
+
+MAX_BYTES = 256_000_000
+"""Largest file of a raster, in bytes: `MAX_CELLS` in plain text."""
+
+MAX_TEXT_BYTES = 50_000_000
+"""Largest file of a vector format, in bytes; as of the project's own maps."""
+
+MAX_CELLS = 64_000_000
+"""Largest raster, in cells: 8000 x 8000."""
+
+MAX_VERTICES = 500_000
+"""Most vertices of a foreign map."""
+
+MAX_SHAPES = 20_000
+"""Most shapes of a drawing, of a file: each costs a quarter of a millisecond, whatever its size."""
+
+MAX_DEPTH = 32
+"""Deepest nesting of collections, groups, blocks, lists."""
+
+HEAD = 1 << 20
+"""So much of a file is looked at, in bytes, to know its format."""
+
+
+def head(path: Path) -> bytes:
+    """Return the first `HEAD` bytes of the file at `path`.
+
+    Raises
+    ------
+    MapError
+        When there is no such file, it is no ordinary one (a folder, a pipe, a device), or it
+        cannot be read.
+    """
+    return _read(path, HEAD)
+
+
+def content(path: Path, most: int = MAX_BYTES) -> bytes:
+    """Return the content of the file at `path`, of at most `most` bytes.
+
+    Raises
+    ------
+    MapError
+        As `head`, and when the file is larger; its size is looked at first.
+    """
+    where = one_line(path)
+    data = b""
+    if _size(path) <= most:
+        data = _read(path, most + 1)
+    if (not data and _size(path) > most) or len(data) > most:
+        raise MapError(f"{where}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
+    return data
+
+
+def require_cells(width: int, height: int, where: str) -> None:
+    """Check the size of a raster as its header gives it.
+
+    Raises
+    ------
+    MapError
+        When a side is not positive, or there are more than `MAX_CELLS`.
+    """
+    if width < 1 or height < 1:
+        raise MapError(f"{where}: {width} x {height} cells, but at least 1 x 1 was wanted")
+    if width * height > MAX_CELLS:
+        most = MAX_CELLS // 1_000_000
+        raise MapError(f"{where}: {width} x {height} cells, but at most {most} million were wanted")
+
+
+def require_vertices(count: int, where: str) -> None:
+    """Check the number of vertices of a map, or the least that it can be.
+
+    Raises
+    ------
+    MapError
+        When there are more than `MAX_VERTICES`.
+    """
+    if count > MAX_VERTICES:
+        raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
+
+
+def require_shapes(count: int, where: str) -> None:
+    """Check the number of shapes of a drawing.
+
+    Raises
+    ------
+    MapError
+        When there are more than `MAX_SHAPES`.
+    """
+    if count > MAX_SHAPES:
+        raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
+
+
+def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
+    """Check a length in metres: a cell, a thickness, a unit.
+
+    Raises
+    ------
+    MapError
+        When it is not a finite number from `smallest` to `largest`.
+    """
+    if not (math.isfinite(value) and smallest <= value <= largest):
+        raise MapError(
+            f"{where}: {shown(value)}, but a number from {smallest:g} to {largest:g} (m) was wanted"
+        )
+
+
+def require_coordinate(value: float, where: str) -> None:
+    """Check a coordinate in metres.
+
+    Raises
+    ------
+    MapError
+        When it is not a finite number within `robocov.mapfile.models.FARTHEST`.
+    """
+    if not abs(value) <= FARTHEST:
+        raise MapError(
+            f"{where}: {shown(value)}, but a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) was wanted"
+        )
+
+
+def _size(path: Path) -> int:
+    """Return the size of the file at `path`, in bytes."""
+    where = one_line(path)
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        raise MapError(f"{where}: no such file") from None
+    except (OSError, ValueError) as error:
+        raise MapError(f"{where}: cannot be read: {_reason(error)}") from None
+    if stat.S_ISDIR(found.st_mode):
+        raise MapError(f"{where}: is a folder, but a file was wanted")
+    if not stat.S_ISREG(found.st_mode):  # opening a pipe would wait for ever
+        raise MapError(f"{where}: is a pipe or a device, but a file was wanted")
+    return found.st_size
+
+
+def _read(path: Path, most: int) -> bytes:
+    _size(path)
+    try:
+        with path.open("rb") as file:
+            return file.read(most)
+    except (OSError, ValueError) as error:
+        raise MapError(f"{one_line(path)}: cannot be read: {_reason(error)}") from None
+
+
+def _reason(error: Exception) -> str:
+    return one_line(error.strerror if isinstance(error, OSError) and error.strerror else error)
+
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+
+
+def read_text(path: Path, separator: bytes) -> tuple[str, str]:
+    """Return the text of a file, and what messages call it.
+
+    Parameters
+    ----------
+    path : Path
+    separator : bytes
+        What stands between vertices: where there are too many, nothing is read.
+
+    Raises
+    ------
+    MapError
+        When it cannot be read, is too large, or is neither UTF-8 nor marked as UTF-16.
+    """
+    where = one_line(path)
+    data = content(path, MAX_TEXT_BYTES)
+    require_vertices(data.count(separator), where)
+    marked = (both for both in _MARKS if data.startswith(both[0]))
+    mark, encoding = next(marked, (b"", "utf-8"))
+    try:
+        return data[len(mark) :].decode(encoding), where
+    except UnicodeDecodeError as error:
+        raise MapError(f"{where}: byte {error.start}: not {encoding.upper()}, but text was wanted") from None
+
+
+_LONG = 400
+"""Longest name of a file, in characters."""
+
+
+def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> tuple[Path, str | None]:
+    """Return the file that the one at `path` names, and what was put right about it.
+
+    It must be in the file's folder or below. Programs write where it was when it was saved, often from
+    the root, and it may have moved with the file: one of the same name beside it is as good.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        As it is written there, relative to the folder of `path`.
+    anywhere : bool
+        Whether it may be outside of that folder.
+    at, what : str
+        The place that names it, and what kind of file it is, for messages.
+
+    Raises
+    ------
+    MapError
+        When it is no name of a file, or outside of the folder.
+    """
+    if not name:
+        raise MapError(f"{at}: empty, but the name of a {what} was wanted")
+    if len(name) > _LONG:
+        raise MapError(f"{at}: {shown(name)}: {len(name)} characters, but a shorter name was wanted")
+    named = path.parent / name
+    beside = path.parent / PureWindowsPath(name).name
+    try:
+        allowed = anywhere or _inside(named, path.parent)
+        if not (allowed and _exists(named)) and beside.is_file() and _inside(beside, path.parent):
+            key = at.rpartition(": ")[2]
+            return beside, f"{key}: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
+        raise MapError(f"{at}: {shown(name)}: {reason}") from None
+    if not allowed:
+        raise MapError(
+            f"{at}: {shown(name)} is outside of the file's folder, but a {what} in it was wanted "
+            f"(--anywhere allows it)"
+        )
+    return named, None
+
+
+def _inside(named: Path, folder: Path) -> bool:
+    """Return whether a file is in `folder` or below, links followed."""
+    return named.resolve().is_relative_to(folder.resolve())
+
+
+def _exists(named: Path) -> bool:
+    """Return whether there is such a file; an OSError where that cannot be known, as from a name too long."""
+    try:
+        named.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
+_BEFORE = b"\xef\xbb\xbf \t\r\n"
+
+
+def begins_with(head: bytes, bracket: bytes) -> bool:
+    """Return whether a file that begins with `head` begins with that bracket, spaces apart."""
+    return head.lstrip(_BEFORE)[:1] == bracket
+
+
+def read_json(path: Path) -> tuple[Any, bytes, str]:
+    """Return what the JSON file at `path` holds, its content, and what messages call it.
+
+    Raises
+    ------
+    MapError
+        When it cannot be read, is too large, or is not JSON; see `robocov.files.strictjson.parse`.
+    """
+    where = one_line(path)
+    data = content(path, MAX_TEXT_BYTES)
+    # each point is a list of two or three: to count takes a moment, to parse minutes
+    require_vertices(max(data.count(b"["), data.count(b",") // 3), where)
+    return parse(data, where), data, where
+
+
+@contextmanager
+def located_errors(content: bytes, where: str) -> Iterator[None]:
+    """Give a context in which errors about the document in `content` get lines and columns."""
+    try:
+        yield
+    except MapError as error:
+        raise located(error, content, where) from None
+
+
+def positions(value: Any, at: Steps, where: str, *, least: int, dimensions: tuple[int, int]) -> Array:
+    """Return the points of a JSON list as (k, d); missing dimensions are nan.
+
+    Parameters
+    ----------
+    value : JSON value
+    at : path of keys and indices
+        Where it is in the document.
+    where : str
+        What messages call the file.
+    least : int
+        So many points are wanted.
+    dimensions : (least, most)
+        So many numbers are wanted of each; d is the most that there are.
+
+    Raises
+    ------
+    MapError
+        When it is not such a list.
+    """
+    if not isinstance(value, list) or len(value) < least:
+        points = "point" if least == 1 else "points"
+        raise refused(where, at, value, f"a list of at least {least} {points} [x, y] was wanted")
+    low, high = dimensions
+    for k, point in enumerate(value):
+        if not (isinstance(point, list) and low <= len(point) <= high and all(map(is_number, point))):
+            raise refused(where, (*at, k), point, "a point [x, y] of finite numbers was wanted")
+    wide = max(map(len, value), default=low)
+    if min(map(len, value), default=low) < wide:
+        value = [[*point, *[np.nan] * (wide - len(point))] for point in value]
+    return np.array(value, dtype=float).reshape(-1, wide)
+
+
+def is_number(value: object) -> bool:
+    """Return whether a JSON value is a number, of a size that can be calculated with."""
+    return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]
+
+
+def refused(where: str, at: Steps, value: object, wanted: str) -> MapError:
+    """Return the error of a value at a place: what is there, what was wanted."""
+    return MapError.of(where, [Mistake.at(at, f"{shown_json(value)}, but {wanted}")])
+
+
+Value: TypeAlias = "str | list[Value] | dict[str, Value]"
+"""Text as it is written, or a list or a mapping of values."""
+
+MAX_YAML_BYTES = 262_144
+"""Longest text that is read, in bytes, which takes a second: a map has 200, a world some thousand."""
+
+DEEPEST = 12
+"""Deepest nesting of lists and mappings."""
+
+
+def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
+    """Return the mapping in `text`.
+
+    Parameters
+    ----------
+    text : bytes
+        UTF-8, with or without a byte order mark.
+    where : str
+        What messages call it: a file's name.
+
+    Raises
+    ------
+    MapError
+        When it is not YAML (with the line), no mapping, has a key twice, or has tags, anchors or aliases.
+
+    Examples
+    --------
+    >>> parse_yaml(b"image: a.pgm\\norigin: [0, 1.5, 0]", "map.yaml")
+    {'image': 'a.pgm', 'origin': ['0', '1.5', '0']}
+    """
+    if len(text) > MAX_YAML_BYTES:
+        raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
+    try:
+        decoded = text.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MapError(f"{where}: byte {error.start}: not UTF-8, but YAML in UTF-8 was wanted") from None
+    try:
+        return _mapping(decoded, where)
+    except yaml.MarkedYAMLError as error:
+        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark is not None else ""
+        raise MapError(f"{where}: {line}not YAML: {one_line(error.problem or error.context)}") from None
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise MapError(f"{where}: not YAML: {one_line(error)[:200]}") from None
+
+
+def _mapping(text: str, where: str) -> dict[str, Value]:
+    result: dict[str, Value] = {}
+    # the collections that are open, each with the name that waits for its value
+    path: list[tuple[list[Value] | dict[str, Value], str | None]] = []
+    # the events come as they are read: a bomb is refused at its first fuse
+    for event in yaml.parse(text, Loader=yaml.BaseLoader):
+        line = f"{where}: line {event.start_mark.line + 1 if event.start_mark else 0}"
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+            raise MapError(f"{line}: an anchor or alias, but a plain value was wanted")
+        tag = getattr(event, "tag", None)
+        if tag is not None:
+            raise MapError(f"{line}: the tag {shown(tag)}, but a plain value was wanted")
+        if isinstance(event, yaml.DocumentStartEvent) and result:
+            raise MapError(f"{line}: a second document, but one was wanted")
+        if isinstance(event, yaml.CollectionEndEvent):
+            path.pop()
+            continue
+        if not isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent):
+            continue
+        value: Value = {} if isinstance(event, yaml.MappingStartEvent) else []
+        if isinstance(event, yaml.ScalarEvent):
+            value = event.value
+        if not path:
+            if not isinstance(value, dict):
+                found = "a list" if isinstance(value, list) else shown(value)
+                raise MapError(f"{line}: {found}, but a mapping (name: value) was wanted")
+            result = value
+        else:
+            _put(path, value, line)
+        if not isinstance(value, str):
+            path.append((value, None))
+        if len(path) > DEEPEST:
+            raise MapError(f"{line}: nested too deeply, but at most {DEEPEST} levels were wanted")
+    return result
+
+
+def _put(path: list[tuple[list[Value] | dict[str, Value], str | None]], value: Value, line: str) -> None:
+    """Put a value into the innermost collection that is open: an item, a name, or what a name stands for."""
+    inside, key = path[-1]
+    if isinstance(inside, list):
+        inside.append(value)
+    elif key is not None:
+        inside[key] = value
+        path[-1] = (inside, None)
+    elif not isinstance(value, str):
+        raise MapError(f"{line}: a name that is a collection, but a word was wanted")
+    elif value in inside:
+        raise MapError(f"{line}: {one_line(value)}: given twice, but once was wanted")
+    else:
+        path[-1] = (inside, value)

@@ -1,0 +1,320 @@
+"""GeoJSON (RFC 7946), in degrees or metres."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.errors import JsonPath as Steps
+from robocov.errors import ParameterError, RobocovError, one_line, place, shown
+from robocov.extras import extra
+from robocov.files.atomic import written
+from robocov_app.formats.files import begins_with, is_number, located_errors, positions, read_json, refused
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.cells import not_held
+from robocov_app.formats.geometry.coordinates import DIGITS, free_area, on_grid, rings
+from robocov_app.formats.geometry.enclosing import BOUNDARY, foreign_map
+from robocov_app.formats.geometry.shapes import Figure, Kind, Shapes
+from robocov_app.formats.georeference import LocalPlane, in_metres
+from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
+
+_PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
+_GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
+_TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
+_NAMES = ("name", "kind", "id")
+"""Properties of a feature that name its shapes; its own id does too."""
+
+
+def is_geojson(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like GeoJSON."""
+    return begins_with(head, b"{") and _TYPE.search(head) is not None
+
+
+def read_geojson(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the map that a FeatureCollection, a Feature or a geometry stands for.
+
+    What polygons and lines are is found out as in `enclosing.foreign_map`; shapes
+    have the names that the properties ``name``, ``kind`` and ``id`` of their feature give.
+
+    Coordinates are longitude and latitude (RFC 7946, section 4) and are projected to metres, if that makes
+    a map of at most 10 km; else they are metres. The member ``crs`` of the older standard is obeyed, as is
+    a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes; the option overrules both.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood; with line and column.
+    """
+    document, content, where = read_json(path)
+    shapes = Shapes(where, options)
+    found = _Found(where, shapes)
+    with located_errors(content, where):
+        found.read(document)
+        options = _with_units(options, document, where)
+        origin = _origin(document, where)
+    figures, notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
+    for figure in figures:
+        shapes.add(figure)
+    shapes.join_lines()
+    named = document.get("name")
+    name = named if isinstance(named, str) and named.strip() else path.stem
+    text = document.get("description")
+    return foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=one_line(name)[:80] or "map",
+        description=one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON.",
+        solid=False,
+        notes=notes,
+    )
+
+
+class _Found:
+    """The geometries of a document, as they are found."""
+
+    def __init__(self, where: str, shapes: Shapes) -> None:
+        self.where = where
+        self.shapes = shapes
+        self.figures: list[Figure] = []
+        self.crs: str | None = None
+
+    def read(self, document: Any) -> None:
+        """Read a whole document."""
+        kind = document.get("type") if isinstance(document, dict) else None
+        if kind == "FeatureCollection":
+            features = document.get("features")
+            if not isinstance(features, list):
+                raise refused(self.where, ("features",), features, "a list of features was wanted")
+            self._see_system(document, ())
+            for k, feature in enumerate(features):
+                self._feature(feature, ("features", k))
+        elif kind == "Feature":
+            self._feature(document, ())
+        elif kind == "Topology":
+            raise refused(self.where, ("type",), kind, "GeoJSON, not TopoJSON, was wanted")
+        else:
+            self._geometry(document, (), ())
+
+    def _feature(self, feature: Any, at: Steps) -> None:
+        if not isinstance(feature, dict) or feature.get("type") != "Feature":
+            raise refused(self.where, at, feature, "a Feature was wanted")
+        self._see_system(feature, at)
+        properties = feature.get("properties") or {}
+        if not isinstance(properties, dict):
+            raise refused(self.where, (*at, "properties"), properties, "an object was wanted")
+        given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
+        labels = [one_line(label).strip() for label in given if type(label) in (str, int)]
+        kind = properties.get("kind")
+        if isinstance(kind, str) and kind.casefold() != BOUNDARY:  # whatever it is called
+            labels = [label for label in labels if label.casefold() != BOUNDARY]
+        if feature.get("geometry") is None:
+            self.shapes.leave_out("feature", "without a geometry")
+        else:
+            names = tuple(dict.fromkeys(label for label in labels if label))
+            self._geometry(feature["geometry"], (*at, "geometry"), names)
+
+    def _geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
+        kind = geometry.get("type") if isinstance(geometry, dict) else None
+        if kind not in _GEOMETRIES:
+            value = geometry if kind is None else kind
+            place = at if kind is None else (*at, "type")
+            raise refused(self.where, place, value, f"one of {', '.join(_GEOMETRIES)} was wanted")
+        self._see_system(geometry, at)
+        if kind == "GeometryCollection":
+            parts = geometry.get("geometries")
+            if not isinstance(parts, list):
+                raise refused(self.where, (*at, "geometries"), parts, "a list of geometries was wanted")
+            for k, part in enumerate(parts):
+                self._geometry(part, (*at, "geometries", k), labels)
+            return
+        value, place = geometry.get("coordinates"), (*at, "coordinates")
+        if kind not in _PLURAL:
+            self._coordinates(kind, value, place, labels)
+            return
+        if not isinstance(value, list):
+            raise refused(self.where, place, value, "a list was wanted")
+        for k, part in enumerate(value):
+            self._coordinates(_PLURAL[kind], part, (*place, k), labels)
+
+    def _coordinates(self, kind: str, value: Any, at: Steps, labels: tuple[str, ...]) -> None:
+        if value == []:
+            self.shapes.leave_out("geometry", "without coordinates")
+        elif kind == "Point":
+            self._keep("point", [self._points([value], at, 1)], labels, at)
+        elif kind == "LineString":
+            self._keep("line", [self._points(value, at, 2)], labels, at)
+        elif not isinstance(value, list):
+            raise refused(self.where, at, value, "a list of rings was wanted")
+        else:
+            rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
+            unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
+            if unclosed:
+                self.shapes.mended["ring", "closed: the last point was not the first"] += unclosed
+            self._keep("polygon", rings, labels, at)
+
+    def _keep(
+        self,
+        kind: Kind,
+        rings: list[Array],
+        labels: tuple[str, ...],
+        at: Steps,
+    ) -> None:
+        self.figures.append(Figure(kind, tuple(rings), labels, place(at)))
+
+    def _points(self, value: Any, at: Steps, least: int) -> Array:
+        points = positions(value, at, self.where, least=least, dimensions=(2, 4))
+        if points.shape[1] > 2:
+            self.shapes.leave_heights(points[:, 2])
+        return points[:, :2]
+
+    def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
+        """Keep the reference system that an object names, as GeoJSON did before RFC 7946."""
+        given = holder.get("crs")
+        if given is None:
+            return
+        properties = given.get("properties") if isinstance(given, dict) else None
+        name = properties.get("name") if isinstance(properties, dict) else None
+        if not isinstance(name, str):
+            raise refused(self.where, (*at, "crs"), given, "the name of a reference system was wanted")
+        if self.crs not in (None, name):
+            raise refused(
+                self.where, (*at, "crs"), given, f"the same system as before, {self.crs}, was wanted"
+            )
+        self.crs = name
+
+
+def _with_units(options: ReadOptions, document: dict[str, Any], where: str) -> ReadOptions:
+    """Return the options with the units that the file gives, where they do not give them."""
+    units = document.get("units")
+    if units is None or options.units is not None:
+        return options
+    if units not in ("metres", "degrees"):
+        raise refused(where, ("units",), units, "metres or degrees was wanted")
+    return replace(options, units=units)
+
+
+def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:
+    """Return longitude and latitude of [0, 0] m where the file gives them."""
+    origin = document.get("origin")
+    if origin is None:
+        return None
+    good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
+    if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
+        raise refused(where, ("origin",), origin, "longitude and latitude in degrees were wanted")
+    return float(origin[0]), float(origin[1])
+
+
+IMPORTER = Importer(
+    name="geojson",
+    title="GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points",
+    suffixes=(".geojson",),
+    sniff=is_geojson,
+    read=read_geojson,
+    options=frozenset(
+        {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
+    ),
+)
+
+
+_FINER = 6
+"""So many more decimals have degrees: one is about a hundred kilometres."""
+
+
+def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    origin = options.origin
+    digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
+    shapes: list[tuple[str, str | None, BaseGeometry]] = [("boundary", None, environment.boundary_polygon)]
+    shapes += [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
+    features, areas, lost, across = [], [], 0, False
+    plane = None if origin is None else _plane(environment, origin)
+    for kind, name, shape in shapes:
+        if plane is None:
+            parts = on_grid(shape, digits)
+            areas.append(MultiPolygon(parts))
+        else:
+            # rounded in metres first, as a reader finds it: what touches there still touches
+            exact = MultiPolygon(on_grid(shape, DIGITS))
+            parts = on_grid(shapely.transform(exact, plane.degrees), digits)
+            areas.append(shapely.transform(MultiPolygon(parts), plane.metres))
+            across |= any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
+        lost += not parts
+        if parts:
+            features.append(_feature(kind, name, [rings(part) for part in parts]))
+    notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
+    if origin is not None:
+        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
+    if across:
+        notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
+    if lost:
+        notes.append(f"{lost} shapes are nothing with {digits} decimals")
+    with written(path) as part:
+        part.write_text(_text(environment, options, features), encoding="utf-8")
+    return ExportReport(
+        EXPORTER.name,
+        (path,),
+        environment.free_area,
+        free_area(areas[0], areas[1:]),
+        dropped=tuple(thing for thing in not_held(environment) if not thing.startswith("names")),
+        notes=tuple(notes),
+    )
+
+
+def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
+    """Return the plane about a place, if longitudes do not run all around in the map."""
+    try:
+        plane = LocalPlane(extra("pyproj", "geo"), *origin)
+    except RobocovError as error:
+        raise ParameterError(f"origin: degrees need more: {error}") from None
+    if np.ptp(plane.degrees(np.array(environment.boundary, dtype=float))[:, 0]) >= 180.0:
+        wanted = "a place farther from the pole was wanted"
+        raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
+    return plane
+
+
+def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, float]]]]) -> dict[str, Any]:
+    many = len(polygons) > 1
+    return {
+        "type": "Feature",
+        "properties": {"kind": kind} if name is None else {"kind": kind, "name": name},
+        "geometry": {
+            "type": "MultiPolygon" if many else "Polygon",
+            "coordinates": polygons if many else polygons[0],
+        },
+    }
+
+
+def _text(environment: Environment, options: WriteOptions, features: list[dict[str, Any]]) -> str:
+    """Return the document, a feature on a line."""
+    head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
+    if environment.description:
+        head["description"] = environment.description
+    head["units"] = "metres" if options.origin is None else "degrees"
+    if options.origin is not None:
+        head["origin"] = list(options.origin)
+    lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
+    members = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}")
+    return f'{members},\n "features": [\n{lines}\n]}}\n'
+
+
+EXPORTER = Exporter(
+    name="geojson",
+    title="GeoJSON: boundary and obstacles as features, in metres or degrees",
+    suffixes=(".geojson",),
+    write=_write,
+    options=frozenset({"digits", "origin"}),
+)

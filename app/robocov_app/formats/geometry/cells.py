@@ -1,0 +1,230 @@
+"""A map as cells of a grid: free where their centre is, and walls that are thinner than a cell stay whole."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy import ndimage
+from shapely.geometry.base import BaseGeometry
+
+from robocov.arrays import Array, BoolArray, IntArray, ranges
+from robocov.environment import Environment
+from robocov.errors import ParameterError, counted
+from robocov.robots import DEFAULT_RADIUS
+from robocov_app.formats.files import MAX_CELLS
+
+CELL = 0.05
+"""Side of a cell in metres where none is given: what maps of robots mostly have."""
+
+_LEAST = math.pi * DEFAULT_RADIUS**2
+"""Parts of the free space with no room for a robot, in m², do not count."""
+
+_MOST_TRIED = 16_000_000
+"""Cells of grids that are tried for whether they keep what others lose."""
+
+_DIGITS = 6
+"""Decimals of a grid's corner: a micrometre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A grid over a map, with one cell to spare on each side.
+
+    Attributes
+    ----------
+    rows, columns : int
+    cell : float, m
+    origin : (x, y), m
+        Lower left corner of the lower left cell.
+    """
+
+    rows: int
+    columns: int
+    cell: float
+    origin: tuple[float, float]
+
+    def covered(self, geometry: BaseGeometry, finer: int = 1) -> BoolArray:
+        """Return which cells have their centre in polygons, (rows, columns), the lowest row first.
+
+        With `finer` each cell is so many by so many, all of which are returned.
+        """
+        rows, columns = self.rows * finer, self.columns * finer
+        row, at = self._crossings(geometry, finer)
+        inside = (row >= 0) & (row < rows)
+        # a crossing turns all that is to the right of it
+        turns = np.zeros((rows, columns + 1), np.uint8)
+        np.add.at(turns, (row[inside], np.clip(np.ceil(at[inside]).astype(np.intp), 0, columns)), 1)
+        turns &= 1
+        return np.bitwise_xor.accumulate(turns, axis=1)[:, :-1].astype(bool)
+
+    def between(self, geometry: BaseGeometry) -> BoolArray:
+        """Return the cells amid what lies outside of polygons and is too thin to have a centre in it.
+
+        The grid-intersection digitization of thin things (Klette and Rosenfeld 2004, Digital Geometry,
+        chapter 2): of each interval outside of the polygons on a line of centres, along rows and along
+        columns, one cell. These and the cells with their centre outside hang together, over their corners,
+        where what is outside does.
+        """
+        found = np.zeros((self.rows, self.columns), dtype=bool)
+        for cells, across in ((found, False), (found.T, True)):
+            line, at = self._crossings(geometry, across=across)
+            order = np.lexsort((at, line))
+            line, at = line[order], at[order]
+            # on each line they go in and out by turns
+            ends = np.flatnonzero((np.arange(len(line)) - np.searchsorted(line, line)) % 2)
+            ends = ends[:-1] if len(ends) and ends[-1] == len(line) - 1 else ends
+            # where they contain one centre it is that cell, however both ways of counting have rounded
+            narrow = np.ceil(at[ends + 1]) - np.ceil(at[ends]) <= 1
+            ends = ends[(line[ends] == line[ends + 1]) & narrow]
+            middle = np.rint((at[ends] + at[ends + 1]) / 2).astype(np.intp)
+            cells[line[ends], middle] = True
+        return found
+
+    def cell_of(self, points: Array) -> tuple[IntArray, IntArray]:
+        """Return row and column of the cells that (n, 2) m points are in."""
+        column, row = np.floor((points - self.origin) / self.cell).astype(np.intp).T
+        return row, column
+
+    def _crossings(
+        self, geometry: BaseGeometry, finer: int = 1, *, across: bool = False
+    ) -> tuple[IntArray, Array]:
+        """Return where sides of polygons cross the lines of centres: the line, and the place on it in cells.
+
+        Lines are rows, or with `across` columns; centres are at whole numbers.
+        """
+        cell = self.cell / finer
+        rings = shapely.get_rings(shapely.get_parts(geometry))
+        points, ring = shapely.get_coordinates(rings, return_index=True)
+        same = ring[1:] == ring[:-1]
+        points = (points - self.origin) / cell - 0.5
+        if across:
+            points = points[:, ::-1]
+        (x0, y0), (x1, y1) = points[:-1][same].T, points[1:][same].T
+        # each side crosses the lines from its lower end, that one too, to its upper end
+        low = np.ceil(np.minimum(y0, y1)).astype(np.intp)
+        count = np.ceil(np.maximum(y0, y1)).astype(np.intp) - low
+        line = ranges(low, count)
+        side = np.arange(len(low)).repeat(count)
+        slope = np.divide(x1 - x0, y1 - y0, out=np.zeros_like(x0), where=count > 0)
+        return line, x0[side] + (line - y0[side]) * slope[side]
+
+
+def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
+    """Return a grid over the boundary of `environment`; what was made of cells of that size meets them again.
+
+    Parameters
+    ----------
+    environment : Environment
+    cell : float or None, m
+        Side of a cell; `CELL` by default.
+    most : int
+        Cells.
+
+    Raises
+    ------
+    ParameterError
+        When there are more than `most`.
+    """
+    cell = CELL if cell is None else cell
+    low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
+    # to a thousandth of a cell, so that a wall on the last line of cells needs no more of them
+    columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
+    rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
+    if rows * columns > most:
+        raise ParameterError(
+            f"cell: {cell:g} m makes {columns} x {rows} cells, but at most {most // 1_000_000} million "
+            f"were wanted"
+        )
+    return Grid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
+
+
+def free_cells(environment: Environment, grid: Grid) -> BoolArray:
+    """Return which cells of `grid` are free, (rows, columns), the lowest row first.
+
+    A cell is free if its centre is, and if nothing solid would be lost: no wall is too thin, and no pillar
+    too small, to block a cell. Where one can drive from cell to cell through their sides one can drive on
+    the map.
+
+    Raises
+    ------
+    ParameterError
+        When none is.
+    """
+    free = grid.covered(environment.free) & ~grid.between(environment.free)
+    # what is smaller than a cell may lie between all lines of centres
+    holes = np.array([shapely.polygons(ring) for part in environment.free.geoms for ring in part.interiors])
+    sides = shapely.bounds(holes).reshape(-1, 4)
+    small = (sides[:, 2:] - sides[:, :2]).max(axis=1, initial=0.0) < grid.cell
+    free[grid.cell_of(shapely.get_coordinates(shapely.point_on_surface(holes[small])))] = False
+    if not free.any():
+        raise ParameterError(f"cell: with {grid.cell:g} m no cell is free, but a smaller one was wanted")
+    return free
+
+
+def lost_passages(environment: Environment, grid: Grid, free: BoolArray) -> tuple[str, ...]:
+    """Return what part of its free space is lost in cells, or falls apart, and which cells would keep it."""
+    lost = _lost(environment, grid, free)
+    if not lost:
+        return ()
+    for cell in _smaller(grid.cell):
+        try:
+            finer = grid_over(environment, cell, _MOST_TRIED)
+        except ParameterError:
+            most = f"at most {_MOST_TRIED // 1_000_000} million"
+            return (f"{lost}; no cells of which there are {most} keep it",)
+        if not _lost(environment, finer, free_cells(environment, finer)):
+            return (f"{lost}; cells of {cell:g} m keep it (--cell {cell:g})",)
+    return ()
+
+
+def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
+    """Return what parts of the free space, with room for a robot, are not in one piece in free cells."""
+    parts = np.array(environment.free.geoms)
+    parts = parts[shapely.area(parts) >= _LEAST]
+    islands, _ = ndimage.label(free)
+    large = np.flatnonzero(np.bincount(islands.ravel())[1:] * grid.cell**2 >= _LEAST)
+    if len(parts) == 0 or len(parts) == len(large) == 1:
+        return ""
+    places, windows = [], ndimage.find_objects(islands)
+    for k in large.tolist():
+        row, column = np.argwhere(islands[windows[k]] == k + 1)[0]
+        places.append((column + windows[k][1].start, row + windows[k][0].start))
+    centres = (np.array(places, dtype=float).reshape(-1, 2) + 0.5) * grid.cell + grid.origin
+    owner = shapely.STRtree(parts).nearest(shapely.points(centres))
+    pieces = np.bincount(owner, minlength=len(parts))
+    words = []
+    if (pieces == 0).any():
+        gone = int((pieces == 0).sum())
+        words.append(
+            f"{counted(gone, 'separate part')} of the free space {'is' if gone == 1 else 'are'} lost"
+        )
+    if (pieces > 1).any():
+        words.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
+    return "; ".join(words)
+
+
+def _smaller(cell: float) -> Iterator[float]:
+    """Return round sizes below that of a cell, the largest first.
+
+    >>> list(itertools.islice(_smaller(0.15), 4))
+    [0.1, 0.05, 0.02, 0.01]
+    """
+    for power in itertools.count(math.floor(-math.log10(cell))):
+        for digit in (5, 2, 1):
+            if (size := round(digit * 10.0**-power, power)) < cell * (1 - 1e-9):
+                yield size
+
+
+def not_held(environment: Environment) -> tuple[str, ...]:
+    """Return what of `environment` no raster format holds, in words."""
+    lost = []
+    if environment.starts:
+        lost.append(f"starts: {', '.join(environment.starts)}")
+    if any(obstacle.name for obstacle in environment.obstacles):
+        lost.append("names of obstacles")
+    return tuple(lost)

@@ -1,0 +1,361 @@
+"""The outer boundary of a foreign map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.environment import GRID
+from robocov.errors import MapError, counted, shown
+from robocov.mapfile.models import LARGEST
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.fills import polygons_of, united
+from robocov_app.formats.geometry.shapes import Line, Outline, Shapes, polygonised
+
+CRUMB = 1e-4
+"""Obstacles and parts that are smaller, in m², come of rounding."""
+
+
+def polygons(geometry: BaseGeometry) -> list[Polygon]:
+    """Return the polygons in `geometry`, counter-clockwise, the largest first; lines and points go."""
+    flat = shapely.get_parts(shapely.get_parts(geometry))
+    parts = [shapely.orient_polygons(part) for part in flat if isinstance(part, Polygon) and part.area > 0.0]
+    return sorted(parts, key=lambda part: (-part.area, part.bounds))
+
+
+def filled(geometry: BaseGeometry) -> Polygon:
+    """Return the largest polygon in `geometry`, without its holes."""
+    return Polygon(polygons(geometry)[0].exterior)
+
+
+def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
+    """Return the polygons of `geometry` with rounded coordinates, valid; the largest first."""
+
+    def decimal(points: np.ndarray) -> np.ndarray:
+        # no negative zero
+        return np.round(points, digits) + 0.0
+
+    plain = shapely.transform(geometry, decimal)
+    if not plain.is_valid:
+        # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
+        valid = shapely.make_valid(geometry, method="structure", keep_collapsed=False)
+        plain = shapely.transform(shapely.set_precision(valid, 10.0**-digits), decimal)
+    return MultiPolygon(polygons(plain))
+
+
+def bounded(
+    free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
+) -> tuple[Polygon, list[Polygon]]:
+    """Return a boundary around `free`, and what is solid in it.
+
+    Parameters
+    ----------
+    free : MultiPolygon, m
+        With coordinates of so many `digits`.
+    given : Polygon or None, m
+        A boundary without holes, which may run along the free space as it was before walls moved.
+        None: the outline of the free space, or its convex hull where it is of several parts.
+    hull : bool
+        Whether the convex hull of that is wanted.
+    margin : float, m
+        So much is solid around it.
+    digits : int
+        Decimals of the coordinates.
+
+    Examples
+    --------
+    >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
+    >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
+    >>> boundary.area, [part.area for part in solid]
+    (12.0, [1.0])
+    """
+    parts = list(free.geoms)
+    if given is not None:
+        base = filled(rounded(shapely.union(given, free), digits))
+    elif len(parts) > 1:
+        base = free.convex_hull
+    else:
+        base = Polygon(parts[0].exterior)
+    if hull:
+        base = base.convex_hull
+    if margin > 0.0:
+        base = filled(base.buffer(margin, join_style="mitre", mitre_limit=2.0))
+    if given is None and not hull and margin == 0.0 and len(parts) == 1:
+        return base, [Polygon(hole) for hole in parts[0].interiors]
+    base = filled(rounded(base, digits))
+    if not shapely.covers(base, free):  # by a rounded hair
+        base = filled(shapely.union(base, free))
+    return base, polygons(rounded(shapely.difference(base, free), digits))
+
+
+BOUNDARY = "boundary"
+"""A shape of this name, id, class or layer is the boundary."""
+
+AROUND = 1.0
+"""Room left around the shapes where none of them is the boundary, in metres."""
+
+_MOST = 0.5
+"""A boundary holds more than this part of the other shapes; walls that are one leave so much of it open."""
+
+
+_FARTHEST_PARTS = 10.0 * LARGEST
+"""Shapes that are farther from each other, in metres, are of no map: unions of such take seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Enclosure:
+    """A boundary that was found: its area with whatever holes it has, and the shapes that made it."""
+
+    area: MultiPolygon
+    words: str
+    outlines: frozenset[Outline] = frozenset()
+    lines: frozenset[Line] = frozenset()
+
+
+def foreign_map(
+    shapes: Shapes,
+    *,
+    format: str,  # noqa: A002 - as of a `ForeignMap`
+    name: str,
+    description: str,
+    solid: bool,
+    accessible: bool = False,
+    world: MultiPolygon | None = None,
+    notes: Sequence[str] = (),
+) -> ForeignMap:
+    """Return the map that the shapes of a file stand for.
+
+    Closed outlines are either *free space*, all of them together; or they are *solid*, but for one which is
+    the boundary. Lines and pillars are obstacles in both. The boundary is, in this order,
+
+    1. the shape whose name, id, class or layer the option ``boundary`` gives, else the one called "boundary";
+       lines of that name are one when they enclose an area; outlines around it are frames, and left out;
+    2. the largest closed outline, if it is the only shape, or more than half of the others lie in it;
+    3. the outer edge of the walls, if they close and what they enclose is mostly open;
+    4. a rectangle around everything, at the distance of the option ``around``.
+
+    Parameters
+    ----------
+    shapes : Shapes
+    format, name, description : str
+    solid : bool
+        What closed outlines are unless the option ``outlines`` says it: True is solid; False is free, but
+        solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
+    accessible : bool
+        Whether outlines are all free in files of that format, as JuPedSim's accessible area, so that one may
+        overlap another: then 2 holds only where all others lie wholly in the largest, which would add nothing
+        to it as free space.
+    world : MultiPolygon or None, m
+        What is free before the shapes stand in it, where the format says so: then no boundary is looked for.
+    notes : sequence of str
+        What else is worth knowing.
+
+    Raises
+    ------
+    MapError
+        When there are no shapes, the boundary has no area, or the shapes cross each other too often.
+    ParameterError
+        When a name in the options is none of the file's.
+    """
+    shapes.require_known_names()
+    if world is None and not shapes.outlines and not shapes.lines:
+        dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
+        raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
+    everything: list[BaseGeometry] = [] if world is None else [world]
+    everything += [o.area for o in shapes.outlines]
+    everything += [shapely.linestrings(line.points) for line in shapes.lines]
+    # one of many parts may be a map, if they are not all too far from each other
+    _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
+    shapes.require_untangled()
+    asked = shapes.options.outlines
+    if world is not None:
+        boundary: _Enclosure | None = _Enclosure(world, "")
+    else:
+        boundary = _named(shapes)
+        if boundary is None and asked != "free":
+            boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
+    if asked is None and not solid:
+        solid = not shapes.outlines or (
+            boundary is not None and len(shapes.outlines) > len(boundary.outlines)
+        )
+    elif asked is not None:
+        solid = asked == "solid"
+    if solid:
+        boundary = boundary or _walled(shapes) or _rectangle(shapes)
+        area = boundary.area
+    else:
+        area = _together([o.area for o in shapes.outlines if not boundary or o not in boundary.outlines])
+        if area.is_empty and boundary is not None:
+            area = boundary.area
+    if area.is_empty:
+        raise MapError(f"{shapes.where}: no closed outline, but one that encloses free space was wanted")
+    _require_size(area.geoms[0].bounds, shapes.where)
+    used = boundary or _Enclosure(area, "")
+    inner = [outline for outline in shapes.outlines if solid and outline not in used.outlines]
+    walls = [line for line in shapes.lines if line not in used.lines]
+    blocks = [outline.area for outline in inner]
+    solids = [*(line.solid for line in walls), *(pillar.polygon for pillar in shapes.pillars)]
+    shapely.prepare(area)
+    around = np.zeros(0, dtype=bool) if not blocks else shapely.covered_by(area, blocks)
+    blocks = [block for block, outer in zip(blocks, around, strict=True) if not outer]
+    outside = int((~shapely.intersects(area, [*blocks, *solids])).sum() + around.sum())
+    if outside:
+        shapes.leave_out("shape", "outside of the boundary", outside)
+    free = _without(area, [*blocks, *solids])
+    outer = None
+    # what is free of a grid has its own outline
+    plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
+    if boundary is not None and (solid or boundary.area is not area) and plain:
+        outer = Polygon(boundary.area.geoms[0].exterior)
+    elif solids and len(area.geoms) == len(free.geoms) == 1:  # walls that begin at the edge are no part of it
+        outer = Polygon(area.geoms[0].exterior)
+    return ForeignMap(
+        name=name,
+        description=description,
+        format=format,
+        free=free,
+        boundary=outer,
+        vertices_read=shapes.vertices,
+        primitives=(
+            *(outline.circle for outline in inner if outline.circle is not None),
+            *(wall for line in walls if (wall := line.wall) is not None),
+            *shapes.pillars,
+        ),
+        repaired=shapes.repaired,
+        dropped=shapes.dropped,
+        notes=(*notes, *_words(shapes, solid, boundary, len(blocks))),
+    )
+
+
+def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
+    """Return what the shapes enclose as walls, else a rectangle around them, m; and that in words."""
+    found = _walled(shapes) or _rectangle(shapes)
+    return found.area, f"the boundary is {found.words}"
+
+
+def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
+    """Refuse what no map may be, before it is computed with."""
+    x, y, right, top = bounds
+    if max(right - x, top - y) > most:
+        size = f"{right - x:.6g} x {top - y:.6g} m"
+        wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
+        raise MapError(f"{where}: {size}, but {wanted}")
+
+
+def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
+    """Return how the shapes were taken."""
+    if boundary is not None and not boundary.words:  # the format says what all of it is
+        blocks, told = 0, []
+    else:
+        told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
+    if blocks:
+        told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
+    elif not solid and len(shapes.outlines) > 1:
+        told.append(
+            f"{counted(len(shapes.outlines), 'closed outline')} taken as free space "
+            f"(--outlines solid: as obstacles)"
+        )
+    used = boundary.lines if boundary is not None else ()
+    widths = sorted(line.width for line in shapes.lines if line not in used)
+    if widths:
+        narrow, wide = f"{widths[0]:.3g}", f"{widths[-1]:.3g}"
+        span = narrow if narrow == wide else f"{narrow} to {wide}"
+        told.append(f"{counted(len(widths), 'line')} taken as walls, {span} m wide (--thickness)")
+    if shapes.pillars:
+        told.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
+    return told
+
+
+def _named(shapes: Shapes) -> _Enclosure | None:
+    """Return the boundary that has the wanted name, or the usual one."""
+    wanted = shapes.options.boundary
+    key = (wanted or BOUNDARY).casefold()
+    outlines = frozenset(o for o in shapes.outlines if key in map(str.casefold, o.labels))
+    lines = frozenset(line for line in shapes.lines if key in map(str.casefold, line.labels))
+    area = _together([*(o.area for o in outlines), polygonised(lines)])
+    if area.is_empty:
+        if wanted is None:
+            return None
+        raise MapError(
+            f"{shapes.where}: boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
+        )
+    return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+
+
+def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
+    """Return the largest closed outline if most others lie in it, or all wholly; if solid, lines too."""
+    if not shapes.outlines:
+        return None
+    outline = max(shapes.outlines, key=_filled)
+    inner: list[BaseGeometry] = [o.area for o in shapes.outlines if o is not outline]
+    if solid:
+        inner += [*(shapely.linestrings(line.points) for line in shapes.lines)]
+        inner += [pillar.polygon for pillar in shapes.pillars]
+        # walls as one shape have rooms as holes
+        if outline.area.area < _MOST * _filled(outline):
+            return None
+    if wholly:
+        holds = bool(shapely.covers(outline.area, inner).all())
+    else:
+        holds = not inner or _holds(outline.area, inner)
+    if not holds:
+        return None
+    called = f", {shown(outline.labels[0])}," if outline.labels else ""
+    words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"
+    return _Enclosure(outline.area, words if inner else "the only closed outline", frozenset([outline]))
+
+
+def _filled(outline: Outline) -> float:
+    """Return the area within the outer rings of an outline, m²."""
+    return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
+
+
+def _walled(shapes: Shapes) -> _Enclosure | None:
+    """Return the outer edge of the walls if they close."""
+    solid = _together([*(o.area for o in shapes.outlines), *(line.solid for line in shapes.lines)])
+    fills = [Polygon(part.exterior) for part in solid.geoms]
+    if not fills:  # what there is is thinner than the grid
+        return None
+    k = int(np.argmax([fill.area for fill in fills]))
+    if solid.geoms[k].area > (1.0 - _MOST) * fills[k].area or not _holds(fills[k], list(solid.geoms)):
+        return None
+    return _Enclosure(MultiPolygon([fills[k]]), f"the outer edge of the walls, around {fills[k].area:.4g} m²")
+
+
+def _rectangle(shapes: Shapes) -> _Enclosure:
+    """Return a rectangle around everything."""
+    around = AROUND if shapes.options.around is None else shapes.options.around
+    low_x, low_y, high_x, high_y = shapely.total_bounds(
+        [*(o.area for o in shapes.outlines), *(line.solid for line in shapes.lines)]
+    )
+    box = shapely.box(low_x - around, low_y - around, high_x + around, high_y + around)
+    return _Enclosure(
+        MultiPolygon([box]),
+        f"a rectangle {around:g} m around everything (--around): no shape holds the others",
+    )
+
+
+def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
+    """Return whether most of the inner shapes lie in the outer one, each by a place on it."""
+    shapely.prepare(outer)
+    return bool(shapely.covers(outer, shapely.point_on_surface(inner)).mean() > _MOST)
+
+
+def _together(areas: Sequence[BaseGeometry]) -> MultiPolygon:
+    """Return areas as one; a single one stays exactly as it is."""
+    areas = [area for area in areas if not area.is_empty]
+    if len(areas) == 1:
+        return polygons_of(areas[0])
+    # to unite first and round then takes a tenth of the time
+    return polygons_of(shapely.set_precision(united(areas), GRID))
+
+
+def _without(area: MultiPolygon, blocks: Sequence[BaseGeometry]) -> MultiPolygon:
+    if not blocks:
+        return area
+    return polygons_of(shapely.difference(area, united(blocks), grid_size=GRID))

@@ -1,0 +1,192 @@
+"""Gaps that a robot passed before walls moved, and does not pass now."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon, STRtree
+
+from robocov.arrays import Array, IntArray, ranges
+from robocov.environment import Point
+
+_CHUNK = 2048
+"""Sides that are looked at together, which bounds the memory."""
+
+_SQUARES = 1024
+"""So many squares are looked at more closely, at each size."""
+
+_SQUARED_WORK, _WORK = 5_000_000, 300_000_000
+"""So many sides may be crossed by the rays that tell whether squares of one size, and gaps, are inside."""
+
+_QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
+
+_MOST_GAPS = 200_000
+"""So many gaps are looked at."""
+
+_CLEARLY = 1 + 1e-6
+"""A gap of just a robot's diameter is none."""
+
+
+def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+    """Return where the centre of a robot may be, one polygon for each place that it cannot leave.
+
+    Places smaller than a quarter of the radius squared are none: it hardly moves there.
+    """
+    inner = free.buffer(-radius, quad_segs=4)
+    return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
+
+
+def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[Point, float]:
+    """Return the place farthest from the walls, and how far that is, m; or any that is far enough.
+
+    Squares that may hold a place that is better by `tolerance` are cut into four, `_SQUARES` of them, the
+    most promising: where there are more, as in a long hall, a place may be a bit better than what is found.
+    """
+    sides = _sides(free)
+    walls = STRtree(sides)
+    shapely.prepare(free)
+    low_x, low_y, high_x, high_y = free.bounds
+    width, height = high_x - low_x, high_y - low_y
+    some = np.linspace(low_y, high_y, _SQUARES)
+    squares = max(min(_SQUARES, _SQUARES * _SQUARED_WORK // max(_rays(sides, some), 1)), 16)
+    side = max(min(width, height), max(width, height) / squares)
+    centres = (
+        np.stack(
+            np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side)), axis=-1
+        ).reshape(-1, 2)
+        + side / 2
+    )
+    best, place = -math.inf, centres[0]
+    while len(centres) and best < enough:
+        _, away = walls.query_nearest(shapely.points(centres), return_distance=True, all_matches=False)
+        away = np.where(shapely.contains_xy(free, *centres.T), away, -away)
+        if away.max() > best:
+            best, place = float(away.max()), centres[away.argmax()]
+        hopeful = away + side * math.sqrt(0.5)
+        order = np.argsort(-hopeful, kind="stable")[:squares]
+        better = best + tolerance if enough == math.inf else max(best + tolerance, enough)
+        centres = centres[order[hopeful[order] > better]]
+        side /= 2
+        centres = (centres[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
+    return (float(place[0]), float(place[1])), best
+
+
+@dataclass(frozen=True)
+class Moved:
+    """By how much the walls of a free space moved.
+
+    Attributes
+    ----------
+    area : float, m²
+        That was free and is not, or is and was not.
+    distance : float, m
+        From a vertex of one outline to the other outline, at most.
+    """
+
+    area: float
+    distance: float
+
+
+def moved_walls(before: MultiPolygon, after: MultiPolygon) -> Moved:
+    """Return by how much walls moved from one free space to another."""
+    distance = 0.0
+    for one, other in ((before, after), (after, before)):
+        points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
+        _, away = STRtree(_sides(other)).query_nearest(points, return_distance=True, all_matches=False)
+        distance = max(distance, float(away.max()))
+    return Moved(float(shapely.symmetric_difference(before, after).area), distance)
+
+
+def _sides(area: Polygon | MultiPolygon) -> Array:
+    """Return the sides of the rings of an area, as linestrings."""
+    rings = shapely.get_rings(shapely.get_parts(area))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    along = ring[1:] == ring[:-1]
+    sides: Array = shapely.linestrings(np.stack([points[:-1][along], points[1:][along]], axis=1))
+    return sides
+
+
+def _rays(sides: Array, y: Array) -> int:
+    """Return how many sides horizontal lines at `y` cross, together: the cost of telling what is inside."""
+    bounds = shapely.bounds(sides)
+    low, high = np.sort(bounds[:, 1]), np.sort(bounds[:, 3])
+    return int((np.searchsorted(low, y, side="right") - np.searchsorted(high, y)).sum())
+
+
+def closed_gaps(
+    sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
+) -> tuple[IntArray, Array] | None:
+    """Return which gaps have become too narrow; None where there are too many to look at.
+
+    A gap is where two sides face each other across the free space. It was wide enough if what these sides
+    stand for is further apart there.
+
+    Parameters
+    ----------
+    sides : (m, 2, 2) m
+        The sides of walls as they are now, from point to point.
+    paths : (m,) linestrings, m
+        What each stands for: the wall as it was.
+    free : MultiPolygon, m
+        The free space now.
+    width : float, m
+        A robot's diameter.
+    moved : float, m
+        No wall has moved further.
+
+    Returns
+    -------
+    pairs : (p, 2)
+        The two sides.
+    places : (p, 2) m
+        The middle of the gap.
+    """
+    lines = shapely.linestrings(sides)
+    tree = STRtree(lines)
+    pairs = np.empty((0, 2), dtype=np.intp)
+    for begin in range(0, len(lines), _CHUNK):
+        one, other = tree.query(lines[begin : begin + _CHUNK], predicate="dwithin", distance=width)
+        one += begin
+        # neighbours meet in a corner; and two walls that are far closer now were close before
+        apart = (one < other) & (sides[one, 1] != sides[other, 0]).any(axis=1)
+        apart &= (sides[other, 1] != sides[one, 0]).any(axis=1)
+        one, other = one[apart], other[apart]
+        distance = shapely.distance(lines[one], lines[other])
+        narrow = (distance < width) & (distance > width - 2 * moved)
+        pairs = np.concatenate([pairs, np.column_stack([one[narrow], other[narrow]])])
+        if len(pairs) > _MOST_GAPS:
+            return None
+    ends = shapely.get_coordinates(shapely.shortest_line(lines[pairs[:, 0]], lines[pairs[:, 1]]))
+    places = ends.reshape(-1, 2, 2).mean(axis=1)
+    if _rays(lines, places[:, 1]) > _WORK:
+        return None
+    shapely.prepare(free)
+    across = shapely.contains_xy(free, *places.T)
+    pairs, places = pairs[across], places[across]
+    reach = width / 2 + 2 * moved
+    windows = shapely.box(*(places - reach).T, *(places + reach).T)
+    before = [shapely.intersection(paths[pairs[:, k]], windows) for k in (0, 1)]
+    # where nothing is left of a wall it was further away
+    was = np.nan_to_num(shapely.distance(*before), nan=np.inf)
+    lost = was > width * _CLEARLY
+    return pairs[lost], places[lost]
+
+
+def paths_of(points: Array, begin: IntArray, size: IntArray, first: IntArray, last: IntArray) -> Array:
+    """Return runs of vertices of rings as linestrings, (m,).
+
+    Parameters
+    ----------
+    points : (k, 2) m
+        Vertices of rings, ring after ring.
+    begin, size : (m,)
+        Where each run's ring begins, and how many vertices it has.
+    first, last : (m,)
+        The first and the last vertex of each run, along the ring; the same for all of a ring.
+    """
+    count = (last - first - 1) % size + 2
+    at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)
+    return np.asarray(shapely.linestrings(points[at], indices=np.arange(len(count)).repeat(count)))

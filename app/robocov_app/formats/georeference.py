@@ -1,0 +1,198 @@
+"""Coordinates on the globe, as metres about a place: what a robot's map is in."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import MapError, RobocovError, shown
+from robocov.extras import extra
+from robocov.mapfile.models import LARGEST
+from robocov_app.formats.files import require_shapes
+from robocov_app.formats.geometry.shapes import Figure
+from robocov_app.formats.options import ReadOptions
+
+DEGREES = "OGC:CRS84"
+"""Longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)."""
+
+_IN_DEGREES = (DEGREES, "EPSG:4326")
+_AS_THEY_ARE = "--units metres takes coordinates as they are"
+_AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
+_DIGITS = 6
+"""Decimals of metres: free space is known to a micrometre."""
+
+_EARTH = 6_371_000.0
+"""Mean radius in metres, to tell degrees from metres; nothing else is computed with it."""
+
+
+def in_metres(
+    figures: Sequence[Figure],
+    options: ReadOptions,
+    where: str,
+    *,
+    crs: str | None = None,
+    globe: bool = False,
+    origin: tuple[float, float] | None = None,
+) -> tuple[list[Figure], list[str]]:
+    """Return figures with coordinates in metres, and what was done to them, in words.
+
+    Parameters
+    ----------
+    figures : sequence of Figure
+    options : ReadOptions
+        ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
+    where : str
+        What messages call the file.
+    crs : str or None
+        The reference system that the file names, as ``EPSG:25832`` or an OGC URN.
+    globe : bool
+        Whether coordinates without a system are degrees where that makes a map of at most 10 km.
+    origin : (longitude, latitude) or None
+        Where the file says that [0, 0] m is; by default the middle of what is there.
+
+    Raises
+    ------
+    MapError
+        When a system is needed that is unknown, or that needs pyproj where it is not installed; or there are
+        too many shapes.
+    """
+    if not figures:
+        return [], []
+    require_shapes(sum(figure.kind != "point" for figure in figures), where)
+    if options.units == "metres" or (crs is None and options.units is None and not _on_globe(figures, globe)):
+        scale = 1.0 if options.scale is None else options.scale
+        notes = [] if scale == 1.0 else [f"a unit is {scale:g} m"]
+        if globe and options.units is None:
+            notes.append("coordinates taken as metres: as degrees the map would be larger than 10 km")
+        if crs is not None:
+            notes.append(f"coordinates of {crs} taken as they are")
+        return _with_points(figures, _points(figures) * scale), notes
+    name = DEGREES if options.units == "degrees" or crs is None else _authority(crs, where)
+    return _projected(figures, name, where, origin)
+
+
+def _points(figures: Sequence[Figure]) -> Array:
+    """Return the points of all figures, one after the other, (k, 2)."""
+    rings = [ring for figure in figures for ring in figure.rings]
+    return np.concatenate(rings) if rings else np.empty((0, 2))
+
+
+def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
+    """Return figures with these points instead of theirs."""
+    moved, begin = [], 0
+    for figure in figures:
+        cuts = begin + np.cumsum([0, *map(len, figure.rings)])
+        rings = tuple(points[a:b] for a, b in itertools.pairwise(cuts.tolist()))
+        moved.append(replace(figure, rings=rings))
+        begin = cuts[-1]
+    return moved
+
+
+def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
+    """Return whether coordinates are degrees of a place, not metres of a plan: a plan is metres wide."""
+    if not possible or not figures:
+        return False
+    points = _points(figures)
+    if not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
+        return False
+    width, height = np.ptp(_unwrapped(points, points[0, 0]), axis=0)
+    shrunk = math.cos(math.radians(float(np.abs(points[:, 1]).max())))
+    return bool(max(width * shrunk, height) * math.radians(1.0) * _EARTH <= LARGEST)
+
+
+def _unwrapped(points: Array, about: float) -> Array:
+    """Return longitudes without a jump at the antimeridian: all within 180 degrees of one."""
+    longitude = about + (points[:, 0] - about + 180.0) % 360.0 - 180.0
+    return np.column_stack([longitude, points[:, 1]])
+
+
+def _authority(crs: str, where: str) -> str:
+    """Return a name of a reference system as AUTHORITY:CODE.
+
+    Only codes are looked up: definitions in full may name files.
+    """
+    match = re.fullmatch(
+        r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Za-z]{3,4}):(?:[\d.]*:)?([A-Za-z]*\d{1,9})",
+        crs.strip(),
+        re.IGNORECASE,
+    ) or re.fullmatch(
+        r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})", crs.strip()
+    )
+    if match is None or match[1].upper() not in _AUTHORITIES:
+        raise MapError(
+            f"{where}: reference system {shown(crs)}, but a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"
+        )
+    return f"{match[1].upper()}:{match[2].upper()}"
+
+
+def _projected(
+    figures: Sequence[Figure], name: str, where: str, origin: tuple[float, float] | None
+) -> tuple[list[Figure], list[str]]:
+    """Return figures in metres east and north of a place, by the azimuthal equidistant projection."""
+    pyproj = _pyproj(name, where)
+    points = _points(figures)
+    if name not in _IN_DEGREES:
+        try:
+            system = pyproj.CRS.from_authority(*name.split(":"))
+            to_globe = pyproj.Transformer.from_crs(system, DEGREES, always_xy=True)
+        except pyproj.exceptions.ProjError:
+            raise MapError(f"{where}: reference system {name} is unknown ({_AS_THEY_ARE})") from None
+        points = np.column_stack(to_globe.transform(*points.T))
+    good = (np.abs(points) <= [360.0, 90.0]).all(axis=1)  # what cannot be projected is inf
+    if not good.all():
+        x, y = _points(figures)[int(np.argmin(good))].tolist()
+        wanted = "longitude and latitude in degrees" if name in _IN_DEGREES else f"coordinates of {name}"
+        raise MapError(f"{where}: a point at [{x:g}, {y:g}], but {wanted} were wanted ({_AS_THEY_ARE})")
+    points = _unwrapped(points, points[0, 0])
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    longitude, latitude = origin or (float(middle[0]), float(middle[1]))
+    points = LocalPlane(pyproj, longitude, latitude).metres(points)
+    longitude = (longitude + 180.0) % 360.0 - 180.0
+    words = (
+        f"{'degrees' if name in _IN_DEGREES else name} projected to metres about longitude {longitude:.5f}, "
+        f"latitude {latitude:.5f} (azimuthal equidistant)"
+    )
+    return _with_points(figures, points), [words]
+
+
+class LocalPlane:
+    """Metres east and north of a place on the globe, from degrees and back.
+
+    Azimuthal equidistant on the ellipsoid of WGS 84 (Snyder 1987, Map Projections: A Working Manual,
+    section 25): within 5 km of the place lengths are true to better than a millimetre.
+
+    Parameters
+    ----------
+    pyproj : module
+    longitude, latitude : float, degrees
+    """
+
+    def __init__(self, pyproj: Any, longitude: float, latitude: float) -> None:
+        self._longitude = longitude
+        self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
+
+    def metres(self, degrees: Array) -> Array:
+        """Return (n, 2) m of longitudes and latitudes.
+
+        Rounded to the micrometre that free space is known to: walls that touch or share a corner still do.
+        """
+        return np.round(np.column_stack(self._project(*degrees.T)), _DIGITS)
+
+    def degrees(self, metres: Array) -> Array:
+        """Return longitudes, all within 180 degrees of the place's, and latitudes of (n, 2) m."""
+        return _unwrapped(np.column_stack(self._project(*metres.T, inverse=True)), self._longitude)
+
+
+def _pyproj(name: str, where: str) -> Any:
+    try:
+        return extra("pyproj", "geo")
+    except RobocovError as error:
+        what = "degrees" if name == DEGREES else name
+        raise MapError(f"{where}: coordinates in {what}: {error} ({_AS_THEY_ARE})") from None

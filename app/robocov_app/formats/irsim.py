@@ -1,0 +1,257 @@
+"""Worlds of the simulator IR-SIM: https://ir-sim.readthedocs.io/en/stable/yaml_config/configuration.html.
+
+A YAML with the size of the ``world``, perhaps a picture of it, and groups of ``robot`` and ``obstacle``: so
+many of a shape, at given states [x, y, theta] or distributed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon
+
+from robocov.arrays import Array, BoolArray
+from robocov.errors import MapError, counted, one_line, shown
+from robocov.mapfile.models import FARTHEST
+from robocov_app.formats import files
+from robocov_app.formats.files import Value, named_file
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.raster import free_area, vertices_of
+from robocov_app.formats.geometry.shapes import Line, Shapes
+from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.picture import read_picture
+
+MOST_OBJECTS = 4_000
+"""Robots and obstacles of a world."""
+
+_WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
+_TRUE = ("true", "yes", "on", "1")
+
+
+def is_irsim(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like a world of IR-SIM."""
+    return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
+
+
+def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the map of an IR-SIM world.
+
+    Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
+    ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left
+    out and counted. The states of robots are a start.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood, or its world is generated.
+    """
+    where = one_line(path)
+    shapes = Shapes(where, options)
+    root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
+    world = root["world"]
+    size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
+    corner = world["offset"].numbers([0.0, 0.0])[:2]
+    free, cell, notes = MultiPolygon([shapely.box(*corner, *(corner + size))]), None, []
+    source = world["obstacle_map"]
+    if source.given:
+        light, moved = _picture(source, world["mdownsample"], path, options)
+        notes = [] if moved is None else [moved]
+        width, height = (size / light.shape[::-1]).tolist()
+        free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
+        cell = max(width, height)
+        shapes.vertices += vertices_of(free)
+        files.require_vertices(shapes.vertices, where)
+    robots: list[tuple[float, float]] = []
+    count = moving = 0
+    for kind in ("robot", "obstacle"):
+        for group in root[kind].items(one=True):
+            number = max(int(group["number"].number(1.0)), 0)
+            count += number
+            if count > MOST_OBJECTS:
+                group["number"].refuse(f"a number of at most {MOST_OBJECTS} together")
+            states = _states(group, number, corner + size / 2, float(size.min() / 2 - 0.5))
+            if states is None:
+                shapes.leave_out(kind, "that IR-SIM places at random", number)
+                continue
+            names = group["name"].items(one=True)
+            for k in range(number):
+                given = [names[min(k, len(names) - 1)].text()] if names else []
+                labels = [label for label in (*given, group["group_name"].text()) if label]
+                x, y, turn = states[min(k, len(states) - 1)][:3]
+                if kind == "robot":
+                    robots.append((float(x), float(y)))
+                elif shapes.wants(labels):
+                    if group["unobstructed"].text().lower() in _TRUE:
+                        shapes.leave_out(kind, "that nothing collides with")
+                        continue
+                    moving += group["kinematics"].given
+                    figures = group["shape"].items(one=True) or [group["shape"]]
+                    _draw(figures[min(k, len(figures) - 1)], _frame(x, y, turn), shapes, labels)
+    if moving:
+        notes.append(
+            f"{counted(moving, 'obstacle')} with kinematics taken as standing where the file has them"
+        )
+    foreign = foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=world["name"].text() or path.stem,
+        description="A world of IR-SIM, imported.",
+        solid=True,
+        world=free,
+        notes=notes,
+    )
+    return replace(foreign, cell=cell, robots=tuple(robots))
+
+
+def _picture(source: _Node, step: _Node, path: Path, options: ReadOptions) -> tuple[BoolArray, str | None]:
+    """Return which cells of the world's picture are free, the top row first, and what was put right."""
+    if isinstance(source.value, dict):
+        if source["name"].text() != "image":
+            name = shown(source["name"].value)
+            raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
+        source = source["path"]
+    file, moved = named_file(
+        path, source.text(), anywhere=bool(options.anywhere), at=source.at, what="picture"
+    )
+    picture = read_picture(file, one_line(file))
+    every = int(step.number(1.0))
+    if every < 1:
+        step.refuse("a number from 1")
+    # IR-SIM counts rows from the bottom
+    return (2 * picture.level.astype(np.uint32) >= picture.full)[::-1][::every, ::every][::-1], moved
+
+
+def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Array] | None:
+    """Return the states [x, y, theta] of a group, of which the last may stand for more; None by chance."""
+    way = group["distribution"]
+    name = way["name"].text("manual")
+    if name == "circle":
+        middle, radius = way["center"].numbers([*centre.tolist(), 0.0]), way["radius"].number(radius)
+        turns = 2 * math.pi * np.arange(number) / max(number, 1)
+        around = np.column_stack([np.cos(turns), np.sin(turns)]) * radius + middle[:2]
+        return [*np.column_stack([around, turns - math.pi])]
+    if name == "random":
+        return None
+    if name != "manual":
+        way["name"].refuse("manual, circle or random")
+    states = group["state"].items()
+    nested = bool(states) and isinstance(states[0].value, list)
+    return [state.numbers([1.0, 1.0, 0.0]) for state in (states if nested else [group["state"]])]
+
+
+def _draw(shape: _Node, frame: Array, shapes: Shapes, labels: list[str]) -> None:
+    """Add an obstacle with its frame, a (3, 3) matrix to metres of the world."""
+    name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
+    shift = np.array([shape["wheelbase"].number(0.0) / 2, 0.0])
+
+    def placed(points: Array) -> Array:
+        return np.asarray(points @ frame[:2, :2].T + frame[:2, 2])
+
+    if shape["random_shape"].text().lower() in _TRUE:
+        shapes.leave_out("shape", "by chance")
+    elif name == "circle":
+        centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
+        shapes.add_circle(placed(centre[None])[0], shape["radius"].length(0.2), labels, at=at)
+    elif name == "rectangle":
+        x, y = shape["length"].length(1.0) / 2, shape["width"].length(1.0) / 2
+        ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) + shift
+        shapes.add_outline([placed(ring)], labels, at=at)
+    elif name in ("polygon", "linestring"):
+        points = [point.numbers([0.0, 0.0])[:2] for point in shape["vertices"].items()]
+        if len(points) < (3 if name == "polygon" else 2):
+            shape["vertices"].refuse("a list of points [x, y]")
+        if name == "linestring":
+            shapes.add_line(Line(placed(np.array(points)), shapes.thickness, tuple(labels)), at=at)
+        elif not shapes.add_outline([placed(np.array(points))], labels, at=at):
+            shapes.leave_out("polygon", "without an area")
+    elif name == "compound":
+        for part in shape["parts"].items():
+            _draw(part, frame @ _frame(*part["pose"].numbers([0.0, 0.0, 0.0])[:3]), shapes, labels)
+    else:
+        shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
+
+
+def _frame(x: float, y: float, turn: float) -> Array:
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A value of the file and its place; what is not given is None."""
+
+    value: Value | None
+    at: str
+
+    @property
+    def given(self) -> bool:
+        return self.value not in (None, "", "null", "~", "None", [], {})
+
+    def __getitem__(self, name: str) -> _Node:
+        if self.given and not isinstance(self.value, dict):
+            self.refuse("a mapping (name: value)")
+        place = self.at if self.at.endswith(": ") else f"{self.at}."
+        return _Node(self.value.get(name) if isinstance(self.value, dict) else None, f"{place}{name}")
+
+    def items(self, *, one: bool = False) -> list[_Node]:
+        """Return the items of a list; where `one` is allowed, anything else is a list of it."""
+        if not self.given:
+            return []
+        if isinstance(self.value, list):
+            return [_Node(item, f"{self.at}[{k}]") for k, item in enumerate(self.value)]
+        if not one:
+            self.refuse("a list")
+        return [self]
+
+    def text(self, default: str = "") -> str:
+        if not self.given:
+            return default
+        if not isinstance(self.value, str):
+            self.refuse("one value")
+        return self.value
+
+    def number(self, default: float) -> float:
+        try:
+            value = float(self.text(str(default)))
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= FARTHEST:
+            self.refuse("a number within 1e7")
+        return value
+
+    def length(self, default: float) -> float:
+        value = self.number(default)
+        files.require_length(value, self.at)
+        return value
+
+    def numbers(self, default: list[float]) -> Array:
+        """Return a list of numbers, of which the last may be missing."""
+        values = [item.number(0.0) for item in self.items()]
+        if self.given and len(values) < 2:
+            self.refuse(f"a list of {len(default)} numbers")
+        return np.array([*values, *default[len(values) :]])
+
+    def refuse(self, wanted: str) -> NoReturn:
+        raise MapError(f"{self.at}: {shown(self.value)}, but {wanted} was wanted")
+
+
+IMPORTER = Importer(
+    name="irsim",
+    title="IR-SIM: YAML of a world, robots and obstacles",
+    suffixes=(),  # a .yaml is this by its content only
+    sniff=is_irsim,
+    read=read_irsim,
+    options=frozenset({"thickness", "anywhere", "only", "skip"}),
+)

@@ -1,0 +1,156 @@
+"""MovingAI benchmark grids.
+
+A letter a cell: ``.`` and ``G`` are passable, ``S`` is swamp, passable too; ``@`` and ``O`` are out of
+bounds, ``T`` is trees and ``W`` water, which are obstacles unless an option says otherwise.
+
+N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Computational Intelligence
+and AI in Games 4 (2012), 144-148.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robocov.environment import Environment
+from robocov.errors import MapError, one_line, shown
+from robocov.files.atomic import written
+from robocov_app.formats import files
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.cells import free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
+from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
+
+CELL = 1.0
+"""Side of a cell in metres where none is given: the format has no unit."""
+
+_PASSABLE, _SOLID = b".GS", b"@O"
+_BAD = 255
+
+
+def _sniff(path: Path, head: bytes) -> bool:
+    words = head.removeprefix(b"\xef\xbb\xbf").split(None, 3)
+    return len(words) > 2 and words[0].lower() == b"type" and words[2].lower() in (b"height", b"width")
+
+
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
+    where = one_line(path)
+    data = files.content(path, files.MAX_CELLS + files.HEAD).removeprefix(b"\xef\xbb\xbf")
+    columns, rows, body, line = _header(data, where)
+    table = np.full(256, _BAD, np.uint8)
+    table[list(_PASSABLE)] = FREE
+    table[list(_SOLID)] = BLOCKED
+    table[ord("T")] = FREE if options.trees == "free" else BLOCKED
+    table[ord("W")] = FREE if options.water == "free" else BLOCKED
+    letters = _letters(body, columns, rows, line, where)
+    cells = table[letters]
+    bad = cells == _BAD
+    if bad.any():
+        row, column = (int(k) for k in np.argwhere(bad)[0])
+        letter = chr(letters[row, column])
+        raise MapError(
+            f"{where}: line {line + row}, column {column + 1}: {shown(letter)}, "
+            f"but one of . G S @ O T W was wanted"
+        )
+    cell = CELL if options.cell is None else options.cell
+    notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
+    return foreign_map(
+        cells,
+        name=path.stem,
+        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
+        format="movingai",
+        cell=cell,
+        where=where,
+        notes=notes,
+    )
+
+
+def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
+    """Return columns, rows, what comes after the header, and the line that it begins in, from 1."""
+    sizes: dict[str, int] = {}
+    at = 0
+    for number in range(1, 20):
+        end = data.find(b"\n", at, at + 200)
+        line = data[at : end if end >= 0 else at + 200]
+        words = line.decode("ascii", "replace").split()
+        place = f"{where}: line {number}"
+        at = end + 1 if end >= 0 else len(data)
+        key = words[0].lower() if words else ""
+        if key == "map" and len(words) == 1:
+            for wanted in ("height", "width"):
+                if wanted not in sizes:
+                    raise MapError(f"{place}: no {wanted} so far, but one was wanted")
+            files.require_cells(sizes["width"], sizes["height"], where)
+            return sizes["width"], sizes["height"], data[at:], number + 1
+        if not words:
+            continue
+        if key == "type" and len(words) == 2:
+            if words[1].lower() not in ("octile", "tile"):
+                raise MapError(f"{place}: type {shown(words[1])}, but octile was wanted")
+        elif key in ("height", "width") and len(words) == 2 and words[1].isascii() and words[1].isdigit():
+            if len(words[1]) > 9:
+                raise MapError(f"{place}: {key} {shown(words[1])}, but a smaller one was wanted")
+            sizes[key] = int(words[1])
+        else:
+            raise MapError(
+                f"{place}: {shown(' '.join(words))}, but type octile, height N, width N or map was wanted"
+            )
+    raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
+
+
+def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDArray[np.uint8]:
+    """Return the letters of the grid, (rows, columns) bytes, the top row first."""
+    lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
+    for k in range(rows):
+        found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
+        if found != columns:
+            what = f"{found} letters" if k < len(lines) and (found or k < len(lines) - 1) else "end of file"
+            raise MapError(f"{where}: line {line + k}: {what}, but {columns} letters were wanted")
+    if len(lines) > rows and lines[rows].strip():
+        raise MapError(f"{where}: line {line + rows}: more than {rows} rows, but so many were wanted")
+    joined = b"".join(lines[k].rstrip(b" \t\r") for k in range(rows))
+    return np.frombuffer(joined, np.uint8).reshape(rows, columns)
+
+
+IMPORTER = Importer(
+    name="movingai",
+    title="MovingAI grid: .map",
+    suffixes=(".map",),
+    sniff=_sniff,
+    read=_read,
+    options=frozenset({"cell", "trees", "water"}),
+)
+
+
+def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    grid = grid_over(environment, options.cell)
+    free = free_cells(environment, grid)
+    letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
+    letters[:, :-1][free[::-1]] = ord(".")
+    letters[:, -1] = ord("\n")
+    head = f"type octile\nheight {grid.rows}\nwidth {grid.columns}\nmap\n"
+    with written(path) as part:
+        part.write_bytes(head.encode("ascii") + letters.tobytes())
+    x, y = grid.origin
+    return ExportReport(
+        "movingai",
+        (path,),
+        environment.free_area,
+        float(np.count_nonzero(free)) * grid.cell**2,
+        dropped=(
+            f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]",
+            *not_held(environment),
+        ),
+        warnings=lost_passages(environment, grid, free),
+    )
+
+
+EXPORTER = Exporter(
+    name="movingai",
+    title="MovingAI grid: .map",
+    suffixes=(".map",),
+    write=_write,
+    options=frozenset({"cell"}),
+)

@@ -1,0 +1,289 @@
+"""A picture of an import: the map as it was read and as it became, with what was lost between."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from robocov.environment import Environment, Gap
+from robocov_app.figures.arena import draw_map, map_handles
+from robocov_app.figures.files import check_figure_path, plain_style, save_figure
+from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
+from robocov_app.formats.foreign import ForeignMap, ImportReport
+from robocov_app.formats.geometry.shaping import Comparison, compare
+from robocov_app.render.layout import columns_for
+from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
+
+_WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
+"""Of the page, of the arenas on it, and the least for what is written, in pixels."""
+
+_SCALE, _TOP, _ABOVE, _LINE = 1.3, 66.0, 34.0, 17.0
+"""Of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report."""
+
+_MARK = 0.55
+"""Opacity of what is marked."""
+
+_MOST_LINES = 12
+"""Of the report; what is beyond is counted."""
+
+_RING = 20.0
+"""Size of the ring around a passage that is too short to be seen, in points."""
+
+
+def preview(
+    foreign: ForeignMap,
+    environment: Environment,
+    report: ImportReport,
+    path: Path,
+    *,
+    theme: Theme | str = LIGHT,
+) -> None:
+    """Draw an import to a file: `plot_import`, saved.
+
+    Parameters
+    ----------
+    foreign : ForeignMap
+    environment : Environment
+    report : ImportReport
+    path : Path
+        A .png, .svg or .pdf.
+    theme : Theme or {"light", "dark"}
+
+    Raises
+    ------
+    OutputError
+        When the file cannot be written.
+    ParameterError
+        When its suffix is another.
+    """
+    check_figure_path(path)
+    save_figure(plot_import(foreign, environment, report, theme=theme), path)
+
+
+def plot_import(
+    foreign: ForeignMap, environment: Environment, report: ImportReport, *, theme: Theme | str = LIGHT
+) -> Figure:
+    """Plot a map as it was read and as it became, at one scale, and what was done to it in words.
+
+    In the first, free space that is not in the map any more is marked, with a place in each large part of it;
+    in the second, places that were solid and are free, and the narrowest passage.
+
+    Parameters
+    ----------
+    foreign : ForeignMap
+    environment : Environment
+    report : ImportReport
+    theme : Theme or {"light", "dark"}
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    theme = theme_named(theme)
+    compared = compare(foreign, environment, report)
+    captions = (
+        ("as read", f"{_number(report.vertices_read)} vertices, {_number(compared.before.area)} m² free"),
+        ("as imported", f"{_number(report.vertices_kept)} vertices, {_number(compared.after.area)} m² free"),
+    )
+    with plain_style():
+        handles = _handles(environment, theme, compared)
+        page, panels, said = _laid_out(theme, compared.bounds, captions, handles, report.lines()[2:])
+        s, left = page.scale, min(box[0] for box, _ in panels)
+        room = page.size[0] - left - page.margin
+        page.text(environment.name, left, 24 * s, points=HEADING, bold=True, room=room)
+        facts = f"{report.size[0]:.4g} x {report.size[1]:.4g} m, imported from {report.format}"
+        page.text(facts, left, 44 * s, colour=theme.faint, room=room)
+        for (box, slot), (name, facts) in zip(panels, captions, strict=True):
+            y = box[1] - 14 * s
+            page.text(name, box[0], y, points=TITLE, bold=True)
+            page.text(
+                facts, box[0] + _indent(page, name), y, colour=theme.faint, room=slot - _indent(page, name)
+            )
+        first, second = (_arena(page, box, compared.bounds) for box, _ in panels)
+        outside = shapely.difference(compared.region, compared.before)
+        _draw(first, outside, theme.obstacle, theme.obstacle_edge)
+        _draw_edges(first, compared.before, theme)
+        _draw(first, compared.lost, theme.trajectory, theme.trajectory, _MARK)
+        _draw_places(first, report.others, theme)
+        draw_map(second, environment, theme)
+        _draw(second, compared.opened, theme.start, theme.start, _MARK)
+        _draw_gap(second, compared.gap, theme)
+        right = max(box[0] + box[2] for box, _ in panels)
+        bottom = max(box[1] + box[3] for box, _ in panels)
+        low_x, _, high_x, _ = compared.bounds
+        page.footer(handles, left, right, bottom, panels[0][0][2] / (high_x - low_x))
+        for k, line in enumerate(reversed(said)):
+            y = page.size[1] - (_LINE * k + 16) * s
+            page.text(line, left, y, points=SMALL, colour=theme.faint)
+        return page.figure
+
+
+def _laid_out(
+    theme: Theme,
+    bounds: Box,
+    captions: Sequence[tuple[str, str]],
+    handles: Sequence[Artist],
+    lines: Sequence[str],
+) -> tuple[Page, list[tuple[Box, float]], list[str]]:
+    """Return a page, the boxes of two arenas on it with the room above each, and the lines below."""
+    page = Page((_WIDTH, _WIDTH), theme, _SCALE)
+    s, (x, y, right, top) = page.scale, bounds
+    aspect, words = (right - x) / (top - y), 0.0
+    for name, facts in captions:
+        words = max(words, _indent(page, name) + page.text_width(facts))
+    columns = columns_for(2, aspect, (_WIDTH, _HEIGHT), _ABOVE * s)
+    rows = 2 // columns
+    # a map that is higher than wide needs no wide page
+    widest = (_WIDTH - page.margin) / columns - page.margin
+    wide = min(widest, max(aspect * _HEIGHT / rows, words))
+    width = max(columns * (wide + page.margin) + page.margin, _NARROWEST)
+    page = Page((int(width), _WIDTH), theme, _SCALE)
+    high = min(wide / aspect, _HEIGHT / rows)
+    slot = min(max(high * aspect, words), (width - page.margin) / columns - page.margin)
+    left = (width - columns * slot - (columns - 1) * page.margin) / 2
+    said = _wrapped(page, lines, width - left - page.margin)
+    below = page.footer_height(handles) + (_LINE * len(said) + 14) * s
+    tall = _TOP * s + rows * (_ABOVE * s + high) + (rows - 1) * 14 * s + below
+    page = Page((int(width), int(max(tall, 320))), theme, _SCALE)
+    return page, page.panels(2, columns, aspect, words, _ABOVE * s, _TOP * s, below), said
+
+
+def _indent(page: Page, name: str) -> float:
+    """Return how far from a caption's beginning its facts begin."""
+    return page.text_width(name, points=TITLE, bold=True) + 12 * page.scale
+
+
+def _arena(page: Page, box: Box, bounds: Box) -> Axes:
+    axes = page.axes(box)
+    axes.set_xlim(bounds[0], bounds[2])
+    axes.set_ylim(bounds[1], bounds[3])
+    axes.set_axis_off()
+    return axes
+
+
+def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
+    """Draw an area with its holes."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    for part in shapely.get_parts(area):
+        if isinstance(part, Polygon):
+            rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
+            outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
+            style = {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
+            axes.add_patch(PathPatch(outline, zorder=2, **style))
+
+
+def _draw_places(axes: Axes, places: Sequence[tuple[float, float]], theme: Theme) -> None:
+    """Write where the parts are that were left out, as the option ``--inside`` takes it."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+    for x, y in places:
+        axes.plot([x], [y], color=tone(theme.ink), marker="+", markersize=8.0, zorder=5, path_effects=halo)
+        axes.annotate(
+            f"{x:.10g} {y:.10g}", (x, y), xytext=(6, 6), textcoords="offset points", fontsize=SMALL,
+            color=tone(theme.ink), zorder=5, path_effects=halo,
+        )  # fmt: skip
+
+
+def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
+    """Draw the narrowest passage, in a ring that makes it found."""
+    if gap is None:
+        return
+    from matplotlib.patheffects import withStroke
+
+    colour = tone(theme.final)
+    halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
+    points = np.array(gap.between)
+    axes.plot(*points.T, color=colour, linewidth=2.0, zorder=5, clip_on=False, path_effects=halo)
+    ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
+    if np.hypot(*(ends[1] - ends[0])) < _RING:
+        x, y = points.mean(axis=0).tolist()
+        axes.plot([x], [y], zorder=5, clip_on=False, path_effects=halo, **_ring(theme, _RING))
+
+
+def _ring(theme: Theme, size: float) -> dict[str, Any]:
+    return {
+        "linestyle": "none",
+        "marker": "o",
+        "markersize": size,
+        "markerfacecolor": "none",
+        "markeredgecolor": tone(theme.final),
+        "markeredgewidth": 1.8,
+    }
+
+
+def _draw_edges(axes: Axes, area: BaseGeometry, theme: Theme) -> None:
+    """Draw where free space ends, also where the page is what lies beyond."""
+    from matplotlib.collections import LineCollection
+
+    rings = shapely.get_rings(shapely.get_parts(area))
+    lines = [shapely.get_coordinates(ring) for ring in rings]
+    axes.add_collection(
+        LineCollection(lines, colors=tone(theme.obstacle_edge), linewidths=0.8, clip_on=False, zorder=2),
+        autolim=False,
+    )
+
+
+def _number(value: float) -> str:
+    r"""Return a number as it is read most easily: whole where it is large.
+
+    >>> _number(1761234.5), _number(35.2789)
+    ('1\u202f761\u202f234', '35.28')
+    """
+    return f"{value:.4g}" if abs(value) < 9999.5 else f"{value:,.0f}".replace(",", "\u202f")
+
+
+def _handles(environment: Environment, theme: Theme, compared: Comparison) -> list[Artist]:
+    """Return the legend's entries for what is drawn."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles = map_handles(environment, theme)
+    for area, words, colour in (
+        (compared.lost, "left out: {} m² were free", theme.trajectory),
+        (compared.opened, "opened: {} m² were solid", theme.start),
+    ):
+        if not area.is_empty:
+            face = (*tone(colour), _MARK)
+            handles.append(
+                Patch(
+                    facecolor=face,
+                    edgecolor=tone(colour),
+                    linewidth=0.8,
+                    label=words.format(_number(area.area)),
+                )
+            )
+    gap = compared.gap
+    if gap is not None:
+        words = f"narrowest passage, {gap.width:.3g} m"
+        handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=words))
+    return handles
+
+
+def _wrapped(page: Page, lines: Sequence[str], room: float) -> list[str]:
+    """Return lines of at most so many pixels, those that are longer in several, and not too many."""
+    wrapped: list[str] = []
+    for line in lines:
+        begun = ""
+        whole = page.text_width(line, points=SMALL) <= room
+        for word in [line] if whole else line.split():
+            longer = f"{begun} {word}".strip()
+            if begun.strip() and page.text_width(longer, points=SMALL) > room:
+                wrapped.append(begun)
+                longer = f"    {word}"
+            begun = longer
+        wrapped.append(begun)
+    if len(wrapped) > _MOST_LINES:
+        wrapped = [*wrapped[: _MOST_LINES - 1], f"and {len(wrapped) - _MOST_LINES + 1} more lines"]
+    return wrapped

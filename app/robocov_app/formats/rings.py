@@ -1,0 +1,139 @@
+"""Lists of rings, as triangulation libraries take them: the first is the outline, the others are holes."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import JsonPath as Steps
+from robocov.errors import one_line
+from robocov_app.formats.files import located_errors, positions, read_json, refused, require_shapes
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.shapes import Shapes
+from robocov_app.formats.options import Importer, ReadOptions
+
+_LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
+_FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
+
+
+def is_rings(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like lists of rings."""
+    return path.suffix.lower() == ".json" and bool(_LISTS.match(head) or _FLAT.search(head))
+
+
+def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the polygons in a file of rings.
+
+    It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free
+    space and the others are obstacles; or one ring alone; or a list of such lists; or, flat, an object with
+    ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and ``dimensions``.
+    There are no units: the option ``scale`` is metres a unit, 1 by default.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood; with line and column.
+    """
+    document, content, where = read_json(path)
+    shapes = Shapes(where, options)
+    scale = 1.0 if options.scale is None else options.scale
+    with located_errors(content, where):
+        polygons = _polygons(document, where, shapes)
+    require_shapes(len(polygons), where)
+    for number, rings in enumerate(polygons, start=1):
+        if not shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}"):
+            shapes.leave_out("outline", "without an area")
+    notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
+    name = one_line(path.stem)[:60] or "map"
+    return foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=name,
+        description="Imported from rings.",
+        solid=False,
+        accessible=True,
+        notes=notes,
+    )
+
+
+def _polygons(document: Any, where: str, shapes: Shapes) -> list[list[Array]]:
+    """Return the polygons of a document: lists of rings, (k, 2) each."""
+    if isinstance(document, dict):
+        return [_flat(document, where, shapes)]
+    depth, inner = 0, document
+    while isinstance(inner, list) and inner:
+        depth, inner = depth + 1, inner[0]
+    if depth == 1:
+        return [[_pairs(document, (), where, 2, shapes)]]
+    if depth == 2:
+        return [[_ring(document, (), where, shapes)]]
+    if depth == 3:
+        return [_rings(document, (), where, shapes)]
+    if depth == 4:
+        return [_rings(rings, (k,), where, shapes) for k, rings in enumerate(document)]
+    raise refused(where, (), document, "a list of rings [[x, y], ...] was wanted")
+
+
+def _rings(value: Any, at: Steps, where: str, shapes: Shapes) -> list[Array]:
+    if not isinstance(value, list) or not value:
+        raise refused(where, at, value, "a list of rings was wanted")
+    return [_ring(ring, (*at, k), where, shapes) for k, ring in enumerate(value)]
+
+
+def _ring(value: Any, at: Steps, where: str, shapes: Shapes) -> Array:
+    points = positions(value, at, where, least=1, dimensions=(2, 3))
+    if points.shape[1] == 3:
+        shapes.leave_heights(points[:, 2])
+    return points[:, :2]
+
+
+def _flat(document: dict[str, Any], where: str, shapes: Shapes) -> list[Array]:
+    """Return the rings of the flat form."""
+    dimensions = document.get("dimensions", 2)
+    if type(dimensions) is not int or dimensions not in (2, 3):
+        raise refused(where, ("dimensions",), dimensions, "2 or 3 was wanted")
+    points = _pairs(document.get("vertices"), ("vertices",), where, dimensions, shapes)
+    holes = document.get("holes") or []
+    good = isinstance(holes, list) and all(type(hole) is int for hole in holes)
+    cuts = [0, *holes, len(points)] if good else []
+    if not good or any(a >= b for a, b in pairwise(cuts)):
+        wanted = f"growing indices of vertices, from 1 to {len(points) - 1}, were wanted"
+        raise refused(where, ("holes",), holes, wanted)
+    return [points[a:b] for a, b in pairwise(cuts)]
+
+
+def _pairs(value: Any, at: Steps, where: str, dimensions: int, shapes: Shapes) -> Array:
+    """Return the points of a flat list of numbers, (k, 2)."""
+    if not isinstance(value, list) or len(value) % dimensions or len(value) < 3 * dimensions:
+        raise refused(where, at, value, f"at least 3 times {dimensions} numbers were wanted")
+    points = positions(
+        [value[k : k + dimensions] for k in range(0, len(value), dimensions)],
+        at,
+        where,
+        least=3,
+        dimensions=(dimensions, dimensions),
+    )
+    if dimensions == 3:
+        shapes.leave_heights(points[:, 2])
+    return np.ascontiguousarray(points[:, :2])
+
+
+IMPORTER = Importer(
+    name="rings",
+    title="lists of rings (JSON as earcut takes it): outline and holes",
+    suffixes=(".json",),
+    sniff=is_rings,
+    read=read_rings,
+    options=frozenset({"scale", "outlines", "around"}),
+)

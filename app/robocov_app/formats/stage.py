@@ -1,0 +1,388 @@
+"""Worlds of the simulator Stage: https://player-stage-manual.readthedocs.io/en/latest/WORLDFILES/.
+
+A world file is a tree of models with properties, of macros that others are made of, and of files that it
+includes. A model is as large as its ``size``, whatever its bitmap or its blocks measure: the box around
+them is scaled to it.
+
+R. Vaughan, Massively multi-robot simulation in Stage, Swarm Intelligence 2 (2008), 189-208.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from robocov.arrays import Array
+from robocov.errors import MapError, one_line, shown
+from robocov.mapfile.models import FARTHEST
+from robocov_app.formats import files
+from robocov_app.formats.files import named_file
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.enclosing import foreign_map, surrounding
+from robocov_app.formats.geometry.fills import polygons_of
+from robocov_app.formats.geometry.raster import free_area, vertices_of
+from robocov_app.formats.geometry.shapes import Outline, Shapes
+from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.picture import read_picture
+
+MAX_BYTES = 5_000_000
+"""Largest file of a world, in bytes."""
+
+MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000
+"""Words and numbers in a world and all that it includes; models and blocks that macros make of them."""
+
+_DARK = 127 / 255
+"""Pixels that are not brighter are solid."""
+
+_TOKEN = re.compile(
+    r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
+    r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])'
+)
+_MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+class _Token(NamedTuple):
+    """A word, number, text or bracket, and its line."""
+
+    kind: str
+    text: str
+    at: str
+
+    def refuse(self, wanted: str) -> NoReturn:
+        raise MapError(f"{self.at}: {shown(self.text)}, but {wanted} was wanted")
+
+
+@dataclass(frozen=True, eq=False)
+class _Entity:
+    """A model, a block or a window: its properties, and the entities within."""
+
+    type: str
+    at: str
+    properties: dict[str, list[str]] = field(default_factory=dict)
+    inside: list[_Entity] = field(default_factory=list)
+
+    def text(self, name: str, default: str = "") -> str:
+        return self.properties.get(name, [default])[0]
+
+    def numbers(self, name: str, default: tuple[float, ...]) -> Array:
+        """Return the values of a property; those that are not written are as in `default`."""
+        given = self.properties.get(name, [])[: len(default)]
+        try:
+            values = np.array([*map(float, given), *default[len(given) :]])
+        except ValueError:
+            values = np.array([math.nan])
+        if not (np.abs(values) <= FARTHEST).all():
+            raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers within 1e7 were wanted")
+        return values
+
+    def number(self, name: str, default: float) -> float:
+        return float(self.numbers(name, (default,))[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """The box of a model, m, and what is free in it: all, but for the dark of its bitmap."""
+
+    box: Polygon
+    free: MultiPolygon
+    labels: tuple[str, ...]
+    cell: float | None = None
+
+
+def is_stage(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` looks like a world of Stage."""
+    return path.suffix.lower() == ".world" and _MODELS.search(head) is not None
+
+
+def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the map of a Stage world.
+
+    Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
+    (``position``) are places to start; sensors and the like are left out. The map is the largest model with
+    a bitmap or a ``boundary``, if most of the others are in it.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When a file cannot be read or understood, with the line; or when it is not in the world's folder.
+    """
+    shapes = Shapes(one_line(path), options)
+    world = _World(path, shapes)
+    root = world.read()
+    world.place(root.inside, np.eye(3))
+    rooms = sorted(world.rooms, key=lambda room: -room.box.area)
+    places = [*(outline.area.representative_point() for outline in shapes.outlines)]
+    places += [*(room.box.centroid for room in rooms), *map(shapely.Point, world.robots)]
+    main = next((room for room in rooms if shapely.covers(room.box, places).mean() > 0.5), None)
+    for room in rooms:
+        dark = polygons_of(shapely.difference(room.box, room.free)) if room is not main else MultiPolygon()
+        if not dark.is_empty:
+            shapes.outlines.append(Outline(dark, room.labels))
+    free = None if main is None else main.free
+    if free is None and shapes.outlines:
+        free, words = surrounding(shapes)
+        world.notes.append(words)
+    foreign = foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=root.text("name") or path.stem,
+        description="A world of Stage, imported.",
+        solid=True,
+        world=free,
+        notes=world.notes,
+    )
+    cell = max((room.cell for room in rooms if room.cell is not None), default=None)
+    return replace(foreign, cell=cell, robots=tuple(world.robots))
+
+
+class _World:
+    """Reads a world and places its models."""
+
+    def __init__(self, path: Path, shapes: Shapes) -> None:
+        self.path = path
+        self.shapes = shapes
+        self.tokens: list[_Token] = []
+        self.entities = 0
+        self.pixels = 0
+        self.macros: dict[str, _Entity] = {}
+        self.bitmaps: dict[Path, tuple[MultiPolygon, int, int]] = {}
+        self.metre, self.turn = 1.0, math.pi / 180
+        self.rooms: list[_Room] = []
+        self.robots: list[tuple[float, float]] = []
+        self.notes: list[str] = []
+
+    def read(self) -> _Entity:
+        """Return the file as an entity: what is global, and the models."""
+        self._split(self.path, 0)
+        root = _Entity("world", self.shapes.where)
+        self._fill(root, 0, 0)
+        self.metre = _LENGTHS.get(root.text("unit_length", "m"), 1.0)
+        self.turn = 1.0 if root.text("unit_angle") == "radians" else math.pi / 180
+        return root
+
+    def _named(self, token: _Token, what: str) -> Path:
+        anywhere = bool(self.shapes.options.anywhere)
+        file, note = named_file(self.path, token.text, anywhere=anywhere, at=token.at, what=what)
+        self.notes += [] if note is None or note in self.notes else [note]
+        return file
+
+    def _split(self, path: Path, depth: int) -> None:
+        """Add the tokens of a file, and of those that it includes."""
+        text = files.content(path, MAX_BYTES).decode("utf-8", "replace")
+        at, line, name, include = 0, 1, one_line(path), False
+        while at < len(text):
+            found = _TOKEN.match(text, at)
+            if found is None:
+                _Token("", text[at : at + 20], f"{name}:{line}").refuse("a word, a number or a bracket")
+            kind = str(found.lastgroup)
+            token = _Token(kind, found[kind], f"{name}:{line}")
+            at, line = found.end(), line + found[0].count("\n")
+            if kind == "blank":
+                continue
+            if include:
+                if kind != "string" or depth >= files.MAX_DEPTH:
+                    token.refuse("a file to include, which does not include itself,")
+                self._split(self._named(token, "file"), depth + 1)
+                include = False
+            elif (kind, token.text) == ("word", "include"):
+                include = True
+            elif len(self.tokens) >= MOST_TOKENS:
+                raise MapError(
+                    f"{token.at}: more than {MOST_TOKENS} words and numbers, but fewer were wanted"
+                )
+            else:
+                self.tokens.append(token)
+
+    def _fill(self, entity: _Entity, k: int, depth: int) -> int:
+        """Read the content of an entity from token `k` on; return where it ends."""
+        end = _Token("", "the end of the file", entity.at)
+        if depth > files.MAX_DEPTH:
+            raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}, but less was wanted")
+        while k < len(self.tokens):
+            token, *ahead = [*self.tokens[k : k + 4], end, end, end][:4]
+            if depth and (token.kind, token.text) == ("mark", ")"):
+                return k + 1
+            if token.kind != "word":
+                token.refuse("the name of a model or a property" + (", or )," if depth else ""))
+            if token.text == "define" and [after.kind for after in ahead] == ["word", "word", "mark"]:
+                macro = _Entity(ahead[1].text, token.at)
+                k = self._fill(macro, k + 4, depth + 1)
+                self.macros.setdefault(ahead[0].text, macro)
+            elif (ahead[0].kind, ahead[0].text) == ("mark", "("):
+                inner = _Entity(token.text, token.at)
+                k = self._fill(inner, k + 2, depth + 1)
+                entity.inside.append(inner)
+            else:
+                k = self._property(entity, k)
+        if depth:
+            end.refuse("a ) after what begins here")
+        return k
+
+    def _property(self, entity: _Entity, k: int) -> int:
+        """Read a property from its name at token `k` on: a number, a text, or a list of these."""
+        name, values = self.tokens[k].text, self.tokens[k + 1 : k + 2]
+        following = k + 2
+        if values and (values[0].kind, values[0].text) == ("mark", "["):
+            while following < len(self.tokens) and self.tokens[following].kind != "mark":
+                following += 1
+            values = self.tokens[k + 2 : following]
+            if self.tokens[following : following + 1] == [] or self.tokens[following].text != "]":
+                self.tokens[k].refuse("a ] after its values")
+            following += 1
+        if not all(value.kind in ("number", "string") for value in values) or following > len(self.tokens):
+            self.tokens[k].refuse("a value, or ( and ), after it")
+        entity.properties[name] = [value.text for value in values] or [""]
+        return following
+
+    def place(self, entities: list[_Entity], frame: Array, depth: int = 0) -> None:
+        """Place models in the frame of their parent, a (3, 3) matrix to metres, and what is in them."""
+        for given in entities:
+            entity, labels = self._expanded(given)
+            if depth > files.MAX_DEPTH:
+                raise MapError(f"{entity.at}: in more than {files.MAX_DEPTH} models, but fewer were wanted")
+            if entity.type in ("window", "block"):
+                continue
+            here = frame @ self._pose(entity, "pose")
+            if entity.type not in ("model", "position"):
+                self.shapes.leave_out(one_line(entity.type)[:30])
+            elif not self.shapes.wants(labels):
+                continue
+            elif entity.type == "position":
+                self.robots.append((float(here[0, 2]), float(here[1, 2])))
+            else:
+                if self._met(entity):
+                    self._shape(entity, here @ self._pose(entity, "origin"), labels)
+                else:
+                    self.shapes.leave_out("model", "that nothing meets")
+                self.place(entity.inside, here, depth + 1)
+
+    def _expanded(self, entity: _Entity) -> tuple[_Entity, tuple[str, ...]]:
+        """Return an entity with all that its macros say, and its name and theirs."""
+        chain = [entity]
+        while chain[-1].type in self.macros:
+            chain.append(self.macros[chain[-1].type])
+            if len(chain) > files.MAX_DEPTH:
+                raise MapError(f"{entity.at}: {shown(entity.type)} is made of itself, but a model was wanted")
+        self.entities += 1 + sum(len(part.inside) for part in chain)
+        if self.entities > MOST_ENTITIES:
+            raise MapError(f"{entity.at}: more than {MOST_ENTITIES} models and blocks, but fewer were wanted")
+        whole = _Entity(chain[-1].type, entity.at)
+        for part in reversed(chain):
+            whole.properties.update(part.properties)
+            whole.inside.extend(part.inside)
+        names = [whole.text("name"), *(part.type for part in chain)]
+        return whole, tuple(name for name in names if name)
+
+    def _pose(self, entity: _Entity, name: str) -> Array:
+        """Return the matrix of a pose [x y z heading], or [x y heading] as Stage 2 has it."""
+        values = entity.numbers(name, (0.0, 0.0, 0.0, 0.0))
+        x, y = values[:2] * self.metre
+        turn = values[2 if len(entity.properties.get(name, [])) == 3 else 3] * self.turn
+        return np.array(
+            [[math.cos(turn), -math.sin(turn), x], [math.sin(turn), math.cos(turn), y], [0, 0, 1]]
+        )
+
+    def _met(self, entity: _Entity) -> bool:
+        """Return whether robots run into a model, or see it."""
+        seen = entity.number("ranger_return", 1.0) > 0 and entity.number("laser_return", 1.0) > 0
+        return seen or entity.number("obstacle_return", 1.0) != 0 or "bitmap" in entity.properties
+
+    def _shape(self, entity: _Entity, frame: Array, labels: tuple[str, ...]) -> None:
+        """Add what a model covers: its bitmap, its blocks, or a box."""
+        size = entity.numbers("size", (0.4, 0.4)) * self.metre
+        files.require_length(float(size.min()), f"{entity.at}: size")
+        files.require_length(float(size.max()), f"{entity.at}: size")
+
+        def placed(points: Array) -> Array:
+            """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
+            return np.round((points * size) @ frame[:2, :2].T + frame[:2, 2], 9) + 0.0
+
+        box = Polygon(placed(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])))
+        rings = _blocks(entity)
+        for inner in entity.inside:
+            block, _ = self._expanded(inner)
+            rings += _blocks(block) if block.type == "block" else []
+        if "bitmap" in entity.properties:
+            token = _Token("string", entity.text("bitmap"), f"{entity.at}: bitmap")
+            free, columns, rows = self._bitmap(self._named(token, "picture"))
+            self.shapes.vertices += vertices_of(free)
+            files.require_vertices(self.shapes.vertices, self.shapes.where)
+            cell = float(max(size[0] / columns, size[1] / rows))
+            self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
+            if rings:
+                self.shapes.leave_out("block", "beside a bitmap", len(rings))
+            return
+        if rings:
+            low, high = np.concatenate(rings).min(axis=0), np.concatenate(rings).max(axis=0)
+            extent = np.maximum(high - low, 1e-12)
+            rings = [placed((ring - (low + high) / 2) / extent) for ring in rings]
+            if entity.number("boundary", 0):
+                self.rooms.append(_Room(box, MultiPolygon([box]), labels))
+        elif not entity.number("noblocks", 0):
+            rings = [np.asarray(box.exterior.coords)[:-1]]
+        for ring in rings:
+            if not self.shapes.add_outline([ring], labels, at=entity.at):
+                self.shapes.leave_out("block", "without an area")
+
+    def _bitmap(self, file: Path) -> tuple[MultiPolygon, int, int]:
+        """Return what is light in the box around all dark pixels, and its columns and rows.
+
+        The box has sides of 1 about the origin.
+        """
+        if file not in self.bitmaps:
+            where = one_line(file)
+            picture = read_picture(file, where)
+            self.pixels += picture.level.size
+            if self.pixels > files.MAX_CELLS:
+                most = files.MAX_CELLS // 1_000_000
+                raise MapError(
+                    f"{where}: with those before it more than {most} million pixels, but fewer were wanted"
+                )
+            dark = picture.level <= _DARK * picture.full
+            if not dark.any():
+                raise MapError(f"{where}: all is light, but a picture with dark walls was wanted")
+            row, column = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
+            light = ~dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
+            rows, columns = light.shape
+            free = MultiPolygon()
+            if light.any():
+                free = free_area(light, (1 / columns, 1 / rows), (-0.5, -0.5), where)
+            self.bitmaps[file] = free, columns, rows
+        return self.bitmaps[file]
+
+
+def _blocks(entity: _Entity) -> list[Array]:
+    """Return the polygons of a block, or of a model as Stage 2 has it: ``block[0].point[1] [x y]``."""
+    rings: dict[str, dict[int, Array]] = {}
+    for name in entity.properties:
+        prefix, found, number = name.removesuffix("]").rpartition("point[")
+        if found and name.endswith("]") and number.isdecimal() and len(number) < 9:
+            rings.setdefault(prefix, {})[int(number)] = entity.numbers(name, (0.0, 0.0))
+    for prefix, points in rings.items():
+        count = entity.number(f"{prefix}points", len(points))
+        if count != len(points):
+            raise MapError(f"{entity.at}: {len(points)} points, but {count:g}, as it says, were wanted")
+    return [np.array([points[k] for k in sorted(points)]) for points in rings.values()]
+
+
+IMPORTER = Importer(
+    name="stage",
+    title="Stage: .world with its includes and bitmaps",
+    suffixes=(".world",),
+    sniff=is_stage,
+    read=read_stage,
+    options=frozenset({"anywhere", "around", "only", "skip"}),
+)

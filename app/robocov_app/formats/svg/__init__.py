@@ -1,0 +1,1 @@
+"""SVG: a part of the standard as drawings of maps use it."""

@@ -1,0 +1,447 @@
+"""Numbers, lengths, transforms and paths of SVG."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+
+import numpy as np
+
+from robocov.arrays import Array, IntArray, ranges
+from robocov.environment import Point
+from robocov_app.formats.geometry.curves import arcs, beziers
+
+# nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
+_DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
+NUMBER = re.compile(rf"[\s,]*+({_DECIMAL})", re.ASCII)
+_LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
+_FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
+
+_LARGEST = 1e30
+PIXELS = {
+    "": 1.0,
+    "px": 1.0,
+    "in": 96.0,
+    "cm": 96 / 2.54,
+    "mm": 96 / 25.4,
+    "q": 96 / 101.6,
+    "pt": 4 / 3,
+    "pc": 16.0,
+}
+"""User units in a unit of length (CSS Values 4, section 6.2)."""
+
+PIXEL = 0.0254 / 96
+"""A user unit in metres, where nothing says otherwise."""
+
+
+def number(text: str) -> float:
+    """Return a number; what is next to nothing is nothing.
+
+    Raises
+    ------
+    ValueError
+        When it is so large that calculating with it would go wrong.
+    """
+    value = float(text)
+    if not abs(value) <= _LARGEST:
+        raise ValueError(f"{text[:20]}, but a number up to {_LARGEST:g} was wanted")
+    return 0.0 if abs(value) < 1.0 / _LARGEST else value
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers of a list as that of ``points``.
+
+    Raises
+    ------
+    ValueError
+        When there is something else in it.
+    """
+    found, at = [], 0
+    while match := NUMBER.match(text, at):
+        found.append(number(match[1]))
+        at = match.end()
+    if text[at:].strip(" \t\r\n\f,"):
+        raise ValueError(f"{text[at : at + 20].strip()!r}, but a number was wanted")
+    return found
+
+
+def length(text: str, whole: float | None = None) -> float:
+    """Return a length in user units.
+
+    Parameters
+    ----------
+    text : str
+    whole : float or None
+        What a percentage is of; None allows none.
+
+    Raises
+    ------
+    ValueError
+        When it is no length, or of a unit that depends on a font.
+    """
+    match = _LENGTH.fullmatch(text)
+    unit = match[2].lower() if match else ""
+    if match is None or not (unit in PIXELS or (unit == "%" and whole is not None)):
+        raise ValueError(f"{text[:30]!r}, but a length in px, mm, cm, in, pt, pc or % was wanted")
+    value = number(match[1])
+    return value * whole / 100.0 if unit == "%" and whole is not None else value * PIXELS[unit]
+
+
+def affine(
+    a: float = 1.0, b: float = 0.0, c: float = 0.0, d: float = 1.0, e: float = 0.0, f: float = 0.0
+) -> Array:
+    """Return the (3, 3) matrix that takes (x, y, 1) to (a x + c y + e, b x + d y + f, 1)."""
+    return np.array([[a, c, e], [b, d, f], [0.0, 0.0, 1.0]])
+
+
+def composed(outer: Array, inner: Array) -> Array:
+    """Return the matrix of both, the inner one first.
+
+    Raises
+    ------
+    ValueError
+        When it makes things so large that calculating with them would go wrong.
+    """
+    both = outer @ inner
+    if not (np.abs(both) <= _LARGEST).all():
+        raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}, but smaller ones were wanted")
+    return np.asarray(both)
+
+
+def moved(matrix: Array, points: Array) -> Array:
+    """Return (k, 2) points under a matrix."""
+    return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])
+
+
+def stretch(matrix: Array) -> tuple[float, float]:
+    """Return by how much a matrix makes lengths longer, at least and at most: its singular values."""
+    (a, c), (b, d) = matrix[:2, :2].tolist()
+    # by hand: a decomposition by LAPACK, for each shape, takes as long as all else that is read of it
+    half, turned = math.hypot(a + d, b - c) / 2, math.hypot(a - d, b + c) / 2
+    return abs(half - turned), half + turned
+
+
+def transform(text: str) -> Array:
+    """Return the matrix of a ``transform``; the last of its functions comes first.
+
+    Raises
+    ------
+    ValueError
+        When there is something else in it.
+    """
+    matrix, at = affine(), 0
+    while match := _FUNCTION.match(text, at):
+        function = _FUNCTIONS.get(match[1].lower())
+        # CSS writes units where attributes have none
+        values = numbers(re.sub(r"(?<=[\d.])(?:px|deg)\b", "", match[2]))
+        if function is None or len(values) not in function[0]:
+            raise ValueError(f"{match[0].strip()[:40]!r}, but a transform was wanted")
+        matrix = composed(matrix, function[1](*values))
+        at = match.end()
+    if text[at:].strip(" \t\r\n,") not in ("", "none"):
+        raise ValueError(f"{text[at:].strip()[:40]!r}, but a transform was wanted")
+    return matrix
+
+
+def _rotation(angle: float, x: float = 0.0, y: float = 0.0) -> Array:
+    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return affine(e=x, f=y) @ affine(cos, sin, -sin, cos) @ affine(e=-x, f=-y)
+
+
+_FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
+    # how many numbers each takes, and its matrix
+    "matrix": ((6,), affine),
+    "translate": ((1, 2), lambda x, y=0.0: affine(e=x, f=y)),
+    "translatex": ((1,), lambda x: affine(e=x)),
+    "translatey": ((1,), lambda y: affine(f=y)),
+    "scale": ((1, 2), lambda x, y=None: affine(x, d=x if y is None else y)),
+    "scalex": ((1,), lambda x: affine(a=x)),
+    "scaley": ((1,), lambda y: affine(d=y)),
+    "rotate": ((1, 3), _rotation),
+    "skewx": ((1,), lambda angle: affine(c=math.tan(math.radians(angle)))),
+    "skewy": ((1,), lambda angle: affine(b=math.tan(math.radians(angle)))),
+}
+
+
+def fitted(box: tuple[float, float, float, float], width: float, height: float, how: str = "") -> Array:
+    """Return the matrix that fits a ``viewBox`` into a viewport (SVG 2, section 8.2).
+
+    Parameters
+    ----------
+    box : x, y, width, height
+        Of positive size.
+    width, height : float
+        Of the viewport, whose corner is [0, 0].
+    how : str
+        ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
+    """
+    align, _, rule = how.strip().partition(" ")
+    x, y = width / box[2], height / box[3]
+    if align.lower() == "none":
+        return affine(x, d=y) @ affine(e=-box[0], f=-box[1])
+    scale = max(x, y) if rule.strip() == "slice" else min(x, y)
+    align = align or "xMidYMid"
+    parts = {"xmin": 0.0, "xmid": 0.5, "xmax": 1.0, "ymin": 0.0, "ymid": 0.5, "ymax": 1.0}
+    left = (width - scale * box[2]) * parts.get(align[:4].lower(), 0.5)
+    top = (height - scale * box[3]) * parts.get(align[4:].lower(), 0.5)
+    return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
+
+
+MOST_DRAWS = 150_000
+"""Commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none."""
+
+_COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
+_FLAG = re.compile(r"[\s,]*([01])")
+_ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+
+
+def subpaths(
+    text: str, tolerance: float, most: int, draws: int = MOST_DRAWS
+) -> tuple[list[tuple[Array, bool]], int]:
+    """Return the subpaths of path data: points (k, 2), and whether they were closed.
+
+    Parameters
+    ----------
+    text : str
+        The attribute ``d``.
+    tolerance : float
+        Largest distance of a curve from its points, in the unit of the path.
+    most, draws : int
+        So many points are made at most, and so many commands carried out.
+
+    Returns
+    -------
+    subpaths : list of (points, closed)
+    draws : int
+        How many commands were carried out.
+
+    Raises
+    ------
+    ValueError
+        Where it is no path data, or where it has more; the message says which character.
+
+    Examples
+    --------
+    >>> [(points, closed)], _ = subpaths("m0 0h4v2z", 0.1, 100)
+    >>> points.tolist(), closed
+    ([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]], True)
+    """
+    if sum(text.count(letter) for command in _ARGUMENTS for letter in (command, command.lower())) > draws:
+        raise ValueError(f"more than {draws} commands, but fewer were wanted")
+    pen = _Pen()
+    at = 0
+    while match := _COMMAND.match(text, at):
+        command, at = match[1], match.end()
+        if not pen.begun and command not in "Mm":
+            raise ValueError(f"character {at}: {command}, but M was wanted first")
+        if command in "Zz":
+            pen.close()
+            continue
+        at = _draw(pen, text, at, command, most, draws)
+    if text[at : at + 1].strip(" \t\r\n\f,") or text[at:].strip(" \t\r\n\f,"):
+        raise ValueError(f"character {at + 1}: {text[at : at + 12].strip()!r}, but a command was wanted")
+    return pen.finished(tolerance, most), pen.draws
+
+
+def _draw(pen: _Pen, text: str, at: int, command: str, most: int, draws: int) -> int:
+    """Carry out a command, again for as long as numbers follow; return where they end."""
+    if command in "MmLl":
+        return _polyline(pen, text, at, command, most)
+    first = True
+    while True:
+        values, after = _values(text, at, command)
+        if not values and not first:
+            return at
+        if len(values) < _ARGUMENTS[command.upper()]:
+            raise _lack(text, after)
+        at, first = after, False
+        pen.draw(command, values)
+        if pen.draws > draws:
+            raise ValueError(f"character {at}: more than {draws} commands, but fewer were wanted")
+        if pen.count > most:
+            raise ValueError(f"character {at}: more than {most} points, but fewer were wanted")
+
+
+def _polyline(pen: _Pen, text: str, at: int, command: str, most: int) -> int:
+    """Draw lines through all points that follow; after M, to all but the first. Return where they end."""
+    values: list[float] = []
+    while match := NUMBER.match(text, at):
+        values.append(number(match[1]))
+        at = match.end()
+        if pen.count + len(values) // 2 > most:
+            raise ValueError(f"character {at}: more than {most} points, but fewer were wanted")
+    if not values or len(values) % 2:
+        raise _lack(text, at)
+    pen.draw(command, values[:2])
+    if len(values) > 2:
+        pen.polyline(values[2:], relative=command.islower())
+    return at
+
+
+def _lack(text: str, at: int) -> ValueError:
+    found = text[at : at + 12].strip() or "the end"
+    return ValueError(f"character {at + 1}: {found!r}, but a number was wanted")
+
+
+def _values(text: str, at: int, command: str) -> tuple[list[float], int]:
+    """Return the next numbers that a command takes, as far as there are any, and where they end."""
+    values: list[float] = []
+    for k in range(_ARGUMENTS[command.upper()]):
+        match = (_FLAG if command in "Aa" and k in (3, 4) else NUMBER).match(text, at)
+        if match is None:
+            break
+        values.append(number(match[1]))
+        at = match.end()
+    return values, at
+
+
+class _Pen:
+    """What is drawn, and where the pen is.
+
+    All vertices of all subpaths are in one list. A curve is kept with the index of the vertex that it ends
+    at, and all of them become points together: one by one that takes long.
+    """
+
+    def __init__(self) -> None:
+        self.begun = False
+        self.draws = 0
+        self.at: Point = (0.0, 0.0)
+        self.start: Point = (0.0, 0.0)
+        self.handle: Point = (0.0, 0.0)
+        self.last = ""
+        self._open = False
+        self._vertices: list[Point] = []
+        self._begins: list[int] = []
+        self._closed: list[bool] = []
+        self._beziers: list[tuple[float, ...]] = []
+        self._arcs: list[tuple[float, ...]] = []
+
+    @property
+    def count(self) -> int:
+        """Vertices so far."""
+        return len(self._vertices)
+
+    def draw(self, command: str, v: list[float]) -> None:
+        """Draw what a command says."""
+        kind = command.upper()
+        x, y = self.at if command.islower() else (0.0, 0.0)
+        self.begun = True
+        self.draws += 1
+        if kind == "M":
+            self.at = self.start = (x + v[0], y + v[1])
+            self._begin()
+        else:
+            if not self._open:  # after a Z the next subpath begins where the last did
+                self._begin()
+            if kind == "L":
+                self._line(x + v[0], y + v[1])
+            elif kind == "H":
+                self._line(x + v[0], self.at[1])
+            elif kind == "V":
+                self._line(self.at[0], y + v[0])
+            elif kind == "A":
+                self._arc(v, (x + v[5], y + v[6]))
+            else:
+                self._curve(kind, [(x + a, y + b) for a, b in zip(v[::2], v[1::2], strict=True)])
+        self.last = kind
+
+    def polyline(self, values: list[float], *, relative: bool) -> None:
+        """Draw lines to many points, x and y in turn."""
+        points = np.array(values).reshape(-1, 2)
+        if relative:
+            points = np.cumsum(points, axis=0) + self.at
+        self._vertices += map(tuple, points.tolist())
+        self.at = self._vertices[-1]
+        self.last = "L"
+
+    def close(self) -> None:
+        """Close the subpath."""
+        if self._open:
+            self._closed[-1] = True
+        self._open = False
+        self.at = self.start
+        self.last = "Z"
+
+    def finished(self, tolerance: float, most: int) -> list[tuple[Array, bool]]:
+        """Return all subpaths, curves flattened."""
+        vertices = np.array(self._vertices).reshape(-1, 2)
+        count = np.ones(len(vertices), dtype=np.intp)
+        curves = []
+        for kept, flatten in ((self._beziers, _as_beziers), (self._arcs, _as_arcs)):
+            if kept:
+                rows = np.array(kept)
+                index = rows[:, 0].astype(np.intp)
+                points, count[index] = flatten(rows[:, 1:], tolerance, most)
+                curves.append((index, points))
+        end = np.cumsum(count)
+        all_points = vertices.repeat(count, axis=0)
+        for index, points in curves:
+            all_points[ranges(end[index] - count[index], count[index])] = points
+        all_points[end - 1] = vertices
+        begins = (end - count)[self._begins]
+        parts = np.split(all_points, begins[1:]) if len(begins) else []
+        return [(part, closed) for part, closed in zip(parts, self._closed, strict=True) if len(part) > 1]
+
+    def _begin(self) -> None:
+        self._begins.append(len(self._vertices))
+        self._closed.append(False)
+        self._open = True
+        self._vertices.append(self.at)
+
+    def _line(self, x: float, y: float) -> None:
+        self.at = (x, y)
+        self._vertices.append(self.at)
+
+    def _curve(self, kind: str, points: list[Point]) -> None:
+        """Draw a Bézier curve; S and T begin with the mirror image of the handle before them."""
+        if kind in "ST":
+            smooth = self.last in ("CS" if kind == "S" else "QT")
+            mirrored = (2 * self.at[0] - self.handle[0], 2 * self.at[1] - self.handle[1])
+            points = [mirrored if smooth else self.at, *points]
+        self.handle = points[-2]
+        (x, y), (end_x, end_y) = self.at, points[-1]
+        if len(points) == 2:  # the same curve as one of degree 3
+            u, v = points[0]
+            points = [
+                (x + 2 * (u - x) / 3, y + 2 * (v - y) / 3),
+                (end_x + 2 * (u - end_x) / 3, end_y + 2 * (v - end_y) / 3),
+            ]
+        (a, b), (c, d) = points[:2]
+        self._beziers.append((len(self._vertices), x, y, a, b, c, d, end_x, end_y))
+        self._line(end_x, end_y)
+
+    def _arc(self, v: list[float], end: Point) -> None:
+        """Draw an elliptic arc (SVG 2, appendix B.2.4 and B.2.5)."""
+        (x, y), rx, ry, turn = self.at, abs(v[0]), abs(v[1]), math.radians(v[2])
+        if end == self.at:
+            return
+        if rx == 0.0 or ry == 0.0:
+            self._line(*end)
+            return
+        cos, sin = math.cos(turn), math.sin(turn)
+        dx, dy = (x - end[0]) / 2, (y - end[1]) / 2
+        # along the axes, where the ellipse is a circle of radius 1
+        a, b = (cos * dx + sin * dy) / rx, (cos * dy - sin * dx) / ry
+        size = math.hypot(a, b)
+        if size > 1.0:  # too small to reach: as large as it takes
+            rx, ry, a, b = rx * size, ry * size, a / size, b / size
+        ratio = math.sqrt(max(1.0 / max(min(size, 1.0), 1e-150) ** 2 - 1.0, 0.0))
+        sign = -1.0 if v[3] == v[4] else 1.0
+        p, q = sign * ratio * b, -sign * ratio * a
+        # the chord is twice the size: exact for huge radii too
+        sweep = 2.0 * math.asin(min(size, 1.0))
+        sweep = math.copysign(math.tau - sweep if v[3] else sweep, 1.0 if v[4] else -1.0)
+        ux, uy, vx, vy = cos * rx, sin * rx, -sin * ry, cos * ry
+        centre = ((x + end[0]) / 2 + ux * p + vx * q, (y + end[1]) / 2 + uy * p + vy * q)
+        begin = math.atan2(b - q, a - p)
+        self._arcs.append((len(self._vertices), *centre, ux, uy, vx, vy, begin, sweep))
+        self._line(*end)
+
+
+def _as_beziers(rows: Array, tolerance: float, most: int) -> tuple[Array, IntArray]:
+    return beziers(rows.reshape(-1, 4, 2), tolerance, most)
+
+
+def _as_arcs(rows: Array, tolerance: float, most: int) -> tuple[Array, IntArray]:
+    return arcs(rows[:, 0:2], rows[:, 2:4], rows[:, 4:6], rows[:, 6], rows[:, 7], tolerance, most)

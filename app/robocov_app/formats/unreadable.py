@@ -1,0 +1,87 @@
+"""Files that no importer reads, named for what they are, with the way to something that one does."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+from robocov.errors import shown
+
+_XML = r"(?:\xef\xbb\xbf)?(?>\s+|<\?.*?\?>|<!--.*?-->|<![^>]*>)*+<(?:\w+:)?"
+_OGR = "ogr2ogr -f GeoJSON out.geojson {name}"
+_SLICE = "cut it at the height of the robots' sensors and save the outline as DXF or SVG"
+_ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with map_saver"
+_UNPACK = "unpack it first"
+_PNG = "save it as a PNG"
+_FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
+
+_KINDS = [
+    (r"\Z", "empty", "is it the right file?"),
+    (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),
+    (_FORMAT + r"(?:run|comparison)\"", "a result of robocov", "robocov replay takes its folder"),
+    (_FORMAT, "robocov's own, but no map", "robocov report takes the folders of results"),
+    (r"\0\0'\x0a", "a shapefile", _OGR),
+    (r"SQLite format 3\0.{52}GP", "a GeoPackage", _OGR),
+    (r"SQLite format 3\0", "a database of SQLite", "of a ROS 2 bag, play it and save its map with map_saver"),
+    (_XML + r"kml\b", "KML", _OGR),
+    (_XML + r"gpx\b", "GPX", _OGR),
+    (_XML + r"(?:FeatureCollection|CityModel)\b", "GML", _OGR),
+    (r".{4,16}OSMHeader", "OpenStreetMap packed as PBF", "osmium cat {name} -o out.osm"),
+    (_XML + r"(?:sdf|gazebo|world)\b", "a world of Gazebo (SDF)", _ROS_MAP),
+    (_XML + r"(?:robot|mujoco|Webots\w*)\b", "a model of a robot or a world in 3D", _ROS_MAP),
+    (r"#VRML|#VRML_SIM|#X3D", "a world in 3D (VRML, Webots)", _ROS_MAP),
+    (_XML + r"COLLADA\b", "a mesh (COLLADA)", _SLICE),
+    (r"solid\s.*?\bfacet\b", "a mesh (STL)", _SLICE),
+    (r"(?>\s+|#[^\n]*|mtllib[^\n]*|[og] [^\n]*)*+v(?:\s+[-+\d.eE]+){3,}\s*\n", "a mesh (OBJ)", _SLICE),
+    (r"ply\r?\n|glTF", "a mesh (PLY, glTF)", _SLICE),
+    (r"# \.PCD|LASF", "a cloud of points", "make a ROS map of it"),
+    (r"# Octomap OcTree", "an octree of OctoMap", "octomap_server makes a ROS map of it"),
+    (r"#ROSBAG|\x89MCAP", "a bag of ROS", "play it and save its map with map_saver"),
+    (r"ISO-10303-21;.{0,4000}?IFC", "a building model (IFC)", "IfcConvert {name} out.svg"),
+    (r"ISO-10303-21;", "a model in 3D (STEP)", _SLICE),
+    (r"AC1[0-9.][0-9.]\d|AC2\.\d", "a DWG", "save it as DXF, or dwg2dxf {name}"),
+    (r"%PDF-", "a PDF", "pdftocairo -svg {name} out.svg, or pdftoppm -png for a scan"),
+    (r"%!PS", "PostScript", "ps2pdf {name}, then pdftocairo -svg"),
+    (r"GIF8|RIFF.{4}WEBP|\0\0\0.jP  |.{4}ftyp(?:heic|avif|mif1)|8BPS|gimp xcf", "a picture", _PNG),
+    (r"\x80[\x02-\x05][\x95\x8c\]}(cK]", "a pickle of Python", "save its polygons as GeoJSON or WKT"),
+    (r"\x93NUMPY", "an array of numpy", "save it as a picture"),
+    (r"version https://git-lfs", "a pointer of Git LFS, not the file itself", "git lfs pull"),
+    (_XML + r"html\b", "a web page, not the file itself", "download the raw file"),
+    (r"PK\x03\x04", "a zip archive", _UNPACK),
+    (r"\x1f\x8b|BZh\d|\xfd7zXZ|7z\xbc\xaf|\x28\xb5\x2f\xfd|.{257}ustar", "a packed file", _UNPACK),
+]  # fmt: skip
+_TABLE = [
+    (re.compile(begin.encode("latin-1"), re.DOTALL | re.IGNORECASE), what, way) for begin, what, way in _KINDS
+]
+
+_PARTS = (".dbf", ".shx", ".prj", ".cpg")
+
+
+def named_kind(path: Path, head: bytes) -> str | None:
+    """Return what a file that begins with `head` is, and what to do with it; None where it is not known.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> named_kind(Path("plan.pdf"), b"%PDF-1.7")
+    'a PDF, which cannot be imported: pdftocairo -svg plan.pdf out.svg, or pdftoppm -png for a scan'
+    """
+    what, way = next(((what, way) for begin, what, way in _TABLE if begin.match(head)), ("", ""))
+    suffix, name = path.suffix.lower(), shlex.quote(path.name)
+    if not what and suffix == ".stl" and len(head) > 84:  # 80 bytes of anything, and their number
+        what, way = "a mesh (STL)", _SLICE
+    elif not what and suffix in _PARTS:
+        what, way, name = "a part of a shapefile", _OGR, shlex.quote(path.with_suffix(".shp").name)
+    if not what:
+        return None
+    return f"{what}{'' if 'robocov' in what else ', which cannot be imported'}: {way.format(name=name)}"
+
+
+def described(head: bytes) -> str:
+    """Return what is seen of a file of no known kind: how it begins."""
+    text = head[:1000].decode(errors="replace")
+    binary = "\0" in text or text.count("\ufffd") > 1
+    return (
+        f"{'binary data' if binary else 'text'} that begins with {shown(head[:20] if binary else text[:20])}"
+    )

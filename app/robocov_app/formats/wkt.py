@@ -1,0 +1,350 @@
+"""Well-known text.
+
+The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from shapely import Polygon
+
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.errors import MapError, one_line, shown
+from robocov.files.atomic import written
+from robocov.files.strictjson import line_and_column
+from robocov_app.formats.files import MAX_DEPTH, read_text
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.cells import not_held
+from robocov_app.formats.geometry.coordinates import DIGITS, decimal, free_on_grid, rings
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.georeference import in_metres
+from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
+
+KINDS = (
+    "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
+    "MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN", "GEOMETRYCOLLECTION",
+)  # fmt: skip
+"""The geometries that are read."""
+
+CURVED = ("CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE")
+"""Those that are known and not read."""
+
+_SPACE = re.compile(r"\s*")
+_WORD = re.compile(r"[A-Za-z_]+")
+_POINTS = re.compile(r"\(([-+.\deE\s,]*)\)", re.ASCII)
+_NO_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
+_BEYOND = 1e100
+_SRID = re.compile(r"SRID\s*=\s*(\d{1,9})\s*;", re.IGNORECASE)
+_COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
+
+
+class WktText:
+    """Well-known text that is read from its beginning to its end.
+
+    Parameters
+    ----------
+    text : str
+        Geometries one after the other, with a comma, a semicolon or nothing between them; lines that
+        begin with # or -- are comments.
+    where : str
+        What messages call the file.
+    shapes : Shapes
+        Is told what is left out.
+
+    Attributes
+    ----------
+    srid : int or None
+        The reference system that the geometries name, once they are read.
+    """
+
+    def __init__(self, text: str, where: str, shapes: Shapes) -> None:
+        # as many spaces instead, so that places stay what they are
+        self.text = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
+        self.where = where
+        self.shapes = shapes
+        self.at = 0
+        self.srid: int | None = None
+        self._figures: list[Figure] = []
+
+    def figures(self) -> list[Figure]:
+        """Return all geometries; the parts of collections one by one.
+
+        Raises
+        ------
+        MapError
+            Where the text is no well-known text, or names two reference systems.
+        """
+        count = 0
+        while self._skip_space() < len(self.text):
+            srid = _SRID.match(self.text, self.at)
+            if srid:
+                if self.srid not in (None, int(srid[1])):
+                    self._refuse(f"SRID {srid[1]} after {self.srid}, but one for all geometries was wanted")
+                self.srid = int(srid[1])
+                self.at = srid.end()
+                self._skip_space()
+            count += 1
+            self._geometry(0, f"geometry {count}")
+            if self._skip_space() < len(self.text) and self.text[self.at] in ",;":
+                self.at += 1
+        return self._figures
+
+    def _geometry(self, depth: int, place: str) -> None:
+        if depth > MAX_DEPTH:
+            self._refuse(f"nested too deeply, but at most {MAX_DEPTH} levels were wanted")
+        begin = self.at
+        kind, measured = self._kind()
+        if self._empty():
+            self.shapes.leave_out("geometry", "without coordinates")
+        elif kind == "GEOMETRYCOLLECTION":
+            for number, _ in enumerate(self._items(), start=1):
+                self._geometry(depth + 1, f"{place}.{number}")
+        elif kind in ("POLYGON", "TRIANGLE"):
+            self._polygon(measured, place)
+        elif kind in ("MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN"):
+            for number, _ in enumerate(self._items(), start=1):
+                if not self._empty():
+                    self._polygon(measured, f"{place}.{number}")
+        elif kind == "MULTILINESTRING":
+            for _ in self._items():
+                if not self._empty():
+                    self._figures.append(Figure("line", (self._points(measured, 2),), at=place))
+        elif kind in ("LINESTRING", "LINEARRING"):
+            self._figures.append(Figure("line", (self._points(measured, 2),), at=place))
+        elif kind == "POINT":
+            points = self._points(measured, 1)
+            if len(points) != 1:
+                self._refuse(f"{len(points)} points, but one was wanted", begin)
+            self._figures.append(Figure("point", (points,), at=place))
+        else:
+            self._multipoint(measured, place)
+
+    def _kind(self) -> tuple[str, bool]:
+        """Read the word that begins a geometry; return it, and whether its last coordinate is a measure."""
+        word = _WORD.match(self.text, self.at)
+        found = word[0].upper() if word else ""
+        for kind in KINDS:
+            dimensions = found.removeprefix(kind)
+            if found.startswith(kind) and dimensions in ("", "Z", "M", "ZM") and word:
+                self.at = word.end()
+                self._skip_space()
+                apart = _WORD.match(self.text, self.at)
+                if not dimensions and apart and apart[0].upper() in ("Z", "M", "ZM"):
+                    dimensions = apart[0].upper()
+                    self.at = apart.end()
+                    self._skip_space()
+                return kind, dimensions == "M"
+        if found.rstrip("ZM") in CURVED:
+            raise self._refusal(f"{found}, but a geometry of straight edges was wanted")
+        raise self._refusal(f"{self._found()}, but one of {', '.join(KINDS)} was wanted")
+
+    def _empty(self) -> bool:
+        """Read the word EMPTY if it comes next."""
+        word = _WORD.match(self.text, self._skip_space())
+        if word is None or word[0].upper() != "EMPTY":
+            return False
+        self.at = word.end()
+        return True
+
+    def _items(self) -> Iterator[None]:
+        """Read the brackets and commas around items that the caller reads."""
+        self._expect("(")
+        while True:
+            self._skip_space()
+            yield
+            self._skip_space()
+            if self.text[self.at : self.at + 1] != ",":
+                break
+            self.at += 1
+        self._expect(")")
+
+    def _polygon(self, measured: bool, place: str) -> None:
+        rings = []
+        for _ in self._items():
+            if self._empty():
+                continue
+            ring = self._points(measured, 1)
+            if len(ring) > 1 and (ring[0] != ring[-1]).any():
+                self.shapes.mended["ring", "closed: the last point was not the first"] += 1
+            rings.append(ring)
+        if rings:
+            self._figures.append(Figure("polygon", tuple(rings), at=place))
+
+    def _multipoint(self, measured: bool, place: str) -> None:
+        if _POINTS.match(self.text, self.at):
+            points = self._points(measured, 1)
+        else:
+            points = np.concatenate([self._points(measured, 1) for _ in self._items() if not self._empty()])
+        self._figures += [Figure("point", (point[None],), at=place) for point in points]
+
+    def _points(self, measured: bool, least: int) -> Array:
+        """Read points in brackets; return them as (k, 2)."""
+        self._skip_space()
+        match = _POINTS.match(self.text, self.at)
+        if match is None:
+            self._expect("(")
+            strange = _NO_POINT.search(self.text, self.at)
+            end = strange.start() if strange else len(self.text)
+            if self.text[end : end + 1] in ("", "("):
+                self.at = end
+                self._refuse(f"{self._found()}, but a point or ) was wanted")
+            self.at = self.text.rfind(",", self.at, end) + 1 or self.at
+            self._refuse_point()
+        self.at = match.start(1)
+        points: list[list[float]] = []
+        for point in match[1].split(","):
+            try:
+                points.append([float(number) for number in point.split()])
+            except ValueError:
+                self._refuse_point()
+            if not 2 <= len(points[-1]) <= 4 or len(points[-1]) != len(points[0]):
+                self._refuse_point()
+            self.at += len(point) + 1
+        if len(points) < least:
+            self._refuse(f"1 point, but at least {least} were wanted", match.start())
+        self.at = match.end()
+        array = np.array(points)
+        if not (np.abs(array) < _BEYOND).all():
+            self._refuse("a number beyond all bounds, but finite ones were wanted", match.start())
+        if array.shape[1] > 2 and not (measured and array.shape[1] == 3):
+            self.shapes.leave_heights(array[:, 2])
+        return array[:, :2]
+
+    def _skip_space(self) -> int:
+        """Go on to what is not a space; return where that is."""
+        match = _SPACE.match(self.text, self.at)
+        assert match is not None
+        self.at = match.end()
+        return self.at
+
+    def _expect(self, bracket: str) -> None:
+        self._skip_space()
+        if self.text[self.at : self.at + 1] != bracket:
+            self._refuse(f"{self._found()}, but {bracket} was wanted")
+        self.at += 1
+
+    def _found(self) -> str:
+        """Return what comes next, as messages quote it."""
+        rest = self.text[self._skip_space() : self.at + 24].splitlines()
+        return shown(rest[0]) if rest else "the end"
+
+    def _refuse_point(self) -> NoReturn:
+        point = self.text[self.at : self.at + 80].split(",")[0].split(")")[0]
+        self._skip_space()
+        what = shown(" ".join(point.split())) if point.strip() else "nothing"
+        self._refuse(f"{what}, but a point as 1.5 2, with as many numbers as the first, was wanted")
+
+    def _refuse(self, what: str, at: int | None = None) -> NoReturn:
+        raise self._refusal(what, at)
+
+    def _refusal(self, what: str, at: int | None = None) -> MapError:
+        line, column = line_and_column(self.text, self.at if at is None else at)
+        return MapError(f"{self.where}:{line}:{column}: {what}")
+
+
+_BEGIN = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
+    % b"|".join(kind.encode() for kind in (*KINDS, *CURVED)),
+    re.IGNORECASE,
+)
+
+
+def is_wkt(path: Path, head: bytes) -> bool:
+    """Return whether a file that begins with `head` begins with a geometry."""
+    return _BEGIN.match(head) is not None
+
+
+def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
+    """Return the map that the geometries of a file of well-known text stand for.
+
+    Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
+    Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
+    it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
+    `enclosing.foreign_map`. Third coordinates and measures are left out. Coordinates
+    are metres, unless a prefix ``SRID=...;`` names a system other than 0.
+
+    Parameters
+    ----------
+    path : Path
+    options : ReadOptions
+
+    Raises
+    ------
+    MapError
+        When the file cannot be read or understood; with line and column.
+    """
+    text, where = read_text(path, b",")
+    shapes = Shapes(where, options)
+    parsed = WktText(text, where, shapes)
+    figures = parsed.figures()
+    crs = f"EPSG:{parsed.srid}" if parsed.srid else None
+    figures, notes = in_metres(figures, options, where, crs=crs)
+    for figure in figures:
+        shapes.add(figure)
+    shapes.join_lines()
+    name = one_line(path.stem)[:60] or "map"
+    return foreign_map(
+        shapes,
+        format=IMPORTER.name,
+        name=name,
+        description="Imported from WKT.",
+        solid=False,
+        accessible=True,
+        notes=notes,
+    )
+
+
+IMPORTER = Importer(
+    name="wkt",
+    title="well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
+    suffixes=(".wkt", ".ewkt"),
+    sniff=is_wkt,
+    read=read_wkt,
+    options=frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"}),
+)
+
+
+def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    digits = DIGITS if options.digits is None else options.digits
+    free = free_on_grid(environment, digits)
+    parts = [_text(part, digits) for part in free.geoms]
+    text = f"POLYGON {parts[0]}" if len(parts) == 1 else f"MULTIPOLYGON ({', '.join(parts)})"
+    with written(path) as part:
+        part.write_text(text + "\n", encoding="ascii")
+    notes = [f"in metres, {digits} decimals"]
+    if len(parts) > 1:
+        notes.append(f"the free space has {len(parts)} parts: some programs take one polygon only")
+    return ExportReport(
+        EXPORTER.name,
+        (path,),
+        environment.free_area,
+        float(free.area),
+        dropped=(
+            *not_held(environment),
+            "the boundary and the obstacles as such: only what is free is there",
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _text(polygon: Polygon, digits: int) -> str:
+    parts = (
+        ", ".join(f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring) for ring in rings(polygon)
+    )
+    return f"({', '.join(f'({part})' for part in parts)})"
+
+
+EXPORTER = Exporter(
+    name="wkt",
+    title="well-known text (JuPedSim): the free space as polygons with holes",
+    suffixes=(".wkt",),
+    write=_write,
+    options=frozenset({"digits"}),
+)

@@ -1,0 +1,258 @@
+"""The elements of an XML file, read by expat with nothing in it that could grow or reach elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+import numpy as np
+
+from robocov.arrays import Array
+from robocov.errors import MapError, one_line, shown
+from robocov.mapfile.models import FARTHEST
+from robocov_app.formats import files
+
+MOST_ELEMENTS = 100_000
+"""In a file, and drawn of it where parts are used again."""
+
+MOST_ATTRIBUTES = 1_000_000
+
+DEEPEST = 100
+"""Deepest nesting of elements and uses; drawing programs stay below 30."""
+
+_SVG = "http://www.w3.org/2000/svg"
+_EXPANDED = 1_000_000
+"""Most characters that entities and default attributes may add to a file: those of drawing programs stand
+for names of namespaces."""
+
+_LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
+
+
+@dataclass(eq=False, slots=True)
+class Element:
+    """An element of SVG, or of a format without namespaces; others are left out when it is read.
+
+    Attributes
+    ----------
+    tag : str
+        Without its namespace.
+    attributes : dict of str
+        Their names without namespaces.
+    children : list of Element
+    text : str
+        Of elements whose text means something only.
+    line : int
+        Of the file, counted from 1.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+    text: str = ""
+
+    def everything(self) -> Iterator[Element]:
+        """Yield this element and all in it."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
+
+    def child(self, tag: str) -> Element | None:
+        """Return the first child with a tag, if there is one."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def numbers(
+        self, where: str, name: str, *, count: int | None = None, default: str | None = None
+    ) -> Array:
+        """Return the numbers of an attribute, which commas or blanks separate.
+
+        Parameters
+        ----------
+        where : str
+            What messages call the file.
+        name : str
+        count : int or None
+            So many are wanted.
+        default : str or None
+            What stands for an attribute that is missing.
+
+        Raises
+        ------
+        MapError
+            When there are no such numbers, or one is too large for a map.
+        """
+        text = self.attributes.get(name, default)
+        try:
+            values = np.array([float(part) for part in (text or "").replace(",", " ").split()])
+        except ValueError:
+            values = np.array([np.nan])
+        if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
+            found = "missing" if text is None else shown(text)
+            wanted = "numbers" if count is None else "a number" if count == 1 else f"{count} numbers"
+            self.refuse(
+                where, f"{name}: {found}, but {wanted} within 1e7 {'was' if count == 1 else 'were'} wanted"
+            )
+        return values
+
+    def refuse(self, where: str, what: str) -> NoReturn:
+        """Raise the error of this element."""
+        name = self.attributes.get("id")
+        called = f"<{self.tag}>" if name is None else f"<{self.tag}> {shown(name)}"
+        raise MapError(f"{where}:{self.line}: {called}: {what}")
+
+
+def read_svg_tree(path: Path) -> tuple[Element, str]:
+    """Return the root of the SVG file at `path`, and what messages call the file.
+
+    Raises
+    ------
+    MapError
+        As `read_xml_tree`.
+    """
+    return read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
+
+
+def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> tuple[Element, str]:
+    """Return the root of the XML file at `path`, and what messages call the file.
+
+    Parameters
+    ----------
+    path : Path
+    root : str
+        Tag that the root has.
+    kind : str
+        What messages call the format.
+    texts : collection of str
+        Tags of elements whose text means something.
+
+    Raises
+    ------
+    MapError
+        When it cannot be read, is too large, is not XML or has another root; when it has entities
+        that stand for other files or other entities, or for too much; or too many elements, or too deep ones.
+    """
+    where = one_line(path)
+    content = files.content(path, files.MAX_TEXT_BYTES)
+    if content.startswith(b"\x1f\x8b"):
+        raise MapError(f"{where}: compressed, but plain {kind} was wanted (gunzip makes it)")
+    if content.count(b"=") > MOST_ATTRIBUTES:
+        raise MapError(f"{where}: more than {MOST_ATTRIBUTES} attributes, but fewer were wanted")
+    return _Reader(where, content, root, kind, texts).root(), where
+
+
+class _Reader:
+    """Builds the tree from what expat tells."""
+
+    def __init__(self, where: str, content: bytes, wanted: str, kind: str, texts: Collection[str]) -> None:
+        self.where = where
+        self.content = content
+        self.wanted, self.kind = wanted, kind
+        self.texts = texts
+        self.references = content.count(b"&")
+        self.room = len(content) + _EXPANDED
+        self.parser = expat.ParserCreate(namespace_separator=" ")
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+        self.parser.EntityDeclHandler = self._entity
+        self.parser.AttlistDeclHandler = self._declared
+        self.parser.StartNamespaceDeclHandler = self._namespace
+        self.declarations = 0
+        self.open: list[Element | None] = []
+        self.pieces: list[str] = []
+        self.first: Element | None = None
+        self.count = 0
+
+    def root(self) -> Element:
+        """Return the root element."""
+        try:
+            self.parser.Parse(self.content, True)
+        except (expat.ExpatError, ValueError, LookupError) as error:
+            line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
+            reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
+            raise MapError(f"{self.where}{line}: not XML: {one_line(reason)[:60]}") from None
+        if self.first is None or self.first.tag != self.wanted:
+            found = "other XML" if self.first is None else f"<{self.first.tag}>"
+            raise MapError(f"{self.where}: {found}, but <{self.wanted}> was wanted")
+        return self.first
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self._take_text()
+        self.count += 1
+        line = self.parser.CurrentLineNumber
+        if self.count > MOST_ELEMENTS:
+            raise MapError(f"{self.where}:{line}: more than {MOST_ELEMENTS} elements, but fewer were wanted")
+        if len(self.open) >= DEEPEST:
+            raise MapError(f"{self.where}:{line}: elements nested deeper than {DEEPEST}, but less was wanted")
+        namespace, _, tag = name.rpartition(" ")
+        plain = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
+        self._take(sum(map(len, plain)) + sum(map(len, plain.values())))
+        element = None
+        # what a foreign element holds is foreign as well
+        if namespace in ("", _SVG) and (not self.open or self.open[-1] is not None):
+            element = Element(tag, plain, line)
+            if self.open and self.open[-1] is not None:
+                self.open[-1].children.append(element)
+            elif not self.open:
+                self.first = element
+        self.open.append(element)
+
+    def _end(self, name: str) -> None:
+        self._take_text()
+        self.open.pop()
+
+    def _text(self, text: str) -> None:
+        self._take(len(text))
+        self.pieces.append(text)
+
+    def _take_text(self) -> None:
+        """Give the innermost element the text since the last tag."""
+        element = self.open[-1] if self.open else None
+        if element is not None and element.tag in self.texts:
+            element.text += "".join(self.pieces)
+        self.pieces.clear()
+
+    def _take(self, count: int) -> None:
+        """Count characters: entities and default attributes make more of them than the file has."""
+        self.room -= count
+        if self.room < 0:
+            self._refuse("its entities stand for too much")
+
+    def _entity(
+        self,
+        name: str,
+        parameter: bool,
+        value: str | None,
+        base: str | None,
+        system: str | None,
+        *rest: object,
+    ) -> None:
+        """Check an entity: it may stand for a few words, which expat puts in where it is used."""
+        self._declared()
+        if value is None:
+            self._refuse(f"entity {shown(name)} stands for another file ({shown(system)}), which is not read")
+        if parameter or "&" in value or "%" in value:
+            self._refuse(f"entity {shown(name)} stands for other entities")
+        if len(value) * self.references > _EXPANDED:
+            self._refuse(f"entity {shown(name)} stands for too much")
+
+    def _declared(self, *given: object) -> None:
+        """Count entities and attributes that are declared: expat looks through all of them each time."""
+        self.declarations += 1
+        if self.declarations > _MOST_DECLARATIONS:
+            self._refuse(f"more than {_MOST_DECLARATIONS} declarations")
+
+    def _namespace(self, prefix: str | None, name: str | None) -> None:
+        """Check the name of a namespace, which becomes part of every name in it."""
+        if name is not None and len(name) > _LONGEST_NAMESPACE:
+            self._refuse(f"a namespace of {len(name)} characters")
+
+    def _refuse(self, what: str) -> NoReturn:
+        line = self.parser.CurrentLineNumber
+        raise MapError(f"{self.where}:{line}: {what}, but plain {self.kind} was wanted")

@@ -1,0 +1,56 @@
+"""Reads hostile files in a process of its own, and says how long each took and how much memory all of them.
+
+    python hostile_files.py FILE ...
+
+prints a JSON object: for each file its CPU seconds and what was said, and by how many MB the peak of the
+memory grew.
+"""
+
+import importlib
+import json
+import sys
+import time
+from pathlib import Path
+
+
+def peak() -> float:
+    """Return the most memory that this process has had, in MB; 0 where that is not known."""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
+
+
+def main(files: list[str]) -> None:
+    from robocov.errors import RobocovError
+    from robocov_app.formats import IMPORTERS, ReadOptions, detect, files
+
+    importlib.import_module("pyproj")  # what imports need is the fault of no file
+    importlib.import_module("ezdxf")
+    for suffix in ("svg", "wkt"):
+        warm = Path(files[0]).with_name(f"warm.{suffix}")
+        warm.write_text(
+            "POLYGON((0 0,9 0,9 9,0 9,0 0))" if suffix == "wkt" else "<svg><path d='M0 0h9v9z'/></svg>"
+        )
+        detect(warm).read(warm, ReadOptions(scale=1.0))
+    before = peak()
+    answer = {}
+    for name in files:
+        path = Path(name)
+        begin = time.process_time()
+        try:
+            named = [kind for kind in IMPORTERS.values() if path.suffix in kind.suffixes]
+            known = (kind for kind in IMPORTERS.values() if kind.sniff(path, files.head(path)))
+            chosen = next(known, named[0])
+            options = ReadOptions(scale=1.0) if "scale" in chosen.options else ReadOptions()
+            chosen.read(path, options)
+            said = "taken"
+        except RobocovError as error:
+            said = str(error)
+        answer[path.name] = (time.process_time() - begin, said)
+    print(json.dumps({"files": answer, "grown_mb": peak() - before}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

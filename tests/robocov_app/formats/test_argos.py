@@ -1,0 +1,143 @@
+"""Arenas of ARGoS: boxes and cylinders where they stand, and what is distributed."""
+
+from pathlib import Path
+
+import pytest
+import shapely
+from shapely import affinity, box
+
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError
+from robocov_app.formats import ForeignMap, ReadOptions, Shaping, detect, import_map
+from robocov_app.formats.argos import IMPORTER
+
+WALL = '<box id="{}" size="{},{},0.5" movable="false"><body position="{},{},0" orientation="{},0,0"/></box>'
+ROBOT = '<foot-bot id="fb"><body position="{},{},0" orientation="0,0,0"/><controller config="c"/></foot-bot>'
+
+
+def arena(folder: Path, body: str, size: str = '"6, 4, 1" center="1,0,0.5"') -> Path:
+    path = folder / "test.argos"
+    path.write_text(
+        '<?xml version="1.0" ?>\n<argos-configuration><framework/>\n'
+        f"<arena size={size}>\n{body}\n</arena><loop_functions/></argos-configuration>"
+    )
+    assert detect(path) is IMPORTER
+    return path
+
+
+def read(folder: Path, body: str, **options: object) -> ForeignMap:
+    return IMPORTER.read(arena(folder, body), ReadOptions(**options))  # type: ignore[arg-type]
+
+
+ARENA = box(-2, -2, 4, 2)
+
+
+def test_bodies_stand_where_the_file_has_them(tmp_path: Path) -> None:
+    body = (
+        WALL.format("long", 2, 0.5, 1, 1, 0)
+        + WALL.format("turned", 1, 0.5, 2, -1, 30)
+        + '<cylinder id="c" radius="0.3" height="1" movable="true"><body position="-1,-1,0"/></cylinder>'
+        + ROBOT.format(0.5, -0.5)
+        + '<light id="l" position="0,0,1"/>'
+    )
+    foreign = read(tmp_path, body)
+    # turned counter-clockwise, y up
+    turned = affinity.rotate(box(1.5, -1.25, 2.5, -0.75), 30, origin="center")
+    solid = [box(0, 0.75, 2, 1.25), turned, CircleObstacle((-1.0, -1.0), 0.3).polygon]
+    assert foreign.free.symmetric_difference(ARENA - shapely.union_all(solid)).area < 1e-5
+    assert foreign.boundary is not None and foreign.boundary.equals(ARENA)
+    assert foreign.robots == ((0.5, -0.5),)
+    assert read(tmp_path, body, skip=("c", "turned")).free.area == pytest.approx(24 - 1)
+
+
+def test_bodies_that_are_tilted_are_left_out(tmp_path: Path) -> None:
+    tilted = WALL.format("a", 1, 1, 0, 0, "0,45").replace("0,45,0,0", "0,45,0")
+    over = WALL.format("b", 1, 1, 0, 0, "0,180").replace("0,180,0,0", "0,180,0")
+    foreign = read(tmp_path, tilted + over)
+    assert foreign.free.area == pytest.approx(24 - 1)
+    assert foreign.dropped == ("1 box that is tilted",)
+
+
+GRID = '<position method="grid" center="1,0,0" distances="2,1,0" layout="2,2,1"/>'
+CHANCE = '<position method="uniform" min="-1,-1,0" max="1,1,0"/>'
+POST = '<box id="post" size="0.5,0.5,1" movable="false"/>'
+
+
+def distribute(position: str, quantity: int, thing: str, values: str = "0,0,0") -> str:
+    return (
+        f'<distribute>{position}<orientation method="constant" values="{values}"/>'
+        f'<entity quantity="{quantity}" max_trials="100">{thing}</entity></distribute>'
+    )
+
+
+def test_what_is_distributed_in_a_grid_is_read_and_by_chance_is_counted(tmp_path: Path) -> None:
+    body = (
+        distribute(GRID, 3, POST) + distribute(CHANCE, 30, POST) + distribute(CHANCE, 7, '<e-puck id="e"/>')
+    )
+    foreign = read(tmp_path, body)
+    # as ARGoS counts: from the far corner on, x first
+    posts = [box(x - 0.25, y - 0.25, x + 0.25, y + 0.25) for x, y in ((2, 0.5), (0, 0.5), (2, -0.5))]
+    assert foreign.free.equals(ARENA - shapely.union_all(posts))
+    assert foreign.dropped == (
+        "30 boxes that ARGoS places at random",
+        "7 e-pucks that ARGoS places at random",
+    )
+    robots = read(tmp_path, distribute('<position method="constant" values="1,1,0"/>', 1, '<e-puck id="e"/>'))
+    assert robots.robots == ((1.0, 1.0),)
+
+
+@pytest.mark.parametrize(
+    ("body", "wanted"),
+    [
+        (POST, None),  # without a body it is nowhere
+        (WALL.format("a", 0, 1, 0, 0, 0), "test.argos:4: <box> 'a': size '0,1,0.5', but lengths above 0"),
+        (WALL.format("a", "x", 1, 0, 0, 0), "size: 'x,1,0.5', but 3 numbers within 1e7 were wanted"),
+        (WALL.format("a", 1, 1, "0,0", 0, 0), "position: '0,0,0,0', but 3 numbers within 1e7 were wanted"),
+        ('<cylinder id="c" height="1"><body/></cylinder>', "radius: missing, but a number within 1e7"),
+        (WALL.format("a", 1, 1, "nan", 0, 0), "position: 'nan,0,0', but 3 numbers"),
+        (WALL.format("a", 1, 1, "1e8", 0, 0), "position: '1e8,0,0', but 3 numbers within 1e7"),
+        (distribute(GRID, 5, POST), "<position>: layout [2, 2, 1], but one for 5 was wanted"),
+        (distribute(GRID, 10**6, POST), "quantity 1000000, but a number from 0 to 4000"),
+        (
+            distribute("", 5, POST),
+            "<distribute>: <position>, <orientation> and <entity> with something in it",
+        ),
+        ("<box>", "not XML: mismatched tag"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, body: str, wanted: str | None) -> None:
+    if wanted is None:
+        assert read(tmp_path, body).free.equals(ARENA)
+        return
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, body)
+    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_without_an_arena_there_is_no_map(tmp_path: Path) -> None:
+    path = tmp_path / "test.argos"
+    path.write_text("<argos-configuration/>")
+    with pytest.raises(MapError, match="no <arena>, but one was wanted"):
+        IMPORTER.read(path, ReadOptions())
+    with pytest.raises(MapError, match="size '0,4,1', but lengths above 0"):
+        IMPORTER.read(arena(tmp_path, "", '"0,4,1"'), ReadOptions())
+
+
+def test_the_map_has_obstacles_and_a_start(tmp_path: Path) -> None:
+    environment, report, _ = import_map(arena(tmp_path, WALL.format("a", 1, 1, 2, 0, 0) + ROBOT.format(0, 0)))
+    assert environment.free_area == pytest.approx(23)
+    assert len(environment.obstacles) == 1
+    assert (environment.starts["robots"].positions, report.size) == (((0.0, 0.0),), (6.0, 4.0))  # type: ignore[union-attr]
+
+
+def test_the_room_with_the_robots_stays(tmp_path: Path) -> None:
+    # walls within the arena, as in most experiments: around them is more room than in them
+    walls = [WALL.format(k, 2.1, 0.1, 0, y, 0) for k, y in enumerate((-1, 1))]
+    walls += [WALL.format(k, 0.1, 2.1, x, 0, 0) for k, x in enumerate((-1, 1))]
+    path = arena(tmp_path, "".join(walls) + ROBOT.format(0.25, 0.5), '"3,3,1"')
+    environment, report, _ = import_map(path)
+    assert shapely.Polygon(environment.boundary).equals(box(-0.95, -0.95, 0.95, 0.95))
+    assert environment.obstacles == ()
+    assert "the part of the free space with most robots stays, which is not the largest" in report.notes
+    environment, _, _ = import_map(path, shaping=Shaping(keep="all"))
+    assert environment.free_area == pytest.approx(1.9**2 + 9 - 2.1**2, abs=0.02)

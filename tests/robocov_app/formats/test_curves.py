@@ -1,0 +1,104 @@
+"""Curves against themselves, drawn much finer."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov_app.formats.geometry.curves import MOST_POINTS, arc, arcs, beziers, sampled
+
+_FINE = np.linspace(0.0, 1.0, 2001)[:, None]
+_NUMBER = st.integers(-5000, 5000).map(lambda number: number / 100)
+_POINT = st.tuples(_NUMBER, _NUMBER)
+
+
+def farthest(exact: np.ndarray, drawn: np.ndarray) -> float:
+    """Return the largest distance of points of a curve from the line that stands for it."""
+    line = shapely.LineString(drawn) if len(np.unique(drawn, axis=0)) > 1 else shapely.Point(drawn[0])
+    return float(shapely.distance(line, shapely.points(exact)).max())
+
+
+def alone(control: np.ndarray, tolerance: float) -> np.ndarray:
+    return beziers(control[None], tolerance)[0]
+
+
+@given(st.lists(_POINT, min_size=4, max_size=4), st.sampled_from([1e-3, 0.1, 5.0]))
+def test_bezier_curves_stay_within_the_tolerance(
+    control: list[tuple[float, float]], tolerance: float
+) -> None:
+    points = np.array(control)
+    weights = [(1 - _FINE) ** 3, 3 * _FINE * (1 - _FINE) ** 2, 3 * _FINE**2 * (1 - _FINE), _FINE**3]
+    exact = sum(weight * point for weight, point in zip(weights, points, strict=True))
+    drawn = np.concatenate([points[:1], alone(points, tolerance)])
+    assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-12
+    assert (drawn[-1] == points[-1]).all()
+
+
+@given(
+    _POINT,
+    _POINT,
+    _POINT,
+    st.floats(-10, 10),
+    st.floats(-math.tau, math.tau),
+    st.sampled_from([1e-3, 0.1, 5.0]),
+)
+def test_arcs_stay_within_the_tolerance(
+    centre: tuple[float, float],
+    u: tuple[float, float],
+    v: tuple[float, float],
+    begin: float,
+    sweep: float,
+    tolerance: float,
+) -> None:
+    c, p, q = np.array(centre), np.array(u), np.array(v)
+    angle = begin + sweep * _FINE
+    exact = c + np.cos(angle) * p + np.sin(angle) * q
+    drawn = np.concatenate([exact[:1], arc(c, p, q, begin, sweep, tolerance)])
+    assert farthest(exact, drawn) <= tolerance * (1 + 1e-6) + 1e-9
+    assert np.allclose(drawn[-1], exact[-1])
+
+
+def test_no_more_points_than_a_circle_needs() -> None:
+    for radius in (0.5, 5.0, 500.0):
+        drawn = arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
+        needed = math.pi / math.acos(1.0 - 1e-3 / radius)
+        assert needed <= len(drawn) <= needed + 1
+    straight = alone(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]), 1e-3)
+    assert straight.tolist() == [[3.0, 0.0]]
+
+
+def test_many_at_once_are_each_one_alone() -> None:
+    curves = np.random.default_rng(2).random((7, 4, 2)) * 10
+    points, count = beziers(curves, 1e-2)
+    assert len(set(count.tolist())) > 2
+    for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
+        assert (part == alone(curves[k], 1e-2)).all()
+    centre, u, v = np.random.default_rng(3).random((3, 7, 2)) * 10
+    angle, sweep = np.random.default_rng(4).random((2, 7)) * 6 - 3
+    points, count = arcs(centre, u, v, angle, sweep, 1e-2)
+    for k, part in enumerate(np.split(points, np.cumsum(count)[:-1])):
+        assert (part == arc(centre[k], u[k], v[k], angle[k], sweep[k], 1e-2)).all()
+
+
+@pytest.mark.parametrize("radius", [1e8, 1e12, 1e30, math.nan])
+def test_what_is_huge_is_refused(radius: float) -> None:
+    with pytest.raises(ValueError, match=f"more than {MOST_POINTS} points, but fewer were wanted"):
+        arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, math.tau, 1e-3)
+    with pytest.raises(ValueError, match="more than"):
+        alone(np.array([[0.0, 0.0], [1e5 * radius, 1.0], [0.0, 2.0], [0.0, 0.0]]), 1e-3)
+    if radius < 1e40:
+        part = arc(np.zeros(2), np.array([radius, 0.0]), np.array([0.0, radius]), 0.0, 1 / radius, 1e-3)
+        assert len(part) == 1
+
+
+def test_a_sampled_curve_stays_within_the_tolerance() -> None:
+    def wave(t: np.ndarray) -> np.ndarray:
+        return np.column_stack([t, np.sin(3 * t) + np.maximum(t - 2, 0)])
+
+    drawn = sampled(wave, np.array([0.0, 2.0, 5.0]), 1e-3)
+    assert farthest(wave(np.linspace(0, 5, 5001)), drawn) <= 1e-3
+    assert len(drawn) < 200
+    assert len(sampled(lambda t: np.column_stack([t, 0 * t]), np.array([0.0, 1.0]), 1e-3)) == 9

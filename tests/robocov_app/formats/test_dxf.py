@@ -1,0 +1,397 @@
+"""DXF drawings, made by ezdxf: entities, blocks, layers, units, and what is refused."""
+
+import io
+import logging
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import affinity, box
+
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect
+from robocov_app.formats.dxf import MOST_ENTITIES, UNITS, polyline
+
+METRES = 6
+Draw = Callable[[Any, Any], Any]
+
+
+def drawn(
+    folder: Path, draw: Draw, *, unit: int = METRES, version: str = "R2010", hall: bool = True, **options: Any
+) -> ForeignMap:
+    """Return what is read of a drawing; a hall of 20 x 10 units is its boundary."""
+    document = ezdxf.new(version)
+    document.header["$INSUNITS"] = unit
+    space = document.modelspace()
+    if hall:
+        space.add_polyline2d([(0, 0), (20, 0), (20, 10), (0, 10)], close=True)
+    draw(document, space)
+    path = folder / "plan.dxf"
+    document.saveas(path)
+    assert detect(path).name == "dxf"
+    return IMPORTERS["dxf"].read(path, ReadOptions(**options))
+
+
+def solid(folder: Path, draw: Draw, **options: Any) -> Any:
+    foreign = drawn(folder, draw, **options)
+    assert not any("damaged" in line for line in foreign.dropped)
+    return box(0, 0, 20, 10) - foreign.free
+
+
+@pytest.mark.parametrize(
+    ("draw", "wanted"),
+    [
+        (lambda d, m: m.add_line((5, 0), (5, 4)), box(4.95, 0, 5.05, 4)),
+        (lambda d, m: m.add_lwpolyline([(5, 0), (5, 4)]), box(4.95, 0, 5.05, 4)),
+        (
+            lambda d, m: m.add_lwpolyline([(5, 0), (5, 4)], dxfattribs={"const_width": 0.4}),
+            box(4.8, 0, 5.2, 4),
+        ),
+        (lambda d, m: m.add_lwpolyline([(5, 0, 0.4, 0.4), (5, 4, 0.4, 0.4)]), box(4.8, 0, 5.2, 4)),
+        (lambda d, m: m.add_lwpolyline([(5, 2), (8, 2), (8, 4), (5, 4)], close=True), box(5, 2, 8, 4)),
+        (lambda d, m: m.add_lwpolyline([(5, 2), (8, 2), (8, 4), (5, 4), (5, 2)]), box(5, 2, 8, 4)),
+        (lambda d, m: m.add_polyline2d([(5, 2), (8, 2), (8, 4), (5, 4)], close=True), box(5, 2, 8, 4)),
+        (
+            lambda d, m: m.add_polyline3d([(5, 2, 1), (8, 2, 1), (8, 4, 1), (5, 4, 1)], close=True),
+            box(5, 2, 8, 4),
+        ),
+        (lambda d, m: m.add_polyline3d([(5, 0, 1), (5, 4, 2)]), box(4.95, 0, 5.05, 4)),
+        (lambda d, m: m.add_solid([(5, 2), (8, 2), (5, 4), (8, 4)]), box(5, 2, 8, 4)),
+        (lambda d, m: m.add_circle((5, 3), 1), CircleObstacle((5, 3), 1).polygon),
+        (
+            lambda d, m: m.add_lwpolyline(
+                [(5, 2), (8, 2), (8, 4), (5, 4)], close=True, dxfattribs={"const_width": 0.2}
+            ),
+            box(4.9, 1.9, 8.1, 4.1) - box(5.1, 2.1, 7.9, 3.9),
+        ),
+        (
+            lambda d, m: m.add_circle((-5, 3), 1, dxfattribs={"extrusion": (0, 0, -1)}),
+            CircleObstacle((5, 3), 1).polygon,
+        ),
+    ],
+)
+def test_entities(tmp_path: Path, draw: Draw, wanted: Any) -> None:
+    assert solid(tmp_path, draw).symmetric_difference(wanted).area < 1e-4
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda d, m: m.add_arc((5, 5), 2, 0, 180),
+        lambda d, m: m.add_arc((5, 5), 2, 350, 170),
+        lambda d, m: m.add_arc((-5, 5), 2, 10, 190, dxfattribs={"extrusion": (0, 0, -1)}),
+        lambda d, m: m.add_ellipse((5, 5), (2, 0), 1, 0, math.pi),
+        lambda d, m: m.add_lwpolyline([(7, 5, 1), (3, 5, 0)], format="xyb"),
+        lambda d, m: m.add_polyline2d([(7, 5, 1), (3, 5, 0)], format="xyb"),
+    ],
+)
+def test_arcs_are_walls_of_half_a_ring(tmp_path: Path, draw: Draw) -> None:
+    wall = solid(tmp_path, draw, thickness=0.2)
+    assert wall.area == pytest.approx(math.pi * 2 * 0.2, rel=2e-3)
+    away = shapely.distance(shapely.Point(5, 5), shapely.points(shapely.get_coordinates(wall)))
+    assert (away >= 1.9 - 2e-3).all()
+    assert (away <= 2.1 + 1e-3).all()
+
+
+def test_closed_curves_are_areas(tmp_path: Path) -> None:
+    oval = solid(tmp_path, lambda d, m: m.add_ellipse((5, 5), (3, 0), 0.5))
+    assert oval.area == pytest.approx(math.pi * 3 * 1.5, rel=1e-3)
+    turned = solid(tmp_path, lambda d, m: m.add_ellipse((5, 5), (0, 3), 0.5))
+    assert turned.area == pytest.approx(oval.area, rel=1e-6)
+    lens = solid(tmp_path, lambda d, m: m.add_lwpolyline([(3, 5, 1), (7, 5, 1)], format="xyb", close=True))
+    assert lens.area == pytest.approx(math.pi * 4, rel=1e-3)
+    points = [(5, 3, 0), (8, 5, 0), (5, 7, 0), (2, 5, 0)]
+    spline = solid(tmp_path, lambda d, m: m.add_spline().set_closed(points))
+    assert 4 < spline.area < 12
+    assert spline.centroid.coords[0] == pytest.approx((5, 5), abs=1e-3)
+    centre = ezdxf.math.OCS((1, 0, 1)).from_wcs((5, 5, 0))
+    tilted = solid(tmp_path, lambda d, m: m.add_circle(centre, 1, dxfattribs={"extrusion": (1, 0, 1)}))
+    assert tilted.area == pytest.approx(math.pi * math.sqrt(0.5), rel=2e-3)
+
+
+def test_splines_stay_near_their_curve(tmp_path: Path) -> None:
+    control = [(2, 2), (6, 9), (10, 1), (14, 8)]
+    wall = solid(tmp_path, lambda d, m: m.add_open_spline(control, degree=3), thickness=0.02)
+    t = np.linspace(0, 1, 500)[:, None]
+    weights = [(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3]
+    exact = shapely.points(sum(w * np.array(c) for w, c in zip(weights, control, strict=True)))
+    assert shapely.distance(wall.buffer(1e-3), exact).max() == 0.0
+
+
+@settings(max_examples=60)
+@given(
+    st.tuples(st.integers(-9, 9), st.integers(-9, 9)),
+    st.tuples(st.integers(-9, 9), st.integers(-9, 9)),
+    st.floats(-3, 3),
+)
+def test_a_bulge_is_the_tangent_of_a_quarter_of_the_angle(
+    a: tuple[int, int], b: tuple[int, int], bulge: float
+) -> None:
+    points = polyline(np.array([a, b], dtype=float), np.array([bulge, 0.0]), 1e-3)
+    assert points[0].tolist() == list(a)
+    assert points[-1].tolist() == list(b)
+    chord = math.dist(a, b)
+    if chord == 0.0 or abs(bulge) < 1e-3:
+        return
+    # its height over the chord is the bulge times half the chord, to the right where it is positive
+    (x, y), (u, v) = a, b
+    height = ((points[:, 0] - x) * (v - y) - (points[:, 1] - y) * (u - x)) / chord
+    assert (height.max() if bulge > 0 else -height.min()) == pytest.approx(abs(bulge) * chord / 2, abs=2e-3)
+
+
+def chair(document: Any, name: str = "chair") -> Any:
+    block = document.blocks.new(name)
+    block.add_lwpolyline([(0, 0), (1, 0), (1, 0.5), (0, 0.5)], close=True)
+    return block
+
+
+def test_blocks_are_carried_out_where_they_are_inserted(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        chair(document)
+        pair = document.blocks.new("pair")
+        pair.add_blockref("chair", (0, 0))
+        pair.add_blockref("chair", (2, 0), dxfattribs={"rotation": 90, "xscale": 2.0, "yscale": 2.0})
+        space.add_blockref("pair", (3, 3))
+        space.add_blockref("pair", (12, 3), dxfattribs={"xscale": -1.0})
+        space.add_blockref("chair", (15, 1), dxfattribs={"row_count": 3, "column_count": 2, "row_spacing": 2,
+                                                         "column_spacing": 1.5})  # fmt: skip
+
+    seat = box(0, 0, 1, 0.5)
+    pair = shapely.union_all(
+        [seat, affinity.translate(affinity.rotate(affinity.scale(seat, 2, 2, origin=(0, 0)), 90, (0, 0)), 2)]
+    )
+    rows = [affinity.translate(seat, 15 + 1.5 * k, 1 + 2 * j) for k in range(2) for j in range(3)]
+    mirrored = affinity.scale(pair, -1, 1, origin=(0, 0))
+    wanted = shapely.union_all([affinity.translate(pair, 3, 3), affinity.translate(mirrored, 12, 3), *rows])
+    assert solid(tmp_path, draw).symmetric_difference(wanted).area < 1e-6
+
+
+def test_circles_in_blocks_that_are_stretched(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        document.blocks.new("table").add_circle((0, 0), 1)
+        space.add_blockref("table", (5, 5), dxfattribs={"xscale": 3.0})
+
+    oval = solid(tmp_path, draw)
+    assert oval.area == pytest.approx(math.pi * 3, rel=2e-3)
+    assert oval.bounds == pytest.approx((2, 4, 8, 6), abs=2e-3)
+
+
+def test_layers_are_chosen_and_those_that_are_off_are_not_there(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        for name in ("WALLS", "Furniture", "hidden", "frozen"):
+            document.layers.add(name)
+        document.layers.get("hidden").off()
+        document.layers.get("frozen").freeze()
+        for k, name in enumerate(("WALLS", "Furniture", "hidden", "frozen")):
+            space.add_lwpolyline(
+                [(k, 1), (k + 1, 1), (k + 1, 2), (k, 2)], close=True, dxfattribs={"layer": name}
+            )
+        chair(document)
+        space.add_blockref("chair", (10, 5), dxfattribs={"layer": "Furniture"})
+
+    assert solid(tmp_path, draw).area == pytest.approx(2.5)
+    assert solid(tmp_path, draw, skip=("furniture",)).area == pytest.approx(1.0)
+    assert solid(tmp_path, draw, skip=("CHAIR",)).area == pytest.approx(2.0)
+    foreign = drawn(tmp_path, draw, only=("0", "walls"))
+    assert foreign.free.area == pytest.approx(199.0)
+    assert foreign.dropped == (
+        "2 shapes by the names that were asked for",
+        "2 shapes hidden, or on layers that are off",
+    )
+
+
+def test_a_layer_of_lines_is_the_boundary(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        for a, b in (((0, 0), (9, 0)), ((9, 6), (9, 0)), ((9, 6), (0, 6)), ((0, 6), (0, 0))):
+            space.add_line(a, b, dxfattribs={"layer": "Outer walls"})
+        space.add_line((4, 0), (4, 3))
+
+    named = drawn(tmp_path, draw, hall=False, boundary="outer walls", thickness=0.2)
+    assert named.free.area == pytest.approx(54 - 0.6)
+    walls = drawn(tmp_path, draw, hall=False, thickness=0.2)
+    assert walls.free.area == pytest.approx(8.8 * 5.8 - 0.2 * 2.9)
+    assert walls.boundary is not None
+    assert walls.boundary.bounds == pytest.approx((-0.1, -0.1, 9.1, 6.1))
+
+
+def test_what_is_no_wall_is_told(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        space.add_text("Kitchen")
+        space.add_mtext("Bath")
+        space.add_point((1, 1))
+        space.add_3dface([(0, 0), (1, 0), (1, 1)])
+        space.add_hatch().paths.add_polyline_path([(7, 1), (8, 1), (8, 2), (7, 2)])
+        space.add_blockref("nothing", (0, 0))
+        space.add_line((3, 3, 2.5), (3, 4, 2.5))
+
+    foreign = drawn(tmp_path, draw)
+    assert foreign.dropped == (
+        "1 3DFACE",
+        "1 HATCH (--hatches takes them as areas)",
+        "1 MTEXT",
+        "1 TEXT",
+        "1 block missing from the file",
+        "1 point (--pillar RADIUS makes pillars of them)",
+        "2 third coordinates, z from 2.5 to 2.5",
+    )
+    assert drawn(tmp_path, draw, hatches=True, pillar=0.5).free.area == pytest.approx(
+        200 - 0.1 - 1 - 0.7854, abs=0.01
+    )
+
+
+def test_multilines_are_their_lines(tmp_path: Path) -> None:
+    def draw(document: Any, space: Any) -> None:
+        line = space.add_mline([(5, 2), (9, 2)])
+        line.set_justification(1)
+
+    assert solid(tmp_path, draw).area > 0.5
+
+
+@pytest.mark.parametrize("unit", sorted(UNITS))
+def test_units(tmp_path: Path, unit: int) -> None:
+    scale = UNITS[unit][1]
+    size = 10.0 / scale
+
+    def draw(document: Any, space: Any) -> None:
+        space.add_lwpolyline([(0, 0), (size, 0), (size, size / 2), (0, size / 2)], close=True)
+
+    foreign = drawn(tmp_path, draw, unit=unit, hall=False)
+    assert foreign.free.area == pytest.approx(50.0)
+    assert foreign.notes[0] == f"in {UNITS[unit][0]}"
+    if unit not in (9, 21):  # which ezdxf does not convert
+        assert ezdxf.units.conversion_factor(ezdxf.units.InsertUnits(unit), ezdxf.units.M) == pytest.approx(
+            scale
+        )
+    given = drawn(tmp_path, draw, unit=unit, hall=False, scale=2 * scale)
+    assert given.free.area == pytest.approx(200.0)
+
+
+def test_a_drawing_without_a_unit_needs_one(tmp_path: Path) -> None:
+    with pytest.raises(MapError, match=r"plan.dxf: \$INSUNITS: 0, but a unit was wanted: --scale METRES"):
+        drawn(tmp_path, lambda d, m: None, unit=0)
+    assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5).free.area == pytest.approx(50.0)
+    assert drawn(tmp_path, lambda d, m: None, unit=0, scale=0.5, version="R12").free.area == pytest.approx(
+        50.0
+    )
+
+
+def test_a_binary_file(tmp_path: Path) -> None:
+    document = ezdxf.new()
+    document.modelspace().add_lwpolyline([(0, 0), (9, 0), (9, 6), (0, 6)], close=True)
+    document.saveas(tmp_path / "plan.dxf", fmt="bin")
+    assert IMPORTERS["dxf"].read(tmp_path / "plan.dxf", ReadOptions()).free.area == pytest.approx(54.0)
+
+
+def text_of(draw: Draw) -> str:
+    document = ezdxf.new()
+    draw(document, document.modelspace())
+    stream = io.StringIO()
+    document.write(stream)
+    return stream.getvalue()
+
+
+def recursive(document: Any, space: Any) -> None:
+    document.blocks.new("a").add_blockref("b", (0, 0))
+    document.blocks.new("b").add_blockref("A", (0, 0))
+    space.add_blockref("a", (0, 0))
+
+
+def bomb(document: Any, space: Any) -> None:
+    chair(document, "b0")
+    for k in range(9):
+        block = document.blocks.new(f"b{k + 1}")
+        for _ in range(10):
+            block.add_blockref(f"b{k}", (0, 0))
+    space.add_blockref("b9", (0, 0))
+
+
+def deep(document: Any, space: Any) -> None:
+    chair(document, "b0")
+    for k in range(40):
+        document.blocks.new(f"b{k + 1}").add_blockref(f"b{k}", (0, 0))
+    space.add_blockref("b40", (0, 0))
+
+
+def many(document: Any, space: Any) -> None:
+    chair(document)
+    space.add_blockref("chair", (0, 0), dxfattribs={"row_count": 30000, "column_count": 30000})
+
+
+@pytest.mark.parametrize(
+    ("content", "wanted"),
+    [
+        (b"", "begins with b'', but a DXF with sections"),
+        (b"hello", "begins with b'hello', but a DXF with sections"),
+        (b"AutoCAD Binary DXF\r\n\x1a\0oops", "no DXF that can be read"),
+        (b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n", "no closed outline and no line"),
+        (b"0\nSECTION\n", "no closed outline and no line"),
+        (b"0\nSECTION\n" + b" 10\n0\n" * 600_000, "vertices, but at most 500000"),
+        (b"0\nSECTION\n" + b"1\n\n" * 4_000_100, "lines, but at most 8000000"),
+        (recursive, "block 'a' is inserted within itself"),
+        (bomb, f"entities to be drawn, blocks and all, but at most {MOST_ENTITIES} were wanted"),
+        (many, "entities to be drawn, blocks and all"),
+        (deep, "blocks nested deeper than 32"),
+        (lambda d, m: m.add_line((0, 0), (1e300, 0)), "a point at [1e+300, 0] m, but coordinates"),
+        (lambda d, m: m.add_line((0, 0), (math.nan, 0)), "a point at [nan, 0] m, but coordinates"),
+        (
+            lambda d, m: m.add_lwpolyline([(0, 0), (5, 2)], dxfattribs={"const_width": 1e308}),
+            "width: 1e+308, but",
+        ),
+        (lambda d, m: m.add_arc((0, 0), 1e300, 0, 10), "a curve beyond 10000000 m"),
+        (lambda d, m: m.add_circle((0, 0), 1e30), "a curve beyond 10000000 m"),
+        (lambda d, m: m.add_ellipse((0, 0), (1e30, 0), 0.5), "a curve beyond 10000000 m"),
+        (lambda d, m: m.add_spline([(0, 0), (math.inf, 0), (1, 1)]), "a curve beyond 10000000 m"),
+        (
+            lambda d, m: m.add_lwpolyline([(0, 0, 1e-8), (9e6, 0, 0)], format="xyb"),
+            "at most 10 km was wanted",
+        ),
+        (
+            lambda d, m: m.add_lwpolyline([(0, 0, 1e9), (9, 0, 0)], format="xyb"),
+            "(1 damaged shape (LWPOLYLINE",
+        ),
+        (
+            lambda d, m: m.add_lwpolyline([(k % 2, 0, 1e6) for k in range(3000)], format="xyb"),
+            "(1 damaged shape (LWPOLYLINE",
+        ),
+        (lambda d, m: None, "no closed outline and no line, but a drawing"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "content",
+)
+def test_what_cannot_be_used_is_refused(tmp_path: Path, content: Any, wanted: str) -> None:
+    path = tmp_path / "plan.dxf"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        path.write_text(text_of(content))
+    with pytest.raises(MapError) as caught:
+        IMPORTERS["dxf"].read(path, ReadOptions(scale=1.0))
+    assert str(caught.value).startswith(str(path))
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_ezdxf_there_is_one_line_with_the_way_to_get_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "plan.dxf"
+    path.write_text(text_of(lambda d, m: m.add_line((0, 0), (1, 1))))
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    with pytest.raises(MapError, match=r'plan.dxf: ezdxf is not installed: pip install "robocov\[dxf\]"'):
+        IMPORTERS["dxf"].read(path, ReadOptions())
+
+
+def test_ezdxf_says_nothing_on_its_own(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "plan.dxf").write_bytes(b"0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\nabc\n")
+    with pytest.raises(MapError):
+        IMPORTERS["dxf"].read(tmp_path / "plan.dxf", ReadOptions(scale=1.0))
+    assert any(isinstance(handler, logging.NullHandler) for handler in logging.getLogger("ezdxf").handlers)
+    assert capfd.readouterr() == ("", "")

@@ -1,0 +1,245 @@
+"""Which shape is the boundary, and what is free: the same rules for every drawing."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import box
+from vector_files import square
+
+from robocov.errors import MapError, ParameterError
+from robocov_app.formats import ForeignMap, ReadOptions
+from robocov_app.formats.files import MAX_VERTICES
+from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
+
+HALL = square(0, 0, 20, 10)
+
+
+def shapes(*areas: Any, lines: Any = (), points: Any = (), **options: Any) -> Shapes:
+    """Return shapes; an area or a line may be a pair of it and its name."""
+    found = Shapes("plan", ReadOptions(**options))
+
+    def figure(kind: str, given: Any) -> Figure:
+        ring, name = given if isinstance(given, tuple) else (given, None)
+        return Figure(kind, (np.array(ring, dtype=float),), (name,) if name else ())  # type: ignore[arg-type]
+
+    for area in areas:
+        found.add(figure("polygon", area))
+    for line in lines:
+        found.add(figure("line", line))
+    for point in points:
+        found.add(figure("point", [point]))
+    return found
+
+
+def taken(found: Shapes, solid: bool = True) -> ForeignMap:
+    return foreign_map(found, format="svg", name="plan", description="", solid=solid)
+
+
+def test_the_largest_outline_that_holds_the_rest_is_the_boundary() -> None:
+    foreign = taken(shapes(square(2, 2, 1, 1), HALL, square(5, 5, 2, 1), square(30, 0, 1, 1)))
+    assert foreign.dropped == ("1 shape outside of the boundary",)
+    assert foreign.boundary is not None
+    assert foreign.boundary.equals(box(0, 0, 20, 10))
+    assert foreign.free.area == pytest.approx(200 - 1 - 2)
+    assert foreign.notes == (
+        "the boundary is the largest closed outline of 200 m²",
+        "3 closed outlines taken as solid (--outlines free: as free space)",
+    )
+
+
+def test_a_name_is_the_boundary_whatever_its_size() -> None:
+    named = shapes((square(1, 1, 8, 8), "Boundary"), HALL, square(2, 2, 1, 1))
+    assert taken(named).boundary.area == pytest.approx(64.0)  # type: ignore[union-attr]
+    chosen = shapes((square(1, 1, 8, 8), "east wing"), (HALL, "frame"), boundary="East Wing", skip=("frame",))
+    foreign = taken(chosen)
+    assert foreign.free.area == pytest.approx(64.0)
+    assert foreign.dropped == ("1 shape by the names that were asked for",)
+    assert foreign.notes[0] == "the boundary is what is called 'East Wing'"
+
+
+def test_lines_of_that_name_are_the_boundary_where_they_close() -> None:
+    sides = [([a, b], "boundary") for a, b in pairwise(HALL)]
+    foreign = taken(shapes(square(2, 2, 1, 1), lines=[*sides, [[5, 0], [5, 5]]]))
+    assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
+    assert foreign.free.area == pytest.approx(200 - 1 - 0.5)
+    assert foreign.notes[-1] == "1 line taken as walls, 0.1 m wide (--thickness)"
+    with pytest.raises(MapError, match=r"plan: boundary 'open': encloses no area, but a closed outline"):
+        taken(shapes(HALL, lines=[([[0, 0], [1, 1]], "open")], boundary="open"))
+
+
+def test_walls_that_close_are_the_boundary_by_their_outer_edge() -> None:
+    found = shapes(lines=[HALL, [[10, 0], [10, 4]], [[10, 6], [10, 10]]], thickness=0.2)
+    foreign = taken(found)
+    assert foreign.boundary.bounds == pytest.approx((-0.1, -0.1, 20.1, 10.1))  # type: ignore[union-attr]
+    assert foreign.free.area == pytest.approx(19.8 * 9.8 - 2 * 0.2 * 3.9)
+    assert len(foreign.free.geoms) == 1
+
+
+def test_without_a_boundary_there_is_room_around_everything() -> None:
+    foreign = taken(shapes(square(0, 0, 2, 2), square(5, 5, 2, 2), around=3.0))
+    assert foreign.boundary.equals(box(-3, -3, 10, 10))  # type: ignore[union-attr]
+    assert foreign.free.area == pytest.approx(13 * 13 - 8)
+    assert "--around" in foreign.notes[0]
+
+
+def test_geometries_are_free_unless_one_holds_the_others() -> None:
+    rooms = shapes(square(0, 0, 4, 4), square(3, 1, 6, 2), square(50, 0, 5, 5))
+    free = taken(rooms, solid=False)
+    assert free.boundary is None
+    assert free.free.area == pytest.approx(16 + 12 - 2 + 25)
+    assert free.notes == ("3 closed outlines taken as free space (--outlines solid: as obstacles)",)
+    nested = taken(shapes(HALL, square(2, 2, 1, 1), square(5, 5, 2, 1)), solid=False)
+    assert nested.free.area == pytest.approx(197.0)
+    alone = taken(shapes(HALL, lines=[[[5, 0], [5, 5]]]), solid=False)
+    assert alone.free.area == pytest.approx(200 - 0.5)
+    walls = taken(shapes(lines=[HALL]), solid=False)
+    assert walls.free.area == pytest.approx(19.9 * 9.9)
+
+
+def test_islands_of_free_space_in_obstacles_are_free() -> None:
+    court = shapes(HALL)
+    court.add_outline([np.array(square(30, 0, 10, 10)), np.array(square(32, 2, 6, 6))])
+    court.add_outline([np.array(square(34, 4, 2, 2))])
+    assert taken(court, solid=False).free.area == pytest.approx(200 + 64 + 4)
+
+
+def test_walls_drawn_as_one_shape_are_solid() -> None:
+    walls = shapes(square(4, 4, 1, 1))
+    walls.add_outline(
+        [np.array(square(0, 0, 20, 10)), np.array(square(1, 1, 8, 8)), np.array(square(10, 1, 9, 8))]
+    )
+    foreign = taken(walls)
+    assert foreign.boundary.equals(box(0, 0, 20, 10))  # type: ignore[union-attr]
+    assert foreign.free.area == pytest.approx(64 + 72 - 1)
+
+
+def test_what_outlines_are_can_be_said() -> None:
+    areas = (HALL, square(2, 2, 1, 1))
+    assert taken(shapes(*areas, outlines="free")).free.area == pytest.approx(200.0)
+    assert taken(shapes(*areas, outlines="solid"), solid=False).free.area == pytest.approx(199.0)
+    rooms = shapes(square(1, 1, 4, 4), square(6, 1, 4, 4), (HALL, "boundary"), outlines="free")
+    foreign = taken(rooms)
+    assert foreign.free.area == pytest.approx(32.0)
+    assert foreign.boundary.area == pytest.approx(200.0)  # type: ignore[union-attr]
+    with pytest.raises(MapError, match="no closed outline, but one that encloses free space"):
+        taken(shapes(lines=[HALL], outlines="free"))
+
+
+def test_points_are_pillars_if_they_are_asked_for() -> None:
+    assert taken(shapes(HALL, points=[[5, 5]])).dropped == (
+        "1 point (--pillar RADIUS makes pillars of them)",
+    )
+    foreign = taken(shapes(HALL, points=[[5, 5], [8, 5]], pillar=0.5))
+    assert foreign.free.area == pytest.approx(200 - 2 * 0.7854, abs=0.01)
+    assert foreign.notes[-1] == "2 points taken as pillars"
+
+
+def test_lines_that_meet_are_joined_to_whole_corners() -> None:
+    corner = shapes(lines=[[[0, 0], [4, 0]], [[4, 0], [4, 3]], [[8, 0], [9, 0]]])
+    corner.join_lines()
+    assert len(corner.lines) == 2
+    solid = shapely.union_all([line.solid for line in corner.lines])
+    assert solid.area == pytest.approx(0.1 * (4 + 3 + 1))
+    apart = shapes(lines=[([[0, 0], [4, 0]], "a"), ([[4, 0], [4, 3]], "b")])
+    apart.join_lines()
+    assert len(apart.lines) == 2
+
+
+def test_only_what_was_asked_for() -> None:
+    areas = ((HALL, "hall"), (square(2, 2, 1, 1), "desk"), (square(5, 5, 2, 1), "Plant"))
+    assert taken(shapes(*areas, only=("HALL", "plant"))).free.area == pytest.approx(198.0)
+    assert taken(shapes(*areas, skip=("plant", "desk"))).free.area == pytest.approx(200.0)
+    with pytest.raises(ParameterError, match=r"plan: skip: unknown name 'plants': did you mean 'Plant'\?"):
+        taken(shapes(*areas, skip=("plants",)))
+    with pytest.raises(ParameterError, match=r"plan: boundary: no shape has a name"):
+        taken(shapes(HALL, boundary="hall"))
+
+
+def test_what_is_nothing_is_told() -> None:
+    found = shapes(HALL, [[0, 0], [1, 0], [2, 0]], lines=[[[1, 1], [1, 1]]])
+    found.leave_heights(np.array([np.nan, 2.0, 3.5]))
+    found.leave_out("text", count=2)
+    found.leave_out("empty geometry", count=2)
+    found.mended["ring", "closed"] += 2
+    foreign = taken(found)
+    assert foreign.dropped == (
+        "2 empty geometries",
+        "1 line without a length",
+        "1 outline without an area",
+        "2 texts",
+        "2 third coordinates, z from 2 to 3.5",
+    )
+    assert foreign.repaired == ("2 rings closed",)
+    with pytest.raises(MapError, match=r"no closed outline and no line \(1 text left out\), but a drawing"):
+        empty = shapes()
+        empty.leave_out("text")
+        taken(empty)
+
+
+def test_hairlines_are_made_walls() -> None:
+    foreign = taken(shapes(HALL, lines=[[[5, 0], [5, 5]]], thickness=1e-5))
+    assert foreign.repaired == ("1 line thinner than 1 mm, made as wide",)
+    assert foreign.free.area == pytest.approx(200 - 0.005)
+
+
+def test_outlines_that_meet_themselves_are_counted() -> None:
+    bow = [[0, 0], [4, 4], [4, 0], [0, 4]]
+    one = taken(shapes(bow), solid=False)
+    assert one.repaired == ("the outline met itself: Self-intersection[2 2]",)
+    assert one.free.area == pytest.approx(8.0)
+    two = taken(shapes(bow, [[x + 10, y] for x, y in bow]), solid=False)
+    assert two.repaired == ("2 outlines met themselves, the first: Self-intersection[2 2]",)
+
+
+@pytest.mark.parametrize("far", [1e300, np.nan, np.inf, 2e7])
+def test_coordinates_beyond_the_world_are_refused(far: float) -> None:
+    for drawn in ({"lines": [[[0, 0], [far, 0]]]}, {"points": [[far, 0]]}):
+        with pytest.raises(MapError, match=r"plan: a point at \[.*\] m, but coordinates from -10000000 to"):
+            shapes(**drawn)
+    with pytest.raises(MapError, match="coordinates from"):
+        shapes([[0, 0], [far, 0], [0, 1]])
+    with pytest.raises(MapError, match="coordinates from"):
+        Shapes("plan", ReadOptions()).add_circle(np.zeros(2), far)
+
+
+def test_what_is_larger_than_any_map_is_refused() -> None:
+    far = shapes(square(0, 0, 1e6, 9))
+    with pytest.raises(MapError, match=r"plan: 1e\+06 x 9 m, but at most 10 km was wanted: is the"):
+        taken(far)
+
+
+def test_shapes_thinner_than_the_grid_are_no_walls() -> None:
+    slivers = shapes(*([[0, y], [3, y], [6, y + 1e-7]] for y in (0, 5)))
+    assert taken(slivers).free.area == pytest.approx(8 * 7)
+
+
+def test_too_many_vertices_are_refused() -> None:
+    found = Shapes("plan", ReadOptions())
+    with pytest.raises(MapError, match=rf"plan: some {MAX_VERTICES + 1} vertices, but at most"):
+        found.add_line(Line(np.zeros((MAX_VERTICES + 1, 2)), 0.1))
+
+
+def test_a_tangle_of_lines_is_refused() -> None:
+    ends = np.random.default_rng(0).random((3000, 2, 2)) * 10
+    with pytest.raises(MapError, match="cross each other"):
+        taken(shapes(lines=ends.tolist()))
+
+
+_ROOM = st.tuples(st.integers(0, 30), st.integers(0, 30), st.integers(1, 12), st.integers(1, 12))
+
+
+@settings(max_examples=100)
+@given(st.lists(_ROOM, min_size=1, max_size=6), st.sampled_from(["free", "solid"]))
+def test_free_and_solid_are_each_others_complement(rooms: list[tuple[int, int, int, int]], what: str) -> None:
+    frame = (square(-1, -1, 60, 60), "boundary")
+    foreign = taken(shapes(frame, *(square(*room) for room in rooms), outlines=what))
+    together = shapely.union_all([box(x, y, x + w, y + h) for x, y, w, h in rooms])
+    wanted = together if what == "free" else box(-1, -1, 59, 59) - together
+    assert foreign.free.is_valid
+    assert foreign.free.symmetric_difference(wanted).area < 1e-6

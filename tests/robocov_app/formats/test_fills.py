@@ -1,0 +1,158 @@
+"""What rings enclose, against winding numbers counted from angles."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Polygon, box
+
+from robocov.errors import MapError
+from robocov_app.formats.geometry.fills import (
+    MAX_CROSSINGS,
+    Crossings,
+    edges_of,
+    enclosed,
+    polygons_of,
+    united,
+)
+
+_RING = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=3, max_size=9)
+
+
+def windings(ring: np.ndarray, x: float, y: float) -> float:
+    """Return how often the ring goes around a place: the angle that it is seen to turn by."""
+    angle = np.arctan2(ring[:, 1] - y, ring[:, 0] - x)
+    turn = (np.diff(angle, append=angle[:1]) + math.pi) % math.tau - math.pi
+    return float(np.rint(turn.sum() / math.tau))
+
+
+@settings(max_examples=150)
+@given(st.lists(_RING, min_size=1, max_size=3), st.sampled_from(["evenodd", "nonzero"]))
+def test_fills_are_what_angles_say(rings: list[list[tuple[int, int]]], rule: str) -> None:
+    arrays = [np.array(ring, dtype=float) for ring in rings]
+    area, reason, _ = enclosed(arrays, rule)  # type: ignore[arg-type]
+    assert area.is_valid
+    assert reason is None
+    # irrational places are on no edge
+    for x in np.arange(0.123456789, 12.0, 1.7):
+        for y in np.arange(0.1415926, 12.0, 1.9):
+            around = [windings(ring, x, y) for ring in arrays]
+            inside = sum(around) != 0 if rule == "nonzero" else sum(abs(n) for n in around) % 2 == 1
+            edge = min(shapely.distance(shapely.LinearRing(ring), shapely.Point(x, y)) for ring in arrays)
+            assert edge < 1e-9 or area.covers(shapely.Point(x, y)) == inside
+
+
+@settings(max_examples=150)
+@given(st.lists(_RING, min_size=1, max_size=3))
+def test_holes_are_taken_out_of_the_outline(rings: list[list[tuple[int, int]]]) -> None:
+    arrays = [np.array(ring, dtype=float) for ring in rings]
+    area, reason, lost = enclosed(arrays)
+    assert area.is_valid
+    outer = enclosed(arrays[:1])[0]
+    assert area.difference(outer).area < 1e-9
+    for hole in arrays[1:]:
+        if Polygon(hole).is_valid:
+            assert area.intersection(Polygon(hole)).area < 1e-9
+    plain = Polygon(arrays[0], arrays[1:])
+    assert lost or (reason is None) == (plain.is_valid or area.is_empty)
+    if plain.is_valid and plain.area > 0.0:
+        assert area.geoms[0].equals(plain)
+
+
+def test_a_bow_tie_is_both_of_its_halves() -> None:
+    area, reason, _ = enclosed([np.array([[0, 0], [4, 4], [4, 0], [0, 4]], dtype=float)])
+    assert reason == "Self-intersection[2 2]"
+    assert area.area == 8.0
+
+
+def test_halves_that_share_an_edge_are_one() -> None:
+    ring = np.array([[1, 0], [2, 2], [2, 0], [1, 0], [2, 2], [0, 0]], dtype=float)
+    area, _, _ = enclosed([ring])
+    assert area.is_valid and len(area.geoms) == 1
+
+
+def test_what_has_no_area_is_empty() -> None:
+    line = np.array([[0, 0], [4, 0], [0, 0]], dtype=float)
+    for rule in ("holes", "evenodd", "nonzero"):
+        assert enclosed([line], rule)[0].is_empty
+        assert enclosed([np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])], rule)[0].is_empty
+        assert enclosed([], rule)[0].is_empty
+
+
+def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
+    count = 2000
+    angle = np.arange(count) * math.tau / count
+    star = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(count) % 2, 1.0, 3.0)[:, None]
+    Crossings("star").add(edges_of([star], closed=True))
+    x = np.arange(count, dtype=float)
+    parallel = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x + 900, 0 * x + 900])], axis=1)
+    Crossings("hatch").add(parallel)
+
+
+@pytest.mark.parametrize("count", [800, 3000, 20_000])
+def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
+    ring = np.random.default_rng(1).random((count, 2))
+    with pytest.raises(MapError, match=rf"knot: its lines cross .* but at most {MAX_CROSSINGS} times"):
+        Crossings("knot").add(edges_of([ring], closed=True))
+    Crossings("loose").add(edges_of([ring[:200]], closed=True))
+
+
+def test_crossings_are_those_of_all_shapes_together() -> None:
+    angle = np.arange(151) * 75 * math.tau / 151
+    star = np.column_stack([np.cos(angle), np.sin(angle)])
+    crossings = Crossings("stars")
+    enclosed([star], "nonzero", crossings)
+    assert crossings.count == pytest.approx(151 * (75 - 1), rel=0.01)
+    enclosed([star + 5], "evenodd", crossings)
+    with pytest.raises(MapError, match=r"stars: its lines cross each other some 3e\+04 times, but at most"):
+        enclosed([star + 9], "holes", crossings)
+
+
+def test_holes_that_take_nothing_out_are_counted() -> None:
+    outer, hole = box(0, 0, 9, 9).exterior, box(1, 1, 2, 2).exterior
+    nothing = [
+        [(3, 3), (4, 4)],
+        [(3, 3), (3, 3), (3, 3)],
+        [(5, 5), (6, 6), (7, 7)],
+        [(20, 0), (21, 0), (21, 1)],
+    ]
+    rings = [np.array(ring) for ring in (outer.coords, hole.coords, *nothing)]
+    area, _, lost = enclosed(rings)
+    assert area.area == 80
+    assert lost == {"of fewer than three points": 2, "without an area": 1, "outside of their outline": 1}
+    assert enclosed(rings[:4])[2] == {"of fewer than three points": 2}
+
+
+def test_edges_and_parts() -> None:
+    ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    assert edges_of([ring, ring], closed=True).shape == (6, 2, 2)
+    assert edges_of([ring], closed=False).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
+    assert edges_of([], closed=True).shape == (0, 2, 2)
+    nested = shapely.GeometryCollection(
+        [shapely.Point(0, 0), shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(5, 5, 9, 9)])]
+    )
+    assert [part.area for part in polygons_of(nested).geoms] == [16.0, 1.0]
+
+
+def test_no_part_is_lost_where_edges_are_almost_on_each_other() -> None:
+    # without a grid GEOS 3.14 loses the triangle on the right
+    slim = Polygon([(0, 0), (1, 0), (-40, 764)])
+    bow, reason, _ = enclosed([np.array([(0, 0), (1, 161), (1, 0), (-40, 764)], dtype=float)])
+    assert reason is not None
+    both = united([slim, bow])
+    assert shapely.distance(both, shapely.Point(1, 161)) < 1e-5
+    overlap = shapely.intersection(slim, bow, grid_size=1e-9).area
+    assert both.area == pytest.approx(slim.area + bow.area - overlap, rel=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(_RING, min_size=1, max_size=5))
+def test_a_union_covers_what_it_is_of(rings: list[list[tuple[int, int]]]) -> None:
+    areas = [enclosed([np.array(ring, dtype=float)], "nonzero")[0] for ring in rings]
+    both = united(areas)
+    assert both.area >= max(area.area for area in areas) - 1e-6
+    for area in areas:
+        assert shapely.difference(area, both.buffer(1e-5)).area < 1e-9

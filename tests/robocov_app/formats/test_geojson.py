@@ -1,0 +1,170 @@
+"""GeoJSON, against shapely's own reader; degrees and metres; names; what is refused."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from vector_files import read, square
+
+from robocov.errors import MapError
+from robocov_app.formats import IMPORTERS, ReadOptions, detect
+
+
+def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def polygon(*rings: Any) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": list(rings)}
+
+
+def collection(*features: Any, **members: Any) -> dict[str, Any]:
+    return {"type": "FeatureCollection", **members, "features": list(features)}
+
+
+HALL = polygon(square(0, 0, 20, 10), square(1, 1, 2, 2))
+
+
+@pytest.mark.parametrize(
+    "document",
+    [HALL, feature(HALL), collection(feature(HALL)), {"type": "GeometryCollection", "geometries": [HALL]}],
+)
+def test_every_way_to_hold_a_polygon(tmp_path: Path, document: Any) -> None:
+    foreign = read(tmp_path, "geojson", document)
+    assert foreign.free.equals(shapely.from_geojson(json.dumps(HALL)))
+    assert detect(tmp_path / "plan.geojson").name == "geojson"
+
+
+def test_footprints_in_a_boundary_are_obstacles(tmp_path: Path) -> None:
+    document = collection(
+        feature(polygon(square(0, 0, 20, 10)), name="yard"),
+        feature(polygon(square(1, 1, 2, 2)), name="shed"),
+        feature({"type": "MultiPolygon", "coordinates": [[square(5, 1, 2, 2)], [square(9, 1, 2, 2)]]}),
+        feature({"type": "LineString", "coordinates": [[15, 0], [15, 5]]}, kind="fence"),
+        feature({"type": "Point", "coordinates": [1, 8, 3]}),
+        feature(None),
+        name="the yard",
+        description="With\nsheds.",
+    )
+    foreign = read(tmp_path, "geojson", document, thickness=0.2)
+    assert (foreign.name, foreign.description) == ("the yard", "With\\nsheds.")
+    assert foreign.free.area == pytest.approx(200 - 12 - 1)
+    assert "the boundary is the largest closed outline, 'yard', of 200 m²" in foreign.notes
+    assert foreign.dropped == (
+        "1 feature without a geometry",
+        "1 point (--pillar RADIUS makes pillars of them)",
+        "1 third coordinate, z from 3 to 3",
+    )
+    assert read(tmp_path, "geojson", document, skip=("fence", "shed")).free.area == pytest.approx(200 - 8)
+    with_pillar = read(tmp_path, "geojson", document, pillar=0.3)
+    assert with_pillar.free.area == pytest.approx(200 - 12 - 0.5 - 0.2827, abs=0.01)
+
+
+def test_a_name_is_no_boundary_where_the_kind_says_otherwise(tmp_path: Path) -> None:
+    document = collection(
+        feature(polygon(square(0, 0, 20, 10)), kind="boundary"),
+        feature(polygon(square(1, 1, 2, 2)), kind="obstacle", name="boundary"),
+    )
+    assert read(tmp_path, "geojson", document).free.area == pytest.approx(196.0)
+
+
+def test_degrees_are_projected(tmp_path: Path) -> None:
+    foreign = read(tmp_path, "geojson", polygon(square(8.4, 49, 0.001, 0.0005)))
+    assert foreign.free.area == pytest.approx(73.17 * 55.6, rel=1e-3)
+    assert foreign.notes[0].startswith(
+        "degrees projected to metres about longitude 8.40050, latitude 49.00025"
+    )
+    line = [[179.9999, 10], [-179.9999, 10], [-179.9999, 10.0001], [179.9999, 10.0001]]
+    across = read(tmp_path, "geojson", polygon(line))
+    assert across.free.area == pytest.approx(21.93 * 11.06, rel=1e-3)
+    assert across.repaired == ("1 ring closed: the last point was not the first",)
+
+
+def test_what_the_file_says_of_its_coordinates(tmp_path: Path) -> None:
+    utm = polygon(square(456000, 5430000, 100, 50))
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
+    assert read(tmp_path, "geojson", {**utm, "crs": crs}).free.area == pytest.approx(5000, rel=2e-3)
+    small = polygon(square(0, 0, 0.05, 0.05))
+    assert read(tmp_path, "geojson", small).free.area > 1e6
+    assert read(tmp_path, "geojson", {**small, "units": "metres"}).free.area == pytest.approx(0.0025)
+    here = read(tmp_path, "geojson", {**small, "origin": [0.0, 0.0]})
+    assert here.free.bounds[0] == pytest.approx(0.0, abs=1e-9)
+    assert read(tmp_path, "geojson", small, units="metres", scale=100.0).free.area == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize(
+    ("document", "wanted"),
+    [
+        (
+            '{"type":"Polygon",\n"coordinates":[[[0,0],[1,"a"]]]}',
+            ':2:23: coordinates[0][1]: [1, "a"], but a point',
+        ),
+        (
+            '{"type":"Polygon",\n"coordinates":[[[0,0],[1,NaN]]]}',
+            ":2:26: coordinates[0][1][1]: nan, but a finite",
+        ),
+        (polygon([[0, 0], [1, True]]), "coordinates[0][1]: [1, true], but a point"),
+        (polygon([[0, 0], [1, 1, 1, 1, 1]]), "coordinates[0][1]: [1, 1, 1, 1, 1], but a point"),
+        (polygon([[0, 0], [1e200, 1]]), "coordinates[0][1]: [1e+200, 1], but a point"),
+        (polygon(7), "coordinates[0]: 7, but a list of at least 1 point"),
+        ({"type": "Polygon"}, "coordinates: null, but a list of rings"),
+        ({"type": "MultiPolygon", "coordinates": {}}, "coordinates: {}, but a list was wanted"),
+        (
+            {"type": "LineString", "coordinates": [[0, 0]]},
+            "coordinates: [[0, 0]], but a list of at least 2 points",
+        ),
+        ({"type": "Topology"}, 'type: "Topology", but GeoJSON, not TopoJSON'),
+        ({"type": "Curve"}, 'type: "Curve", but one of Point, LineString'),
+        ([], "[], but one of Point"),
+        (collection(7), "features[0]: 7, but a Feature was wanted"),
+        (collection(features=1), None),
+        ({"type": "FeatureCollection"}, "features: null, but a list of features"),
+        (collection(feature(HALL) | {"properties": 3}), "features[0].properties: 3, but an object"),
+        ({"type": "GeometryCollection"}, "geometries: null, but a list of geometries"),
+        ({**HALL, "crs": {"type": "link"}}, 'crs: {"type": "link"}, but the name of a reference system'),
+        ({**HALL, "units": "feet"}, 'units: "feet", but metres or degrees'),
+        ({**HALL, "origin": [0]}, "origin: [0], but longitude and latitude"),
+        ({**HALL, "origin": [0, 95]}, "origin: [0, 95], but longitude and latitude"),
+        ("{", "not JSON"),
+    ],
+)
+def test_what_is_none_is_refused_with_its_place(tmp_path: Path, document: Any, wanted: str | None) -> None:
+    path = tmp_path / "plan.geojson"
+    path.write_text(document if isinstance(document, str) else json.dumps(document))
+    with pytest.raises(MapError) as caught:
+        IMPORTERS["geojson"].read(path, ReadOptions())
+    message = str(caught.value)
+    assert message.startswith(f"{path}:")
+    assert "\n" not in message
+    assert wanted is None or wanted in message
+
+
+def test_two_systems_in_a_file(tmp_path: Path) -> None:
+    first = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25832"}}}
+    second = feature(HALL) | {"crs": {"properties": {"name": "EPSG:25833"}}}
+    with pytest.raises(MapError, match=r"features\[1\]\.crs: .*, but the same system as before, EPSG:25832"):
+        read(tmp_path, "geojson", collection(first, second))
+
+
+_COORDINATE = st.floats(-4e3, 4e3).map(lambda value: round(value, 4))
+_POINT = st.tuples(_COORDINATE, _COORDINATE)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.lists(_POINT, min_size=3, max_size=6).map(shapely.Polygon), min_size=1, max_size=4))
+def test_free_space_is_what_shapely_reads(tmp_path_factory: pytest.TempPathFactory, polygons: Any) -> None:
+    text = shapely.to_geojson(shapely.MultiPolygon(polygons))
+    try:
+        found = read(tmp_path_factory.getbasetemp(), "geojson", text, units="metres", outlines="free").free
+    except MapError as error:
+        assert "without an area" in str(error)
+        return
+    # on a grid: without one GEOS may lose parts
+    valid = shapely.make_valid(polygons, method="structure", keep_collapsed=False)
+    wanted = shapely.union_all(valid, grid_size=1e-7)
+    length = max(sum(polygon.length for polygon in polygons), 1.0)
+    assert shapely.symmetric_difference(found, wanted, grid_size=1e-7).area <= 2e-6 * length

@@ -1,0 +1,121 @@
+"""From the globe to metres, against geodesics."""
+
+import sys
+from typing import Any
+
+import numpy as np
+import pyproj
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import MapError
+from robocov_app.formats import ReadOptions
+from robocov_app.formats.geometry.shapes import Figure
+from robocov_app.formats.georeference import in_metres
+
+PLAIN = ReadOptions()
+_GLOBE = pyproj.Geod(ellps="WGS84")
+
+
+def moved(points: Any, options: ReadOptions = PLAIN, **given: Any) -> tuple[np.ndarray, list[str]]:
+    figures, notes = in_metres([Figure("line", (np.array(points, dtype=float),))], options, "plan", **given)
+    return figures[0].rings[0], notes
+
+
+@settings(max_examples=100)
+@given(
+    st.floats(-180, 180),
+    st.floats(-84, 84),
+    st.lists(st.tuples(*[st.floats(0, 1)] * 2), min_size=2, max_size=6),
+)
+def test_lengths_are_those_on_the_ellipsoid(longitude: float, latitude: float, places: Any) -> None:
+    narrow = max(np.cos(np.radians(latitude)), 0.05)
+    degrees = np.array([(longitude + 0.02 / narrow * x, latitude + 0.02 * y) for x, y in places])
+    degrees[:, 0] = (degrees[:, 0] + 180.0) % 360.0 - 180.0  # across the antimeridian as well
+    metres, (note,) = moved(degrees, globe=True)
+    assert note.startswith("degrees projected to metres about longitude")
+    azimuth, _, length = _GLOBE.inv(*degrees[:-1].T, *degrees[1:].T)
+    step = np.diff(metres, axis=0)
+    assert np.hypot(*step.T) == pytest.approx(length, rel=1e-6, abs=1e-5)
+    # north is up in the middle; elsewhere meridians lean to the pole
+    long = np.asarray(length) > 1.0
+    lean = (np.degrees(np.arctan2(*step.T)) - azimuth + 180.0) % 360.0 - 180.0
+    assert (np.abs(lean[long]) < 0.06 / narrow).all()
+
+
+def test_what_is_wide_is_metres() -> None:
+    metres, (note,) = moved([[0, 0], [20, 10]], globe=True)
+    assert metres.tolist() == [[0, 0], [20, 10]]
+    assert "as degrees the map would be larger than 10 km" in note
+    assert moved([[500, 0], [520, 10]], globe=True)[0][0, 0] == 500.0
+    assert moved([[0, 0], [20, 10]])[1] == []
+    assert moved([[0, 0], [20, 10]], ReadOptions(scale=0.1))[0].tolist() == [[0, 0], [2, 1]]
+    # ten kilometres are more degrees near the pole
+    assert "degrees projected" in moved([[10, 85], [10.9, 85.05]], globe=True)[1][0]
+    assert "degrees projected" in moved([[8, 49], [8.001, 49.001]], ReadOptions(units="degrees"))[1][0]
+
+
+def test_a_system_is_obeyed() -> None:
+    degrees = np.array([[8.4, 49.0], [8.41, 49.005]])
+    to_utm = pyproj.Transformer.from_crs("EPSG:4326", "EPSG:25832", always_xy=True)
+    utm = np.column_stack(to_utm.transform(*degrees.T))
+    here = {"origin": (8.4, 49.0)}
+    direct, _ = moved(degrees, globe=True, **here)
+    assert direct[0] == pytest.approx([0, 0], abs=1e-9)
+    for name in ("EPSG:25832", "urn:ogc:def:crs:EPSG::25832", "http://www.opengis.net/def/crs/EPSG/0/25832"):
+        metres, (note,) = moved(utm, crs=name, **here)
+        assert metres == pytest.approx(direct, abs=1e-3)
+        assert note.startswith("EPSG:25832 projected")
+    for name in ("EPSG:4326", "urn:ogc:def:crs:OGC:1.3:CRS84"):
+        assert moved(degrees, crs=name, **here)[0] == pytest.approx(direct)
+    plain, notes = moved(utm, ReadOptions(units="metres"), crs="EPSG:25832")
+    assert (plain == utm).all()
+    assert notes == ["coordinates of EPSG:25832 taken as they are"]
+    # Mercator's metres are not metres
+    mercator = np.column_stack(pyproj.Transformer.from_crs(4326, 3857, always_xy=True).transform(*degrees.T))
+    assert moved(mercator, crs="EPSG:3857", **here)[0] == pytest.approx(direct, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("crs", "points", "wanted"),
+    [
+        ("EPSG:99999", [[0, 0]], "reference system EPSG:99999 is unknown"),
+        (
+            "+proj=utm +zone=32",
+            [[0, 0]],
+            r"reference system '\+proj=utm \+zone=32', but a code as EPSG:25832",
+        ),
+        ("FILE:123", [[0, 0]], "reference system 'FILE:123', but a code"),
+        ("EPSG:4326", [[0, 0], [5, 91]], r"a point at \[5, 91\], but longitude and latitude in degrees"),
+        ("EPSG:25832", [[1e300, 0]], r"a point at \[1e\+300, 0\], but coordinates of EPSG:25832"),
+        ("EPSG:4326", [[0, 0], [np.nan, 1]], r"a point at \[nan, 1\], but longitude and latitude"),
+    ],
+)
+def test_what_no_place_is_is_refused(crs: str, points: Any, wanted: str) -> None:
+    with pytest.raises(MapError, match=rf"^plan: {wanted}.*--units metres") as caught:
+        moved(points, crs=crs)
+    assert "\n" not in str(caught.value)
+
+
+def test_without_pyproj_there_is_one_line_with_the_way_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyproj", None)
+    with pytest.raises(MapError, match=r'^plan: coordinates in degrees: .*pip install "robocov\[geo\]"'):
+        moved([[8, 49], [8.001, 49.001]], globe=True)
+    assert moved([[8, 49], [8.001, 49.001]], ReadOptions(units="metres"), globe=True)[0][0, 0] == 8.0
+
+
+def test_figures_keep_their_rings() -> None:
+    figures = [
+        Figure("polygon", (np.zeros((4, 2)), np.ones((3, 2))), ("hall",), "geometry 1"),
+        Figure("point", (np.full((1, 2), 5.0),)),
+    ]
+    scaled, _ = in_metres(figures, ReadOptions(scale=2.0), "plan")
+    assert [[len(ring) for ring in figure.rings] for figure in scaled] == [[4, 3], [1]]
+    assert (scaled[0].rings[1] == 2.0).all()
+    assert (scaled[0].labels, scaled[0].at, scaled[1].rings[0].tolist()) == (
+        ("hall",),
+        "geometry 1",
+        [[10.0, 10.0]],
+    )
+    assert in_metres([], ReadOptions(units="degrees"), "plan", globe=True) == ([], [])

@@ -1,0 +1,158 @@
+"""Files made to do harm: each is refused in one line, within a second and 200 MB, in a process of its own."""
+
+import io
+import json
+import struct
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from raster_files import PLAN, chunk, drawn, pgm, raw_png
+
+MEMORY = 200 * 2**20
+SECONDS = 3.0
+"""Of CPU time: three times what is promised, as machines are busy."""
+
+WATCHED = """
+import json, re, sys, time
+from pathlib import Path
+from robocov.errors import RobocovError
+from robocov_app.formats import import_map, ReadOptions
+import PIL.PngImagePlugin, yaml
+
+def told(path, cell):
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+    began = time.process_time()
+    try:
+        import_map(Path(path), options=ReadOptions(cell=cell))
+    except RobocovError as error:
+        said = str(error)
+    else:
+        said = "accepted"
+    status = Path("/proc/self/status").read_text()
+    return said, time.process_time() - began, 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
+
+print(json.dumps([told(path, cell) for path, cell in json.loads(sys.argv[1])]))
+"""
+
+
+def watched(files: list[tuple[Path, float | None]]) -> list[tuple[str, float, int]]:
+    """Import files in a process of its own; return what is said of each, seconds, and peak in bytes."""
+    done = subprocess.run(
+        [sys.executable, "-c", WATCHED, json.dumps([(str(path), cell) for path, cell in files])],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-500:]
+    return [(said, seconds, memory) for said, seconds, memory in json.loads(done.stdout)]
+
+
+def sparse(path: Path, head: bytes, size: int) -> Path:
+    with path.open("wb") as file:
+        file.write(head)
+        file.truncate(size)
+    return path
+
+
+def text_bomb() -> bytes:
+    """Return a PNG whose text unpacks to 40 MB."""
+    packed = zlib.compress(b"a" * 40_000_000)
+    good = raw_png(4, 4, 8, 0, (b"\0" + b"\xff" * 4) * 4)
+    return good[:33] + chunk(b"zTXt", b"Comment\0\0" + packed) + good[33:]
+
+
+def large(kind: str, side: int, keep: int | None = None, **options: object) -> bytes:
+    """Return the first bytes of a white picture, with as many pixels as it says or a part of them."""
+    stream = io.BytesIO()
+    Image.new("1" if options.get("compression") == "group4" else "L", (side, side), 255).save(
+        stream, kind, **options
+    )
+    return stream.getvalue()[:keep]
+
+
+def sized(data: bytes, old: int, new: int) -> bytes:
+    """Return a picture that says that it has another size."""
+    form = ">H" if data.startswith(b"\xff") else "<H"
+    return data.replace(struct.pack(form, old), struct.pack(form, new))
+
+
+def deep_yaml() -> bytes:
+    return b"image: a.pgm\nresolution: 1\norigin: " + b"[" * 30_000
+
+
+def laughs() -> bytes:
+    lines = [b"image: a.pgm", b"resolution: 1", b"a: &a [lol, lol, lol, lol, lol, lol, lol, lol, lol]"]
+    lines += [b"%c: &%c [%s]" % (k, k, b", ".join([b"*%c" % (k - 1)] * 9)) for k in range(98, 107)]
+    return b"\n".join(lines)
+
+
+TOO_MANY = "at most 64 million"
+GRID = b"type octile\nheight %d\nwidth %d\nmap\n"
+
+HOSTILE: dict[str, tuple[str, Callable[[], bytes] | None, str, str]] = {
+    # name: (file, content, options, what it says)
+    "pixels of a bomb": ("a.png", lambda: raw_png(20_000, 20_000, 8, 6, b"\0" * 10**7), "cell", TOO_MANY),
+    "GBs of pixels": ("a.png", lambda: raw_png(8000, 8000, 16, 6, b"\0" * 10**7), "cell", "truncated"),
+    "more than it says": ("a.png", lambda: raw_png(10, 10, 8, 0, b"\0" * 4 * 10**7), "cell", "no cell is"),
+    "text": ("a.png", text_bomb, "cell", "whole PNG"),
+    "10^9 cells": ("a.pgm", lambda: b"P5 31623 31623 255\n" + b"\xff" * 1000, "cell", TOO_MANY),
+    "10^9 plain cells": ("a.pgm", lambda: b"P2 1 999999999 255\n" + b"1 " * 1000, "cell", TOO_MANY),
+    "cut off": ("a.pgm", lambda: b"P5 8000 8000 65535\n" + b"\xff" * 1000, "cell", "cut off after 500"),
+    "a grid of 10^9": ("a.map", lambda: GRID % (31623, 31623), "", TOO_MANY),
+    "a grid cut off": ("a.map", lambda: GRID % (8000, 8000) + b"." * 9000, "", "9000 letters"),
+    "noise": ("a.pgm", lambda: pgm(255 * (np.indices((2500, 2500)).sum(axis=0) % 2)), "cell", "vertices"),
+    "10^9 of a JPEG": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 31_623), "cell", TOO_MANY),
+    "a JPEG cut off": ("a.jpg", lambda: sized(large("JPEG", 997), 997, 8000), "cell", "whole JPEG"),
+    "a BMP cut off": ("a.bmp", lambda: sized(large("BMP", 997), 997, 8000), "cell", "whole BMP"),
+    "a TIFF cut off": (
+        "a.tif", lambda: large("TIFF", 4000, 9000, compression="packbits"), "cell", "whole TIFF"
+    ),
+    "10^9 of a TIFF": ("a.tif", lambda: sized(large("TIFF", 997), 997, 31_623), "cell", TOO_MANY),
+    "a TIFF of nothing": (
+        "a.tif", lambda: sized(large("TIFF", 997, compression="tiff_lzw"), 997, 8000), "cell", "whole TIFF"
+    ),
+    "a wide TIFF": (
+        "a.tif", lambda: sized(large("TIFF", 997, compression="group4"), 997, 8000), "cell", "whole TIFF"
+    ),
+    "a PPM cut off": ("a.ppm", lambda: b"P6 8000 8000 255\n" + b"\xff" * 1000, "cell", "cut off after 333"),
+    "a PBM cut off": ("a.pbm", lambda: b"P1 8000 8000\n" + b"1 " * 1000, "cell", "whole PPM"),
+    "laughs": ("a.yaml", laughs, "", "an anchor or alias"),
+    "depth": ("a.yaml", deep_yaml, "", "nested too deeply"),
+    "a large yaml": ("a.yaml", lambda: b"image: a\nresolution: 1\n" + b"# " * 10**7, "", "larger than"),
+    "a terabyte": ("a.pgm", None, "cell", "larger than 256 MB"),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="memory is measured as Linux tells it")
+def test_they_are_refused(tmp_path: Path) -> None:
+    files: list[tuple[Path, float | None]] = []
+    for name, (file, content, options, _) in HOSTILE.items():
+        folder = tmp_path / name.replace("^", "")
+        folder.mkdir()
+        (folder / "a.pgm").touch()
+        if content is None:
+            sparse(folder / file, b"P5 4000 4000 255\n", 10**12)
+        else:
+            (folder / file).write_bytes(content())
+        files.append((folder / file, 1.0 if options == "cell" else None))
+    for (name, case), (path, _), (said, seconds, memory) in zip(
+        HOSTILE.items(), files, watched(files), strict=True
+    ):
+        assert case[3] in said, name
+        assert said.startswith(str(path)), name
+        assert "\n" not in said, name
+        assert seconds < SECONDS, name
+        assert memory < MEMORY, name
+
+
+def test_a_good_one_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "a.pgm"
+    path.write_bytes(pgm(drawn(PLAN)))
+    ((said, _, memory),) = watched([(path, 1.0)])
+    assert said == "accepted"
+    assert memory < MEMORY

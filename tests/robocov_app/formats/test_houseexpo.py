@@ -1,0 +1,187 @@
+"""HouseExpo plans, on small ones of our own: what is kept, what is repaired, what is refused."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Polygon, box
+
+from robocov.environment import DiscStart, Environment, PolygonObstacle, UniformStart
+from robocov.errors import MapError, ParameterError
+from robocov.mapfile import from_json, load_map, save_map, to_json
+from robocov_app.formats import Shaping, detect, import_map
+from robocov_app.formats.foreign import ImportReport
+from robocov_app.formats.geometry.corners import sharpened
+
+# two rooms of 4 m x 3 m and a door of 0.9 m in a wall of 0.1 m, with corners cut by 1 cm as in such plans
+PLAN = [
+    [0.01, 0], [4, 0], [4, 0.99], [4.01, 1], [4.09, 1], [4.1, 0.99], [4.1, 0], [8.1, 0], [8.1, 3], [4.1, 3],
+    [4.1, 1.91], [4.09, 1.9], [4.01, 1.9], [4, 1.91], [4, 3], [0, 3], [0, 0.01],
+]  # fmt: skip
+
+
+def write(folder: Path, document: Any, name: str = "plan.json") -> Path:
+    path = folder / name
+    path.write_text(json.dumps(document))
+    return path
+
+
+def plan(verts: Any, **others: Any) -> dict[str, Any]:
+    return {"verts": verts, "id": "abc", "room_num": 2, "room_category": {}, "bbox": {}} | others
+
+
+def imported(path: Path, **shaping: Any) -> tuple[Environment, ImportReport]:
+    environment, report, foreign = import_map(path, format="houseexpo", shaping=Shaping(**shaping))
+    assert foreign.format == report.format == "houseexpo"
+    return environment, report
+
+
+def test_a_plan_becomes_a_map_that_saves_and_loads(tmp_path: Path) -> None:
+    path = write(tmp_path, plan(PLAN))
+    assert detect(path).name == "houseexpo"
+    environment, report = imported(path)
+    assert environment.name == "HouseExpo abc"
+    assert environment.free_area == pytest.approx(12 + 12 + 0.09, abs=1e-3)
+    assert len(environment.free.geoms) == 1
+    assert (report.vertices_read, report.repaired, report.dropped) == (17, (), ())
+    assert report.area_kept == environment.free_area
+    save_map(environment, tmp_path / "out.json")
+    assert load_map(tmp_path / "out.json") == environment
+    assert json.loads(json.dumps(report.to_dict()))["area_read_m2"] == report.area_read
+    assert report.lines()[0].startswith("houseexpo: 17 vertices read, 12 kept; free area 24.09 m² read")
+
+
+def test_cut_corners_become_whole(tmp_path: Path) -> None:
+    environment, report = imported(write(tmp_path, plan(PLAN)))
+    assert report.vertices_kept == 12
+    assert set(environment.boundary) == {
+        (0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (4.1, 1.0), (4.1, 0.0), (8.1, 0.0),
+        (8.1, 3.0), (4.1, 3.0), (4.1, 1.9), (4.0, 1.9), (4.0, 3.0), (0.0, 3.0),
+    }  # fmt: skip
+    untouched, report = imported(write(tmp_path, plan(PLAN)), simplify=0.0)
+    assert report.vertices_kept == 17
+    assert set(untouched.boundary) == {(float(x), float(y)) for x, y in PLAN}
+
+
+def test_a_closed_ring_with_repeats(tmp_path: Path) -> None:
+    verts = [[0, 0], [5, 0], [5, 0], [5, 3], [0, 3], [0, 0]]
+    environment, report = imported(write(tmp_path, plan(verts)))
+    assert len(environment.boundary) == 4
+    assert environment.area == 15.0
+    assert report.repaired == ("2 repeated vertices taken out",)
+
+
+def test_a_ring_that_crosses_itself(tmp_path: Path) -> None:
+    # a bow tie of 8 m² and 2 m²
+    verts = [[0, 0], [0, 4], [6, -2], [6, 0]]
+    environment, report = imported(write(tmp_path, plan(verts)))
+    assert environment.area == pytest.approx(8.0)
+    assert report.area_read == pytest.approx(10.0)
+    assert report.area_kept == pytest.approx(8.0)
+    assert report.repaired[0].startswith("the outline met itself: Self-intersection[4 0")
+    assert report.dropped == ("1 separate part of the free space, 2 m²",)
+
+
+def test_a_ring_round_a_block_gives_an_obstacle(tmp_path: Path) -> None:
+    # the outline runs in to a block, round it, and out again the same way
+    verts = [[0, 0], [6, 0], [6, 6], [0, 6], [0, 3], [2, 3], [2, 4], [4, 4], [4, 2], [2, 2], [2, 3], [0, 3]]
+    environment, report = imported(write(tmp_path, plan(verts)))
+    assert environment.free_area == pytest.approx(36 - 4)
+    assert [type(obstacle) for obstacle in environment.obstacles] == [PolygonObstacle]
+    assert report.repaired
+
+
+def test_the_starts(tmp_path: Path) -> None:
+    path = write(tmp_path, plan(PLAN))
+    environment, _ = imported(path)
+    assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
+    assert len(environment.start("room").sample(6)) == 6
+    assert list(imported(path, default_start="uniform")[0].starts) == ["uniform", "room"]
+    room = environment.starts["room"]
+    assert isinstance(room, DiscStart)
+    assert room.radius == pytest.approx(1.39, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("document", "wanted"),
+    [
+        ([], "not a HouseExpo plan"),
+        ({"vertices": []}, 'an object with "verts" was wanted'),
+        (plan([]), "verts: [], but a list of at least 3 points"),
+        (plan("many"), 'verts: "many", but a list'),
+        (plan([[0, 0], [1, 0], [1, "1"]]), 'verts[2]: [1, "1"], but a point [x, y] in metres'),
+        (plan([[0, 0], [1, True], [1, 1]]), "verts[1]: [1, true], but a point"),
+        (plan([[0, 0], [1, 0, 0], [1, 1]]), "verts[1]: [1, 0, 0], but a point"),
+        (plan([[0, 0], [1, 0], [1e9, 1]]), "verts[2]: [1000000000.0, 1], but a point"),
+        (plan([[0, 0], [1, 1], [0, 0], [1, 1], [1, 1]]), "verts: area 0 m²"),
+        (plan([[0, 0], [0, 0], [1, 1]]), "verts: 2 different points, but at least 3"),
+        (plan([[0, 0], [1, 1], [3, 3]]), "verts: area 0 m²"),
+        (plan([[0, 0], [0.15, 0], [0.15, 9], [0, 9]]), "no place is wide enough for a robot"),
+        (plan([[0, 0], [20000, 0], [20000, 9], [0, 9]]), "boundary: 20000 x 9 m, but at most 10 km"),
+    ],
+)
+def test_what_is_no_plan_is_refused_in_one_line(tmp_path: Path, document: Any, wanted: str) -> None:
+    path = write(tmp_path, document)
+    with pytest.raises(MapError) as caught:
+        imported(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert wanted in message
+    assert "\n" not in message
+
+
+def test_corners_are_made_whole_and_nothing_else() -> None:
+    cut = Polygon([(0, 0.02), (0.02, 0), (6, 0), (6, 3), (0, 3)])
+    assert sharpened(cut, 0.02).symmetric_difference(box(0, 0, 6, 3)).area < 1e-12
+    assert sharpened(cut, 0.0).equals(cut)
+    # a bevel of 10 cm is no cut corner, and lines that hardly turn meet nowhere in particular
+    bevel = Polygon([(0.1, 0), (6, 0), (6, 3), (0, 3), (0, 0.1)])
+    assert sharpened(bevel, 0.02).equals(bevel)
+    bent = Polygon([(0, 0), (3, 0), (3.02, 0.001), (6, 0.2), (6, 3), (0, 3)])
+    assert sharpened(bent, 0.02).equals(bent)
+    holed = Polygon(box(0, 0, 6, 3).exterior, [[(1, 1.01), (1.01, 1), (2, 1), (2, 2), (1, 2)]])
+    assert sharpened(holed, 0.02).area == pytest.approx(17.0)
+
+
+def test_options_out_of_range(tmp_path: Path) -> None:
+    path = write(tmp_path, plan(PLAN))
+    for tolerance in (-1.0, math.nan, 11.0):
+        with pytest.raises(ParameterError, match="simplify"):
+            imported(path, simplify=tolerance)
+    with pytest.raises(ParameterError, match="default_start: 'door'"):
+        imported(path, default_start="door")  # type: ignore[arg-type]
+
+
+def test_other_files_are_not_recognised(tmp_path: Path) -> None:
+    with pytest.raises(MapError, match=r"unknown format .*, but one of .*houseexpo"):
+        detect(write(tmp_path, {"rooms": []}))
+    with pytest.raises(MapError, match="no such file"):
+        detect(tmp_path / "none.json")
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), min_size=3, max_size=14),
+    st.sampled_from([0.0, 0.02, 0.5]),
+)
+def test_any_ring_is_imported_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, verts: list[tuple[int, int]], tolerance: float
+) -> None:
+    path = write(tmp_path_factory.getbasetemp(), plan([[x / 4, y / 4] for x, y in verts]))
+    message = None
+    try:
+        environment, report = imported(path, simplify=tolerance)
+    except MapError as error:
+        message = str(error)
+    if message is not None:
+        assert message.startswith(str(path))
+        assert "\n" not in message
+        return
+    assert from_json(to_json(environment)) == environment
+    assert report.area_kept == environment.free_area
+    if tolerance == 0.0:
+        assert report.area_kept <= report.area_read + 1e-3

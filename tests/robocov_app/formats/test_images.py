@@ -1,0 +1,303 @@
+"""Pictures of every kind give the same brightness; what is broken or too large is refused."""
+
+import io
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image, PngImagePlugin
+from raster_files import chunk, pgm, raw_png
+
+from robocov.errors import MapError
+from robocov_app.formats.picture import Brightness, is_picture, read_picture
+
+GREY = np.array([[0, 17, 34, 255], [255, 204, 119, 0], [136, 0, 255, 51]], dtype=np.uint8)
+"""Multiples of 17: as exact in 4 bits as in 8."""
+
+
+def png(image: Image.Image, **options: object) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, format="PNG", **options)
+    return stream.getvalue()
+
+
+def read(folder: Path, data: bytes) -> Brightness:
+    path = folder / "picture"
+    path.write_bytes(data)
+    return read_picture(path, "picture")
+
+
+def shade(picture: Brightness) -> np.ndarray:
+    return picture.level / picture.full
+
+
+def test_pgm_plain_and_raw_of_8_and_16_bits(tmp_path: Path) -> None:
+    plain = "P2\n# a comment\n4 # and here\n3\n#another\n255\n" + "\n".join(
+        " ".join(map(str, row)) for row in GREY
+    )
+    deep = np.rint(GREY / 255 * 65535).astype(int)
+    files = [
+        pgm(GREY),
+        pgm(GREY, head="# one\n#two\n\n"),
+        pgm(GREY).replace(b"\n", b" ", 1).replace(b"255\n", b"255\t", 1),
+        b"P5\r\n4 3\r\n255\r\n" + GREY.tobytes(),
+        pgm(GREY) + b"and more after it",
+        plain.encode(),
+        plain.replace("\n", "\r\n").encode(),
+        plain.replace("17 34", "17 # in the midst\n34").encode(),
+        pgm(deep, 65535),
+        f"P2 4 3 65535 {' '.join(map(str, deep.ravel()))}".encode(),
+        pgm(np.rint(GREY / 255 * 15), 15),
+    ]
+    for data in files:
+        picture = read(tmp_path, data)
+        np.testing.assert_allclose(shade(picture), GREY / 255, atol=1e-5)
+        assert picture.alpha is None
+        assert is_picture(data)
+    # the blank after the largest value may be a byte that looks like a line end of the picture
+    first = np.full((1, 3), 10, dtype=np.uint8)
+    np.testing.assert_array_equal(read(tmp_path, b"P5 3 1 255\n" + first.tobytes()).level, first)
+
+
+def test_png_of_every_depth_and_colour(tmp_path: Path) -> None:
+    base = Image.fromarray(GREY)
+    packed = b"".join(
+        b"\0" + bytes((row[0] // 17 << 4 | row[1] // 17, row[2] // 17 << 4 | row[3] // 17)) for row in GREY
+    )
+    deep = b"".join(b"\0" + (row.astype(">u2") * 257).tobytes() for row in GREY)
+    files = {
+        "8 bit": png(base),
+        "4 bit": raw_png(4, 3, 4, 0, packed),
+        "16 bit": raw_png(4, 3, 16, 0, deep),
+        "palette": png(base.convert("P")),
+        "RGB": png(base.convert("RGB")),
+        "interlaced": raw_png(1, 1, 8, 0, b"\0\x77", interlaced=1),
+    }
+    for name, data in files.items():
+        picture = read(tmp_path, data)
+        wanted = GREY if name != "interlaced" else np.array([[0x77]])
+        np.testing.assert_allclose(shade(picture), wanted / 255, atol=1e-5, err_msg=name)
+        assert picture.alpha is None
+    for bits, step in ((1, 255), (2, 85)):
+        levels = np.array([0, 1, 1, 0] if bits == 1 else [0, 1, 3, 2])
+        row = int(sum(int(v) << (8 - bits * (k + 1)) for k, v in enumerate(levels)))
+        picture = read(tmp_path, raw_png(4, 1, bits, 0, bytes((0, row))))
+        np.testing.assert_array_equal(shade(picture)[0], levels * step / 255)
+
+
+def test_colours_are_added_up_and_alpha_is_kept_apart(tmp_path: Path) -> None:
+    colours = np.array([[[255, 0, 0, 255], [0, 255, 0, 128], [10, 20, 30, 0]]], dtype=np.uint8)
+    picture = read(tmp_path, png(Image.fromarray(colours)))
+    assert picture.full == 765
+    assert picture.level.tolist() == [[255, 255, 60]]
+    assert picture.alpha is not None
+    assert picture.alpha.tolist() == [[255, 128, 0]]
+    grey = read(tmp_path, png(Image.fromarray(np.array([[[7, 255], [9, 3]]], dtype=np.uint8))))
+    assert (grey.full, grey.level.tolist()) == (255, [[7, 9]])
+    assert grey.alpha is not None and grey.alpha.tolist() == [[255, 3]]
+    deep = b"\0" + struct.pack(">8H", 65535, 0, 0, 65535, 257, 514, 771, 0)
+    picture = read(tmp_path, raw_png(2, 1, 16, 6, deep))
+    assert picture.level.tolist() == [[255, 6]]
+    assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0]]
+
+
+def test_a_transparent_colour_of_a_palette_or_a_grey(tmp_path: Path) -> None:
+    image = Image.fromarray(np.array([[0, 1, 2]], dtype=np.uint8), mode=None).convert("L")
+    palette = Image.new("P", (3, 1))
+    palette.putpalette([0, 0, 0, 255, 255, 255, 100, 100, 100])
+    palette.putdata([0, 1, 2])
+    picture = read(tmp_path, png(palette, transparency=2))
+    assert picture.alpha is not None and picture.alpha.tolist() == [[255, 255, 0]]
+    assert picture.level.tolist() == [[0, 765, 300]]
+    picture = read(tmp_path, png(image, transparency=1))
+    assert picture.alpha is not None and picture.alpha.tolist() == [[255, 0, 255]]
+
+
+def test_texts(tmp_path: Path) -> None:
+    texts = PngImagePlugin.PngInfo()
+    texts.add_text("Title", "a plan")
+    texts.add_itxt("robocov", "α", zip=True)
+    picture = read(tmp_path, png(Image.fromarray(GREY), pnginfo=texts))
+    assert picture.texts["Title"] == "a plan"
+    assert picture.texts["robocov"] == "α"
+
+
+def test_long_plain_pictures_are_read_piece_by_piece(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(3).integers(0, 65536, (700, 600))
+    text = "P2 600 700 65535\n" + "\n".join(" ".join(map(str, row)) for row in pixels)
+    np.testing.assert_array_equal(read(tmp_path, text.encode()).level, pixels)
+
+
+def test_tall_pictures_are_converted_strip_by_strip(tmp_path: Path) -> None:
+    tall = np.random.default_rng(1).integers(0, 256, (1500, 3, 3), dtype=np.uint8)
+    picture = read(tmp_path, png(Image.fromarray(tall)))
+    np.testing.assert_array_equal(picture.level, tall.sum(axis=2))
+
+
+COLOURS = np.array([[[255, 0, 0], [0, 250, 0]], [[0, 3, 255], [10, 20, 30]], [[9, 9, 9], [255, 255, 255]]])
+
+
+def saved(image: Image.Image, kind: str, **options: object) -> bytes:
+    stream = io.BytesIO()
+    image.save(stream, kind, **options)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["BMP", "TIFF", "PPM", "PNG"])
+@pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA", "I;16", "CMYK"])
+def test_other_formats_are_as_bright_as_a_png(tmp_path: Path, kind: str, mode: str) -> None:
+    image = Image.fromarray(COLOURS.astype(np.uint8)).convert("L" if mode == "I;16" else mode)
+    if mode == "I;16":
+        image = Image.fromarray(np.asarray(image).astype(np.uint16) * 257)
+    if (kind, mode) in {("BMP", "I;16"), ("BMP", "CMYK"), ("PPM", "CMYK"), ("PNG", "CMYK"), ("PPM", "P")}:
+        pytest.skip("is never saved so")
+    data = saved(image, kind)
+    assert is_picture(data)
+    picture = read(tmp_path, data)
+    plain = image.convert("I") if mode == "I;16" else image.convert("RGB")
+    wanted = np.asarray(plain) / 65535 if mode == "I;16" else np.asarray(plain).sum(axis=2) / 765
+    np.testing.assert_allclose(shade(picture), wanted, atol=1e-9)
+    assert (picture.alpha is not None) == (mode == "RGBA" and kind in ("TIFF", "PNG"))
+    assert not picture.lossy
+
+
+@pytest.mark.parametrize("compression", ["tiff_lzw", "tiff_adobe_deflate", "packbits", "group4"])
+def test_tiff_with_compression(tmp_path: Path, compression: str) -> None:
+    image = Image.fromarray(np.array(GREY, dtype=np.uint8)).convert("1" if compression == "group4" else "L")
+    picture = read(tmp_path, saved(image, "TIFF", compression=compression))
+    np.testing.assert_array_equal(shade(picture), np.asarray(image.convert("L")) / 255)
+
+
+@pytest.mark.parametrize("kind", [">u2", "<u2"])
+@pytest.mark.parametrize("white_is_zero", [False, True])
+def test_tiff_of_16_bits(tmp_path: Path, kind: str, white_is_zero: bool) -> None:
+    order = kind[0]
+    pixels = np.array([[0, 65535], [1000, 2000]]).astype(kind).tobytes()
+    tags = [
+        (256, 2),
+        (257, 2),
+        (258, 16),
+        (259, 1),
+        (262, int(not white_is_zero)),
+        (273, 8),
+        (278, 2),
+        (279, 8),
+    ]
+    entries = b"".join(struct.pack(f"{order}HHII", tag, 4, 1, value) for tag, value in tags)
+    head = (b"MM" if order == ">" else b"II") + struct.pack(f"{order}HI", 42, 16)
+    data = head + pixels + struct.pack(f"{order}H", len(tags)) + entries + b"\0\0\0\0"
+    if order == ">" and white_is_zero:  # which Pillow does not know
+        with pytest.raises(MapError, match="whole TIFF"):
+            read(tmp_path, data)
+        return
+    wanted = np.array([[0, 65535], [1000, 2000]]) / 65535
+    np.testing.assert_allclose(shade(read(tmp_path, data)), 1 - wanted if white_is_zero else wanted)
+
+
+def test_samples_of_32_bits_are_refused(tmp_path: Path) -> None:
+    for image in (Image.new("F", (3, 3)), Image.new("I", (3, 3))):
+        with pytest.raises(MapError, match=r"whole TIFF was wanted: samples of 32 bits or with a sign"):
+            read(tmp_path, saved(image, "TIFF"))
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "TIFF", "PNG"])
+@pytest.mark.parametrize("turn", range(1, 9))
+def test_pictures_stand_as_their_exif_says(tmp_path: Path, kind: str, turn: int) -> None:
+    image = Image.new("L", (16, 8), 255)
+    image.paste(0, (0, 0, 8, 8))
+    upright = {1: image, 2: image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)}
+    upright |= {3: image.rotate(180), 4: image.transpose(Image.Transpose.FLIP_TOP_BOTTOM)}
+    upright |= {5: image.transpose(Image.Transpose.TRANSPOSE), 6: image.rotate(-90, expand=True)}
+    upright |= {7: image.transpose(Image.Transpose.TRANSVERSE), 8: image.rotate(90, expand=True)}
+    exif = Image.Exif()
+    exif[274] = turn
+    picture = read(tmp_path, saved(image, kind, exif=exif))
+    np.testing.assert_array_equal(picture.level, np.asarray(upright[turn]))
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "CMYK"])
+def test_jpeg(tmp_path: Path, mode: str) -> None:
+    image = Image.new("RGB", (32, 16), (250, 240, 230))
+    image.paste((20, 0, 10), (8, 0, 24, 16))
+    picture = read(tmp_path, saved(image.convert(mode), "JPEG", quality=95))
+    assert picture.lossy and picture.level.shape == (16, 32)
+    np.testing.assert_allclose(shade(picture), np.asarray(image).sum(axis=2) / 765, atol=0.05)
+
+
+def test_ppm_of_16_bits_and_in_words(tmp_path: Path) -> None:
+    deep = (COLOURS * 257).astype(">u2")
+    words = " ".join(map(str, COLOURS.ravel().tolist()))
+    for data in (b"P6 2 3 65535\n" + deep.tobytes(), f"P3 2 3 255 {words}".encode()):
+        np.testing.assert_array_equal(shade(read(tmp_path, data)), COLOURS.sum(axis=2) / 765)
+
+
+WHOLE = png(Image.fromarray(np.random.default_rng(2).integers(0, 256, (40, 30), dtype=np.uint8)))
+
+
+@pytest.mark.parametrize(
+    ("data", "wanted"),
+    [
+        (b"", "begins with b''"),
+        (b"GIF89a", "begins with b'GIF89a', but a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM was wanted"),
+        (b"P6 1 1 255 ab", "cut off after 0 of 1 pixels"),
+        (b"P6 1 1 9 abc", "a pixel of 99, but at most 9"),
+        (b"P5", "width: b'', but a whole number"),
+        (b"P5 -3 4 255\n", "width: b'-3 4 255"),
+        (b"P5 3.5 4 255\n", "height: b'.5 4"),
+        (b"P5 nan 4 255\n", "width: b'nan"),
+        (b"P5 # no end", "width: b'# no end'"),
+        (b"P5 0 4 255\n", "0 x 4 cells"),
+        (b"P5 1000000000 1000000000 255\n", "width: b'1000000000"),
+        (b"P5 999999999 999999999 255\n", "999999999 x 999999999 cells, but at most 64 million"),
+        (b"P5 4 4 0\n", "largest value: 0"),
+        (b"P5 4 4 65536\n", "largest value: 65536"),
+        (b"P5 4 4 255", "cut off after 0 of 16 pixels"),
+        (b"P5 4 4 255\n" + b"a" * 15, "cut off after 15 of 16 pixels"),
+        (b"P5 4 4 999\n" + b"\0" * 31, "cut off after 15 of 16 pixels"),
+        (b"P5 2 1 9\n\x05\x0a", "a pixel of 10, but at most 9"),
+        (b"P2 4 4 255\n1 2 3", "cut off: 6 bytes are too few"),
+        (b"P2 2 2 255\n1 2 3       ", "cut off after 3 of 4 pixels"),
+        (b"P2 2 2 255\n1 x 3 4 5", "not whole numbers"),
+        (b"P2 2 2 255\n1 2.5 3 4", "not whole numbers"),
+        (b"P2 2 2 255\n1 -2 3 4 5", "a pixel of -2"),
+        (b"P2 2 2 255\n1 256 3 4 5", "a pixel of 256, but at most 255"),
+        (b"P2 2 2 255\n1 99999999999999999999 3 4", "pixel"),
+        (WHOLE[:20], "whole PNG was wanted: Truncated File Read"),
+        (WHOLE[:60], "whole PNG was wanted: image file is truncated"),
+        (WHOLE[:-60], "whole PNG was wanted: image file is truncated"),
+        (WHOLE.replace(b"IHDR", b"JHDR"), "whole PNG was wanted: cannot identify image file"),
+        (WHOLE[:50] + b"\0\0\0\0\0\0\0\0" + WHOLE[58:], "whole PNG"),
+        (raw_png(100000, 100000, 8, 0, b"\0" * 1000), "at most 64 million"),
+        (raw_png(9000, 9000, 8, 0, b"\0" * 1000), "9000 x 9000 cells, but at most 64 million"),
+        (raw_png(0, 5, 8, 0, b""), "whole PNG"),
+        (raw_png(8000, 8000, 16, 6, b"\0" * 10**6), "whole PNG was wanted: image file is truncated"),
+        (raw_png(2, 2, 3, 0, b"\0\0\0\0"), "whole PNG"),
+        (raw_png(2, 2, 8, 5, b"\0\0\0\0\0\0"), "PNG"),
+        (WHOLE[:33] + chunk(b"iCCP", b"") + WHOLE[33:], "broken, but a whole PNG"),
+    ],
+    ids=map(str, range(99)),
+)  # fmt: skip
+def test_what_is_refused(tmp_path: Path, data: bytes, wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, data)
+    message = str(caught.value)
+    assert message.startswith("picture: ")
+    assert wanted in message
+    assert "\n" not in message
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.integers(8, len(WHOLE) - 1), st.integers(0, 255), st.booleans())
+def test_a_changed_byte_is_no_disaster(
+    tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
+) -> None:
+    data = WHOLE[:at] if cut else WHOLE[:at] + bytes((byte,)) + WHOLE[at + 1 :]
+    try:
+        picture = read(tmp_path_factory.getbasetemp(), data)
+    except MapError as error:
+        assert "\n" not in str(error)
+        return
+    assert picture.level.shape == (40, 30)

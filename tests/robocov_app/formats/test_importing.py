@@ -1,0 +1,106 @@
+"""How a format is known, what its options are, and that every format keeps to the common way."""
+
+import os
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+from raster_files import PLAN, drawn, pgm, ros_map
+
+from robocov.errors import MapError, ParameterError
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect, import_map, importer
+
+
+def test_every_format_says_what_it_is() -> None:
+    known = {field.name for field in fields(ReadOptions)}
+    for name, one in IMPORTERS.items():
+        assert one.name == name
+        assert one.title
+        assert all(suffix.startswith(".") and suffix.islower() for suffix in one.suffixes)
+        # a YAML is of IR-SIM by its content only: what is missing in others, the reader of ROS says
+        assert one.suffixes or one.name == "irsim"
+        assert one.options <= known, name
+        assert importer(name) is one
+    assert {"ros", "movingai", "picture"} <= IMPORTERS.keys()
+
+
+def test_no_format_takes_noise_for_its_own(tmp_path: Path) -> None:
+    rng_free = [
+        b"",
+        b"\0" * 5000,
+        bytes(range(256)) * 20,
+        b"hello",
+        b"[" * 5000,
+        b"\xff\xfe",
+        b"{}",
+        b"<",
+        b"#",
+    ]
+    for head in rng_free:
+        for name, one in IMPORTERS.items():
+            assert one.sniff(tmp_path / "file.bin", head) is False, (name, head[:10])
+
+
+def test_the_content_counts_before_the_suffix(tmp_path: Path) -> None:
+    (tmp_path / "plan.map").write_bytes(pgm(drawn(PLAN)))
+    assert detect(tmp_path / "plan.map").name == "picture"
+    assert detect(ros_map(tmp_path, drawn(PLAN))).name == "ros"
+    (tmp_path / "half.yaml").write_text("image: plan.map\n")
+    assert detect(tmp_path / "half.yaml").name == "ros"
+    with pytest.raises(MapError, match="resolution: missing"):
+        import_map(tmp_path / "half.yaml")
+
+
+def test_what_is_not_known(tmp_path: Path) -> None:
+    path = tmp_path / "plan.xyz"
+    path.write_text("nothing")
+    wanted = r"plan\.xyz: unknown format \(text that begins with 'nothing'\), but one of .*ros.* was wanted"
+    with pytest.raises(MapError, match=wanted):
+        detect(path)
+    with pytest.raises(MapError, match="no such file"):
+        detect(tmp_path / "none.png")
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(MapError, match="is a pipe or a device"):
+        detect(tmp_path / "pipe.png")
+    with pytest.raises(MapError, match="is a folder"):
+        import_map(tmp_path)
+    with pytest.raises(ParameterError, match="unknown format 'gif'"):
+        import_map(path, format="gif")
+
+
+def test_a_format_may_be_forced(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN))
+    image = path.with_suffix(".pgm").rename(tmp_path / "image.bin")
+    environment, report, foreign = import_map(
+        image, format="picture", options=ReadOptions(cell=0.25, threshold=0.9)
+    )
+    assert (report.format, foreign.cell) == ("picture", 0.25)
+    assert environment.free_area == pytest.approx(68 / 16)
+    with pytest.raises(MapError):
+        import_map(image, format="movingai")
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ({"cell": 0.0}, "cell: 0"),
+        ({"cell": float("nan")}, "cell: nan"),
+        ({"scale": -1.0}, "scale: -1"),
+        ({"thickness": float("inf")}, "thickness: inf"),
+        ({"threshold": 1.1}, "threshold: 1.1, but a number from 0 to 1"),
+        ({"threshold": float("nan")}, "threshold: nan"),
+        ({"unknown": "solid"}, "unknown: 'solid', but one of obstacle, free, cut"),
+        ({"trees": "green"}, "trees: 'green', but one of obstacle, free"),
+    ],
+)
+def test_options_out_of_range(options: dict[str, object], wanted: str) -> None:
+    with pytest.raises(ParameterError, match=wanted):
+        ReadOptions(**options)  # type: ignore[arg-type]
+
+
+def test_the_same_file_gives_the_same_map(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN))
+    first, report, _ = import_map(path, shaping=Shaping(keep="all"))
+    again, same, _ = import_map(path, shaping=Shaping(keep="all"))
+    assert first == again
+    assert report == same

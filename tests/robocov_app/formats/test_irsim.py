@@ -1,0 +1,190 @@
+"""Worlds of IR-SIM: shapes at their states, groups, pictures of cells that are no squares."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from raster_files import drawn, pgm
+from shapely import affinity, box
+
+from robocov.environment import CircleObstacle
+from robocov.errors import MapError
+from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
+from robocov_app.formats.irsim import IMPORTER
+
+WORLD = "world:\n  height: 6  # along y\n  width: 10\n  offset: [-1, 2]\n  step_time: 0.1\n"
+SPACE = box(-1, 2, 9, 8)
+
+
+def read(folder: Path, text: str, world: str = WORLD, **options: object) -> ForeignMap:
+    path = folder / "world.yaml"
+    path.write_text(world + text)
+    assert detect(path) is IMPORTER
+    return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
+
+
+def solid(foreign: ForeignMap) -> shapely.Geometry:
+    return SPACE - foreign.free
+
+
+def test_shapes_are_turned_and_moved_to_their_states(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        """
+obstacle:
+  - shape: {name: 'circle', radius: 0.5, center: [1, 0]}
+    state: [1, 4, 1.5707963267948966]
+  - {shape: {name: rectangle, length: 2, width: 1}, state: [4, 4, 0.5]}
+  - shape:
+      name: 'polygon'
+      vertices:
+        - [0, 0]
+        - [1, 0]
+        - [1, 2]
+    state: [7, 5]
+  - shape: {name: linestring, vertices: [[0, 2], [0, 4]]}
+    state: [6, 1, 0]
+""",
+        thickness=0.2,
+    )
+    wanted = [
+        CircleObstacle((1.0, 5.0), 0.5).polygon,
+        affinity.rotate(box(3, 3.5, 5, 4.5), 0.5, origin=(4, 4), use_radians=True),
+        shapely.Polygon([(7, 5), (8, 5), (8, 7)]),
+        box(5.9, 3, 6.1, 5),
+    ]
+    assert solid(foreign).symmetric_difference(shapely.union_all(wanted)).area < 1e-5
+    assert foreign.boundary is not None and foreign.boundary.equals(SPACE)
+
+
+def test_the_last_of_a_list_stands_for_the_rest_of_a_group(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        """
+obstacle:
+  - number: 3
+    distribution: {name: manual}
+    state: [[1, 4], [4, 4], [7, 4]]
+    shape:
+      - {name: rectangle, length: 2, width: 1}
+      - {name: rectangle, length: 1, width: 1}
+  - number: 4
+    distribution: {name: circle, radius: 2.5, center: [4, 5]}
+    shape: {name: rectangle, length: 0.5, width: 0.1}
+""",
+    )
+    wanted = [box(0, 3.5, 2, 4.5), box(3.5, 3.5, 4.5, 4.5), box(6.5, 3.5, 7.5, 4.5)]
+    wanted += [box(6.25, 4.95, 6.75, 5.05), box(1.25, 4.95, 1.75, 5.05)]
+    wanted += [box(3.95, 7.25, 4.05, 7.75), box(3.95, 2.25, 4.05, 2.75)]
+    assert solid(foreign).symmetric_difference(shapely.union_all(wanted)).area < 1e-5
+
+
+def test_parts_of_a_compound_have_poses_of_their_own(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        """
+obstacle:
+  shape:
+    name: compound
+    parts:
+      - {name: rectangle, length: 2, width: 0.5}
+      - {name: rectangle, length: 1, width: 0.5, pose: [0, 1, 0]}
+  state: [4, 5, 1.5707963267948966]
+""",
+    )
+    wanted = shapely.MultiPolygon([box(3.75, 4, 4.25, 6), box(2.75, 4.5, 3.25, 5.5)])
+    assert solid(foreign).symmetric_difference(wanted).area < 1e-5
+
+
+def test_what_is_by_chance_or_collides_with_nothing_is_counted(tmp_path: Path) -> None:
+    text = """
+robot:
+  - kinematics: {name: diff}
+    state: [[0, 3, 0], [1, 3, 0]]
+    number: 2
+  - {number: 5, distribution: {name: random}}
+obstacle:
+  - {number: 10, distribution: {name: random, range_low: [0, 0, 0]}}
+  - {number: 2, shape: [{name: polygon, random_shape: true}], state: [5, 5]}
+  - {name: ghost, shape: {name: circle, radius: 1}, unobstructed: True, state: [5, 5]}
+  - {name: [post], group_name: posts, shape: {name: rectangle}, state: [7, 5], kinematics: {name: omni}}
+  - {number: -3, distribution: {name: random}}
+"""
+    foreign = read(tmp_path, text)
+    assert solid(foreign).equals(box(6.5, 4.5, 7.5, 5.5))
+    assert foreign.robots == ((0.0, 3.0), (1.0, 3.0))
+    assert foreign.dropped == (
+        "10 obstacles that IR-SIM places at random",
+        "1 obstacle that nothing collides with",
+        "5 robots that IR-SIM places at random",
+        "2 shapes by chance",
+    )
+    assert foreign.notes == ("1 obstacle with kinematics taken as standing where the file has them",)
+    assert read(tmp_path, text, skip=("posts",)).free.equals(SPACE)
+    environment, _, _ = import_map(tmp_path / "world.yaml")
+    assert environment.starts["robots"].positions == ((0.0, 3.0), (1.0, 3.0))  # type: ignore[union-attr]
+
+
+def test_a_picture_fills_the_world_whatever_its_cells_are(tmp_path: Path) -> None:
+    (tmp_path / "grid.pgm").write_bytes(pgm(drawn("#...\n....\n...#")))
+    foreign = read(tmp_path, "  obstacle_map: 'grid.pgm'\n")
+    # cells of 2.5 x 2 m, the top row of the picture is the highest
+    assert foreign.free.equals(SPACE - box(-1, 6, 1.5, 8) - box(6.5, 2, 9, 4))
+    assert foreign.cell == 2.5
+    foreign = read(tmp_path, "  obstacle_map: {name: image, path: grid.pgm}\n  mdownsample: 2\n")
+    # rows count from the bottom: those left are ...# and #..., of every other column
+    assert foreign.free.equals(SPACE - box(-1, 5, 4, 8))
+    obstacle = "  obstacle_map: grid.pgm\nobstacle:\n  - {shape: {name: rectangle}, state: [4, 5]}\n"
+    assert read(tmp_path, obstacle).free.area == pytest.approx(60 - 10 - 1)
+
+
+def test_pictures_are_only_read_from_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "far.pgm").write_bytes(pgm(drawn("#.\n..")))
+    folder = tmp_path / "worlds"
+    folder.mkdir()
+    with pytest.raises(MapError, match=r"world\.obstacle_map: '\.\./far\.pgm' is outside"):
+        read(folder, "  obstacle_map: ../far.pgm\n")
+    assert read(folder, "  obstacle_map: ../far.pgm\n", anywhere=True).free.area == pytest.approx(45)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("  obstacle_map: {name: perlin, seed: 1}", "world.obstacle_map: 'perlin', which IR-SIM generates"),
+        ("  mdownsample: 0\n  obstacle_map: a.pgm", "world.mdownsample: '0', but a number from 1"),
+        ("obstacle: 5", "obstacle: '5', but a mapping"),
+        ("obstacle:\n  - {shape: {name: blob}}", "obstacle[0].shape.name: 'blob', but circle, rectangle"),
+        ("obstacle:\n  - {shape: {radius: -1}}", "obstacle[0].shape.radius: -1.0, but a number from"),
+        ("obstacle:\n  - {shape: {radius: x}}", "obstacle[0].shape.radius: 'x', but a number within 1e7"),
+        ("obstacle:\n  - {state: [1, a]}", "obstacle[0].state[1]: 'a', but a number within 1e7 was wanted"),
+        ("obstacle:\n  - {state: 1}", "obstacle[0].state: '1', but a list was wanted"),
+        ("obstacle:\n  - {state: [1]}", "obstacle[0].state: ['1'], but a list of 3 numbers"),
+        ("obstacle:\n  - {state: [.nan, 1]}", "obstacle[0].state[0]: '.nan', but a number"),
+        ("obstacle:\n  - {state: [1e9, 1]}", "obstacle[0].state[0]: '1e9', but a number within 1e7"),
+        ("obstacle:\n  - {number: 9e6}", "obstacle[0].number: '9e6', but a number of at most 4000"),
+        ("obstacle:\n  - {distribution: {name: x}}", "obstacle[0].distribution.name: 'x', but manual"),
+        ("obstacle:\n  shape: {name: polygon, vertices: [[0, 0]]}", "shape.vertices: [['0', '0']], but "),
+        ("obstacle:\n  - &a {shape: *a}", "line 7: an anchor or alias"),
+        ("obstacle: " + "[" * 20, "nested too deeply, but at most 12 levels"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, text: str, wanted: str) -> None:
+    (tmp_path / "a.pgm").write_bytes(pgm(np.full((2, 2), 255, np.uint8)))
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, text)
+    assert wanted in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
+    # a generated map has a resolution, and comments speak of images
+    path = tmp_path / "world.yaml"
+    path.write_text(WORLD + "  obstacle_map:\n    name: perlin # or an image: a.png\n    resolution: 0.1\n")
+    assert detect(path) is IMPORTER
+
+
+def test_turns_are_in_radians() -> None:
+    from robocov_app.formats.irsim import _frame
+
+    assert _frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))

@@ -1,0 +1,110 @@
+"""Grids of Moving AI: letters, line ends, and what is refused with its line and column."""
+
+from pathlib import Path
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import MapError
+from robocov_app.formats import ReadOptions, detect, import_map
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.movingai import IMPORTER
+
+ROWS = ("@@@@@@", "@..GT@", "@S.OW@", "@....@", "@@@@@@")
+GRID = "type octile\nheight 5\nwidth 6\nmap\n" + "\n".join(ROWS) + "\n"
+
+
+def write(folder: Path, text: str | bytes, name: str = "a.map") -> Path:
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def read(folder: Path, text: str | bytes, **options: object) -> ForeignMap:
+    return IMPORTER.read(write(folder, text), ReadOptions(**options))  # type: ignore[arg-type]
+
+
+def test_letters(tmp_path: Path) -> None:
+    foreign = read(tmp_path, GRID)
+    wanted = shapely.box(1, 1, 5, 2) | shapely.box(1, 2, 3, 3) | shapely.box(1, 3, 4, 4)
+    assert shapely.equals(foreign.free, wanted)
+    assert foreign.cell == 1.0
+    assert foreign.notes == (
+        "no cell size was given: 1 m taken",
+        "6 x 5 cells of 1 m: 30 % free, 70 % blocked",
+    )
+    assert read(tmp_path, GRID, trees="free").free.area == 10
+    # the water touches free cells at two corners, where obstacles touch too
+    assert read(tmp_path, GRID, water="free").free.area == pytest.approx(10, abs=0.002)
+    assert read(tmp_path, GRID, trees="free", water="free", cell=0.5).free.area == 11 / 4
+    assert read(tmp_path, GRID, trees="obstacle").free.area == 9
+
+
+def test_it_is_known_by_its_content_and_its_suffix(tmp_path: Path) -> None:
+    assert detect(write(tmp_path, GRID, "grid.txt")) is IMPORTER
+    assert detect(write(tmp_path, "nothing of the kind", "b.map")) is IMPORTER
+    with pytest.raises(MapError, match=r"b\.map: line 1: 'nothing of the kind', but type octile"):
+        import_map(tmp_path / "b.map")
+
+
+def test_line_ends_marks_blanks_and_the_order_of_the_header(tmp_path: Path) -> None:
+    same = read(tmp_path, GRID).free
+    for text in (
+        GRID.replace("\n", "\r\n"),
+        "\ufeff" + GRID,
+        GRID.rstrip("\n"),
+        GRID + "\n\n  \n",
+        GRID.replace("height 5\nwidth 6", "width 6\nheight 5"),
+        GRID.replace("type octile", "type  octile  \n"),
+        GRID.replace("@..GT@", "@..GT@ \t"),
+        GRID.replace("octile", "tile"),
+    ):
+        assert shapely.equals(read(tmp_path, text).free, same)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("", "no line map"),
+        ("type octile\n", "no line map"),
+        ("type hex\nheight 1\nwidth 1\nmap\n.", "line 1: type 'hex', but octile"),
+        ("type octile\nheight 1\nmap\n.", "line 3: no width so far"),
+        ("type octile\nheight -1\nwidth 1\nmap\n.", "line 2: 'height -1'"),
+        ("type octile\nheight nan\nwidth 1\nmap\n.", "line 2: 'height nan'"),
+        ("type octile\nheight 0\nwidth 1\nmap\n", "1 x 0 cells, but at least 1 x 1"),
+        ("type octile\nheight 999999999\nwidth 999999999\nmap\n.", "at most 64 million"),
+        ("type octile\nheight 9999999999999\nwidth 1\nmap\n.", "line 2: height '9999999999999'"),
+        ("type octile\nheight \u0665\nwidth 1\nmap\n.", "line 2: "),
+        (GRID.replace("@S.OW@", "@S.XW@"), "line 7, column 4: 'X', but one of . G S @ O T W"),
+        (GRID.replace("@S.OW@", "@S.OW"), "line 7: 5 letters, but 6 letters"),
+        (GRID.replace("@S.OW@", "@S.OW@@"), "line 7: 7 letters"),
+        (GRID.replace("@S.OW@\n", "\n@S.OW@\n"), "line 7: 0 letters"),
+        (GRID.replace("@....@\n@@@@@@\n", ""), "line 8: end of file, but 6 letters"),
+        (GRID + "......\n", "line 10: more than 5 rows"),
+        (GRID.replace(".", "@").replace("G", "@").replace("S", "@"), "no cell is free"),
+        ("type octile\n" * 30, "no line map"),
+        ("x" * 5000, "line 1: 'xxx"),
+    ],
+    ids=map(str, range(99)),
+)
+def test_what_is_refused(tmp_path: Path, text: str, wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        read(tmp_path, text)
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.binary(max_size=12), st.integers(0, len(GRID)), st.integers(0, 6))
+def test_a_damaged_grid_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, patch: bytes, at: int, gone: int
+) -> None:
+    data = GRID.encode()
+    try:
+        foreign = read(tmp_path_factory.getbasetemp(), data[:at] + patch + data[at + gone :])
+    except MapError as error:
+        assert "\n" not in str(error)
+        return
+    assert foreign.free.area > 0

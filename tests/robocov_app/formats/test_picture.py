@@ -1,0 +1,109 @@
+"""Pictures of plans: dark and light, transparent, and the place that they say of themselves."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image, PngImagePlugin
+from raster_files import pgm
+
+from robocov.errors import MapError
+from robocov_app.formats import ReadOptions, detect, import_map
+from robocov_app.formats.picture import CHUNK, IMPORTER
+
+LEVELS = np.array([[0, 127, 128, 255], [255, 255, 255, 255]], dtype=np.uint8)
+
+
+def saved(folder: Path, pixels: np.ndarray, chunk: str | None = None, title: str | None = None) -> Path:
+    texts = PngImagePlugin.PngInfo()
+    if chunk is not None:
+        texts.add_text(CHUNK, chunk)
+    if title is not None:
+        texts.add_text("Title", title)
+    path = folder / "plan.png"
+    Image.fromarray(pixels).save(path, pnginfo=texts)
+    return path
+
+
+def read(path: Path, **options: object) -> shapely.MultiPolygon:
+    return IMPORTER.read(path, ReadOptions(**options)).free  # type: ignore[arg-type]
+
+
+def test_dark_is_an_obstacle(tmp_path: Path) -> None:
+    path = saved(tmp_path, LEVELS)
+    assert detect(path) is IMPORTER
+    lower = shapely.box(0, 0, 4, 1)
+    assert shapely.equals(read(path, cell=1.0), lower | shapely.box(2, 1, 4, 2))
+    assert shapely.equals(read(path, cell=1.0, threshold=0.4), lower | shapely.box(1, 1, 4, 2))
+    assert shapely.equals(read(path, cell=1.0, threshold=1.0), lower | shapely.box(3, 1, 4, 2))
+    assert shapely.equals(read(path, cell=1.0, invert=True), shapely.box(0, 1, 2, 2))
+    assert shapely.equals(read(path, cell=1.0, invert=True, threshold=0.0), shapely.box(0, 1, 4, 2) | lower)
+
+
+def test_a_pgm_is_a_picture_too(tmp_path: Path) -> None:
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(LEVELS))
+    assert detect(path) is IMPORTER
+    assert read(path, cell=0.5).area == 6 / 4
+
+
+def test_single_cells_of_a_jpeg_are_noise(tmp_path: Path) -> None:
+    pixels = np.full((64, 64), 255, dtype=np.uint8)
+    pixels[20:23, 20:23] = pixels[40, 40] = 0
+    Image.fromarray(pixels).save(tmp_path / "plan.jpg", quality=100)
+    Image.fromarray(pixels).save(tmp_path / "plan.bmp")
+    lossy, report, _ = import_map(tmp_path / "plan.jpg", options=ReadOptions(cell=0.1))
+    assert len(lossy.obstacles) == 1
+    assert report.dropped == ("1 obstacle smaller than 0.015 m², 0.01 m² (--specks 0 keeps them)",)
+    exact, _, _ = import_map(tmp_path / "plan.bmp", options=ReadOptions(cell=0.1))
+    assert len(exact.obstacles) == 2
+
+
+def test_what_is_transparent_is_unknown(tmp_path: Path) -> None:
+    pixels = np.full((4, 4, 4), 255, dtype=np.uint8)
+    pixels[:, 2, 3] = 127
+    pixels[:, 3] = (0, 0, 0, 128)
+    path = saved(tmp_path, pixels)
+    assert shapely.equals(read(path, cell=1.0), shapely.box(0, 0, 2, 4))
+    assert shapely.equals(read(path, cell=1.0, unknown="free"), shapely.box(0, 0, 3, 4))
+    foreign = IMPORTER.read(path, ReadOptions(cell=1.0, unknown="cut"))
+    assert foreign.boundary is not None
+    assert foreign.notes == ("4 x 4 cells of 1 m: 50 % free, 25 % blocked, 25 % transparent, cut away",)
+    pixels[..., 3] = 0
+    with pytest.raises(MapError, match="--unknown free takes transparent cells as free"):
+        read(saved(tmp_path, pixels), cell=1.0)
+
+
+def test_the_place_that_it_says_of_itself(tmp_path: Path) -> None:
+    path = saved(tmp_path, LEVELS, json.dumps({"cell_m": 0.5, "origin_m": [3, -2]}), title="an office")
+    foreign = IMPORTER.read(path, ReadOptions())
+    assert foreign.free.bounds == (3.0, -2.0, 5.0, -1.0)
+    assert (foreign.name, foreign.cell) == ("an office", 0.5)
+    assert read(path, cell=2.0).bounds == (3.0, -2.0, 11.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    "chunk",
+    [
+        None, "", "no JSON", "[]", "{}", '{"cell_m": 1}', '{"cell_m": "x", "origin_m": [0, 0]}',
+        '{"cell_m": NaN, "origin_m": [0, 0]}', '{"cell_m": -1, "origin_m": [0, 0]}',
+        '{"cell_m": 1, "origin_m": [0, Infinity]}', '{"cell_m": 1, "origin_m": [0]}', "[" * 5000,
+        '{"cell_m": 1e999, "origin_m": [0, 0]}', '{"cell_m": 1, "origin_m": {"a": 0, "b": 1}}',
+    ],
+)  # fmt: skip
+def test_without_a_scale_one_must_be_given(tmp_path: Path, chunk: str | None) -> None:
+    path = saved(tmp_path, LEVELS, chunk)
+    with pytest.raises(
+        MapError, match=r"plan\.png: a picture has no scale, but --cell, the metres a pixel, was"
+    ):
+        read(path)
+    assert read(path, cell=1.0).bounds == (0.0, 0.0, 4.0, 2.0)
+
+
+def test_the_yaml_beside_it_is_pointed_at(tmp_path: Path) -> None:
+    path = saved(tmp_path, LEVELS)
+    (tmp_path / "plan.yaml").write_text("image: plan.png")
+    with pytest.raises(MapError, match=r"\(or import plan\.yaml beside it\)"):
+        import_map(path)

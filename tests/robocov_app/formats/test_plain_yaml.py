@@ -1,0 +1,83 @@
+"""A mapping of plain values; whatever else YAML can do is refused."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robocov.errors import MapError
+from robocov_app.formats.files import MAX_YAML_BYTES as MAX_BYTES
+from robocov_app.formats.files import parse_yaml as parse
+
+
+def test_values_are_text_as_it_is_written() -> None:
+    text = (
+        b"\xef\xbb\xbfimage: 'a b.pgm' # here\r\nresolution: 1e-2\r\norigin: [-1, .5, 010]\r\nnegate: no\r\n"
+    )
+    assert parse(text, "m") == {
+        "image": "a b.pgm", "resolution": "1e-2", "origin": ["-1", ".5", "010"], "negate": "no",
+    }  # fmt: skip
+    assert parse(b"---\na:\n- 1\n- 2\n...\n", "m") == {"a": ["1", "2"]}
+    assert parse(b'{"a": "1", b: null, c: }', "m") == {"a": "1", "b": "null", "c": ""}
+    assert parse(b"", "m") == parse(b"# nothing\n", "m") == {}
+
+
+def test_lists_and_mappings_are_nested() -> None:
+    text = b"a: {b: 1, c: [2, 3]}\nd: [[1, {x: y}], 3]\ne: 4\nf: {}\ng:\n  - h: []\n    i: 5"
+    assert parse(text, "m") == {
+        "a": {"b": "1", "c": ["2", "3"]}, "d": [["1", {"x": "y"}], "3"], "e": "4", "f": {},
+        "g": [{"h": [], "i": "5"}],
+    }  # fmt: skip
+
+
+BOMB = b"a: &a [x,x,x]\n" + b"".join(
+    b"%c: &%c [*%c,*%c,*%c]\n" % (k, k, k - 1, k - 1, k - 1) for k in range(98, 110)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        (b"a: !!python/object/apply:os.system [ls]", "m: line 1: the tag 'tag:yaml.org,2002:python/object"),
+        (b"a: 1\nb: !x 2", "m: line 2: the tag '!x', but a plain value"),
+        (b"a: &x 1\nb: *x", "m: line 1: an anchor or alias"),
+        (BOMB, "m: line 1: an anchor or alias"),
+        (b"<<: *x", "m: line 1: an anchor or alias"),
+        (b"a: 1\na: 2", "m: line 2: a: given twice"),
+        (b"- 1\n- 2", "m: line 1: a list, but a mapping"),
+        (b"just a word", "m: line 1: 'just a word', but a mapping"),
+        (b"a: 1\n---\nb: 2", "m: line 2: a second document"),
+        (b"[a, b]: 1", "m: line 1: "),
+        (b"a: {b: 1, b: 2}", "m: line 1: b: given twice"),
+        (b"? {a: b}\n: 1", "m: line 1: a name that is a collection"),
+        (b"a: [1", "m: line 1: not YAML: "),
+        (b"a: 'x", "not YAML"),
+        (b"a: \tb: c", "not YAML"),
+        (b'a: "\\UFFFFFFFF"', "not YAML"),
+        (b"a: \x01", "not YAML"),
+        (b"\xff\xfea", "byte 0: not UTF-8"),
+        (b"a: " + b"[" * 1000, "nested too deeply"),
+        (b"[" * 60_000, "a list, but a mapping"),
+        (b"{" * 60_000, "m: line 1: "),
+        (b"a: " + b"x" * MAX_BYTES, "m: larger than 256 kB"),
+    ],
+    ids=map(str, range(99)),
+)
+def test_what_is_refused(text: bytes, wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        parse(text, "m")
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.one_of(st.binary(max_size=80), st.text(alphabet="ab:-[]{},&*!|>'\"#%@ \n\t01.?", max_size=60)))
+def test_anything_is_a_mapping_or_refused(text: bytes | str) -> None:
+    try:
+        result = parse(text if isinstance(text, bytes) else text.encode(), "m")
+    except MapError as error:
+        assert str(error).startswith("m: ")
+        assert "\n" not in str(error)
+        return
+    for key, value in result.items():
+        assert isinstance(key, str)
+        assert isinstance(value, str | list | dict)

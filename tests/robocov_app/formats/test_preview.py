@@ -1,0 +1,121 @@
+"""The picture of an import: two arenas at one scale, what differs is marked, all words can be read."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from clear_pages import all_clear
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import PathPatch
+from PIL import Image
+from shapely import MultiPolygon, Polygon, box
+
+from robocov.errors import OutputError, ParameterError
+from robocov_app.figures.page import tone
+from robocov_app.formats import ForeignMap, Shaping, shaped
+from robocov_app.formats.preview import plot_import, preview
+from robocov_app.render.theme import DARK, LIGHT
+
+HALL = box(0, 0, 12, 8)
+PILLARS = shapely.union_all([box(4, 2, 5, 3), box(4, 3.6, 5, 5), box(9, 6, 9.1, 6.1)])
+CLOSET = box(13, 0, 15, 2)
+
+
+def foreign(free: Any, **given: Any) -> ForeignMap:
+    parts = list(getattr(free, "geoms", [free]))
+    return ForeignMap("plan", "", "svg", MultiPolygon(parts), vertices_read=123, **given)
+
+
+def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "light", **given: Any) -> Any:  # noqa: B008
+    read = foreign(free, **given)
+    return plot_import(read, *shaped(read, shaping, "plan.svg"), theme=theme)
+
+
+def marked(axes: Any, colour: tuple[int, int, int]) -> list[Any]:
+    return [patch for patch in axes.patches if to_rgb(patch.get_facecolor()) == tone(colour)]
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_what_was_lost_is_on_the_left_and_what_was_opened_on_the_right(theme: Any) -> None:
+    figure = plotted((HALL - PILLARS).union(CLOSET), theme=theme.name)
+    before, after = figure.axes
+    assert before.get_xlim() == after.get_xlim()
+    assert before.get_ylim() == after.get_ylim()
+    lost = marked(before, theme.trajectory)
+    assert [patch.get_path().get_extents().bounds for patch in lost] == [CLOSET.bounds[:2] + (2, 2)]
+    opened = marked(after, theme.start)
+    assert np.allclose([patch.get_path().get_extents().bounds for patch in opened], [(9, 6, 0.1, 0.1)])
+    assert not marked(before, theme.start)
+    assert not marked(after, theme.trajectory)
+    said = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"left out: 4 m² were free", "opened: 0.01 m² were solid", "narrowest passage, 0.6 m"} <= said
+    all_clear(figure)
+
+
+def test_the_words() -> None:
+    figure = plotted((HALL - PILLARS).union(CLOSET), repaired=("2 rings closed",))
+    words = [text.get_text() for text in figure.texts]
+    assert {"plan", "as read", "as imported", "repaired: 2 rings closed"} <= set(words)
+    assert any(word.startswith("123 vertices, ") for word in words)
+    assert any(word.startswith("dropped: 1 separate part") for word in words)
+    assert any(word.endswith("imported from svg") for word in words)
+
+
+def test_nothing_is_marked_where_nothing_differs() -> None:
+    figure = plotted(HALL - box(4, 2, 5, 8))
+    before, after = figure.axes
+    assert not marked(before, LIGHT.trajectory)
+    assert not marked(after, LIGHT.start)
+    assert len(figure.legends[0].get_texts()) == 3
+    edges = [found for found in before.collections if isinstance(found, LineCollection)]
+    assert sum(len(found.get_segments()) for found in edges) == 1
+
+
+def test_walls_that_moved_by_the_tolerance_are_nothing_lost() -> None:
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    wavy = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]) * (4 + 0.03 * np.cos(40 * angle))[:, None])
+    figure = plotted(wavy, Shaping(simplify=0.1))
+    assert not marked(figure.axes[0], LIGHT.trajectory)
+    assert not marked(figure.axes[1], LIGHT.start)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "free", [HALL, box(0, 0, 60, 2), box(0, 0, 2, 60), box(5e5, 5e6, 5e5 + 30, 5e6 + 20), box(0, 0, 1, 1)],
+    ids=["hall", "corridor", "shaft", "far away", "small"],
+)  # fmt: skip
+@pytest.mark.parametrize("lines", [0, 1, 30])
+def test_nothing_covers_or_cuts_anything(free: Any, lines: int) -> None:
+    notes = tuple(f"note {k}: " + "what was taken as something else " * 9 for k in range(lines))
+    figure = plotted(free, notes=notes)
+    all_clear(figure)
+    words = [text.get_text() for text in figure.texts]
+    assert any(word.startswith("and ") and word.endswith(" more lines") for word in words) == (lines > 9)
+
+
+def test_free_space_that_is_not_valid_is_drawn_all_the_same() -> None:
+    bow = Polygon([(0, 0), (8, 8), (8, 0), (0, 8)])
+    assert not bow.is_valid
+    figure = plotted(bow)
+    assert any(isinstance(patch, PathPatch) for patch in figure.axes[0].patches)
+
+
+@pytest.mark.slow
+def test_files_are_the_same_every_time(tmp_path: Path) -> None:
+    read = foreign(HALL - PILLARS)
+    environment, report = shaped(read, Shaping(), "plan.svg")
+    for name in ("plan.png", "plan.svg", "plan.pdf"):
+        preview(read, environment, report, tmp_path / name)
+        first = (tmp_path / name).read_bytes()
+        preview(read, environment, report, tmp_path / name)
+        assert (tmp_path / name).read_bytes() == first
+    preview(read, environment, report, tmp_path / "plan.png", theme="dark")
+    with Image.open(tmp_path / "plan.png") as picture:
+        assert picture.getpixel((2, 2))[:3] == DARK.background
+    with pytest.raises(ParameterError, match=r"suffix '.bmp', but .png, .svg or .pdf was wanted"):
+        preview(read, environment, report, tmp_path / "plan.bmp")
+    with pytest.raises(OutputError, match="there is no folder"):
+        preview(read, environment, report, tmp_path / "none" / "plan.png")

@@ -1,0 +1,173 @@
+"""Circles and walls of drawings: they stay where nothing speaks against it, and what is free stays free."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from shapely import MultiPolygon, Polygon, box
+
+from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, WallObstacle
+from robocov_app.formats import ReadOptions, import_map
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.shaping import Shaping, shaped
+
+ROOM = box(0, 0, 20, 16)
+ARC = tuple((10 + 4 * math.cos(k / 100), 5 + 4 * math.sin(k / 100)) for k in range(314))
+
+_POINT = st.tuples(*(st.floats(0.0, far).map(lambda value: round(value, 3)) for far in (20.0, 16.0)))
+_CIRCLE = st.builds(CircleObstacle, _POINT, st.floats(0.05, 2.0))
+_WALL = st.builds(
+    WallObstacle, st.lists(_POINT, min_size=2, max_size=4, unique=True).map(tuple), st.floats(0.05, 0.6)
+)
+_BLOCK = st.builds(
+    lambda at, width, height: box(*at, at[0] + width, at[1] + height),
+    _POINT,
+    st.floats(0.1, 3.0),
+    st.floats(0.1, 3.0),
+)
+
+
+def drawn(primitives: list[Any], blocks: list[Polygon]) -> ForeignMap:
+    solid = shapely.union_all([*blocks, *(one.polygon for one in primitives)])
+    free = MultiPolygon([p for p in shapely.get_parts(ROOM - solid).tolist() if p.area > 0])
+    return ForeignMap("plan", "", "test", free, boundary=ROOM, primitives=tuple(primitives))
+
+
+def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment:
+    return shaped(drawn(primitives, list(blocks)), Shaping(**shaping), "plan")[0]
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.lists(_CIRCLE, max_size=5),
+    st.lists(_WALL, max_size=5),
+    st.lists(_BLOCK, max_size=3),
+    st.sampled_from([0.0, 0.02, 0.2]),
+)
+def test_free_space_stays(
+    circles: list[CircleObstacle], walls: list[WallObstacle], blocks: list[Polygon], tolerance: float
+) -> None:
+    foreign = drawn([*circles, *walls], blocks)
+    parts = sorted(foreign.free.geoms, key=lambda part: -part.area)
+    if not parts or not shapely.maximum_inscribed_circle(parts[0], tolerance=0.01).length > 0.5:
+        return
+    environment, report = shaped(foreign, Shaping(simplify=tolerance), "plan")
+    apart = shapely.symmetric_difference(environment.free, parts[0])
+    # twice: what was drawn may have moved, and so may the primitives from where it was drawn
+    assert apart.area <= 2 * (tolerance + 2e-4) * parts[0].length
+    assert report.obstacles == len(environment.obstacles)
+    others = [*blocks, *(one.polygon for one in (*circles, *walls))]
+    for circle in circles:
+        # what is nearer than that may be drawn over the circle
+        alone = sum(shapely.dwithin(circle.polygon, other, 1e-3 + tolerance) for other in others) == 1
+        if alone and parts[0].buffer(1e-9).covers(circle.polygon.exterior) and circle.radius > 2 * tolerance:
+            near = [o for o in environment.obstacles if isinstance(o, CircleObstacle)]
+            assert any(abs(o.radius - circle.radius) < 1e-3 for o in near)
+
+
+def test_each_is_kept_with_its_name_and_the_rest_are_polygons() -> None:
+    pillar = CircleObstacle((4.0, 4.0), 0.5, "pillar")
+    wall = WallObstacle(((10.0, -1.0), (10.0, 6.0), (12.0, 6.0)), 0.2, "wall")
+    environment = made([pillar, wall], box(15, 10, 17, 12))
+    assert environment.obstacles[1:] == (pillar, wall)
+    assert isinstance(environment.obstacles[0], PolygonObstacle)
+    assert environment.free_area == pytest.approx(320 - 4 - pillar.polygon.area - 1.6)
+
+
+@pytest.mark.parametrize(
+    ("primitives", "blocks"),
+    [
+        pytest.param([CircleObstacle((4, 4), 0.5)], [box(4, 3.8, 6, 4.2)], id="a part of something else"),
+        pytest.param([CircleObstacle((4, 4), 0.5)], [box(3, 3, 5, 5)], id="within something else"),
+        pytest.param(
+            [WallObstacle(((2, 4), (6, 4)), 0.2)], [box(1.975, 3.875, 6.025, 4.125)], id="a little larger"
+        ),
+        pytest.param([WallObstacle(ARC, 0.2)], [], id="of more points than the polygon has"),
+        pytest.param([CircleObstacle((4, 4), 1)], [box(4, 3.98, 5.4, 4.02)], id="with a thin spike"),
+        pytest.param(
+            [WallObstacle(((4, 4), (8, 4), (8, 8), (4, 8), (4, 4)), 0.2)], [], id="around what is cut off"
+        ),
+    ],
+)
+def test_what_is_more_than_primitives_stays_a_polygon(
+    primitives: list[Obstacle], blocks: list[Polygon]
+) -> None:
+    environment = made(primitives, *blocks)
+    assert all(isinstance(one, PolygonObstacle) for one in environment.obstacles)
+
+
+def test_a_circle_whose_rounded_twin_has_more_sides() -> None:
+    circle = CircleObstacle((4.0, 4.0), 0.50676)
+    assert len(circle.polygon.exterior.coords) != len(CircleObstacle((4, 4), 0.5068).polygon.exterior.coords)
+    assert made([circle], simplify=0.0).obstacles == (CircleObstacle((4.0, 4.0), 0.5068),)
+
+
+def test_what_was_filled_among_several_stays_filled() -> None:
+    # below the wall a wedge is cut off, so flat that both are as good within the tolerance
+    circles = [CircleObstacle((1.0, 2.0), 1.0), CircleObstacle((3.0, 0.0), 1.0)]
+    environment = made([*circles, WallObstacle(((0, 0), (3, 1)), 0.5)], simplify=0.2)
+    assert len(environment.free.geoms) == 1
+    assert [one for one in environment.obstacles if isinstance(one, CircleObstacle)] == circles[:1]
+
+
+# fmt: off
+DXF = [
+    *(0, "SECTION", 2, "HEADER", 9, "$ACADVER", 1, "AC1015", 9, "$INSUNITS", 70, 6, 0, "ENDSEC", 0,
+        "SECTION", 2, "ENTITIES"),
+    *(0, "LWPOLYLINE", 100, "AcDbEntity", 8, "boundary", 100, "AcDbPolyline", 90, 4, 70, 1, 10, 0, 20, 0,
+        10, 9, 20, 0, 10, 9, 20, 6, 10, 0, 20, 6),
+    *(0, "CIRCLE", 8, "pillars", 10, 3, 20, 3, 40, 0.5),
+    *(0, "LINE", 8, "walls", 10, 5, 20, 0, 11, 5, 21, 2.5),
+    *(0, "LWPOLYLINE", 100, "AcDbEntity", 8, "walls", 100, "AcDbPolyline", 43, 0.3, 90, 3, 70, 0, 10, 7,
+        20, 2, 10, 8, 20, 2, 10, 8, 20, 5),
+    *(0, "ENDSEC", 0, "EOF"),
+]
+# fmt: on
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 6"><rect id="boundary" width="9" height="6"/>
+<circle id="pillars" cx="3" cy="3" r="0.5"/><path id="walls" d="M5 6V3.5" stroke="#000" stroke-width=".1"/>
+<polyline id="walls" points="7,4 8,4 8,1" fill="none" stroke="#000" stroke-width=".3"/>
+<line x1="1" y1="1" x2="2" y2="1" stroke="#000" stroke-width=".2" stroke-linecap="square"/>
+<line x1="1" y1="2" x2="2" y2="2" stroke="#000" stroke-width=".2" stroke-linecap="round"/></svg>"""
+GEOJSON = {
+    "type": "GeometryCollection",
+    "geometries": [
+        {"type": "Polygon", "coordinates": [[[0, 0], [9, 0], [9, 6], [0, 6], [0, 0]]]},
+        {"type": "Point", "coordinates": [3, 3]},
+        {"type": "LineString", "coordinates": [[5, 0], [5, 2.5]]},
+    ],
+}
+WKT = "POLYGON ((0 0, 9 0, 9 6, 0 6, 0 0))\nPOINT (3 3)\nLINESTRING (5 0, 5 2.5)"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "options", "named", "others"),
+    [
+        ("plan.dxf", "\n".join(map(str, DXF)) + "\n", {}, True, 1),
+        ("plan.svg", SVG, {"scale": 1.0}, True, 3),
+        ("plan.geojson", json.dumps(GEOJSON), {"pillar": 0.5, "units": "metres"}, False, 0),
+        ("plan.wkt", WKT, {"pillar": 0.5}, False, 0),
+    ],
+    ids=["dxf", "svg", "geojson", "wkt"],
+)
+def test_what_a_file_draws_stays(
+    tmp_path: Path, name: str, text: str, options: dict[str, Any], named: bool, others: int
+) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    environment, _, _ = import_map(path, options=ReadOptions(**options))
+    circle = CircleObstacle((3.0, 3.0), 0.5, "pillars" if named else None)
+    wall = WallObstacle(((5.0, 0.0), (5.0, 2.5)), 0.1, "walls" if named else None)
+    assert circle in environment.obstacles
+    found = [one for one in environment.obstacles if isinstance(one, WallObstacle)]
+    assert wall in found or WallObstacle(wall.points[::-1], 0.1, wall.name) in found
+    assert len(environment.obstacles) == 2 + others
+    if others:
+        assert any(one.width == 0.3 and len(one.points) == 3 for one in found)
+    if name == "plan.svg":  # a square end reaches on; a round one is no wall's
+        assert WallObstacle(((0.9, 5.0), (2.1, 5.0)), 0.2) in found
+        assert sum(isinstance(one, PolygonObstacle) for one in environment.obstacles) == 1

@@ -1,0 +1,97 @@
+"""Lists of rings, nested and flat."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from shapely import Polygon, box
+from vector_files import read, square
+
+from robocov.errors import MapError
+from robocov_app.formats import IMPORTERS, ReadOptions, detect
+
+HALL = [square(0, 0, 20, 10), square(1, 1, 2, 2), square(5, 5, 1, 1)]
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        HALL,
+        [HALL],
+        [ring[:-1] for ring in HALL],
+        {
+            "vertices": [n for ring in HALL for point in ring for n in point],
+            "holes": [5, 10],
+            "dimensions": 2,
+        },
+        {
+            "vertices": [n for ring in HALL for point in ring for n in [*point, 3.0]],
+            "holes": [5, 10],
+            "dimensions": 3,
+        },
+    ],
+    ids=["rings", "polygons", "open", "flat", "flat with heights"],
+)
+def test_the_first_ring_is_the_outline(tmp_path: Path, document: Any) -> None:
+    foreign = read(tmp_path, "rings", document)
+    assert foreign.free.equals(Polygon(HALL[0], HALL[1:]))
+    assert foreign.notes[0] == "a unit is 1 m (the file says none; --scale)"
+    assert foreign.dropped == (
+        ("15 third coordinates, z from 3 to 3",)
+        if "dimensions" in document and document["dimensions"] == 3
+        else ()
+    )
+    assert detect(tmp_path / "plan.json").name == "rings"
+
+
+def test_one_ring_alone(tmp_path: Path) -> None:
+    for document in (HALL[0], [n for point in HALL[0] for n in point]):
+        foreign = read(tmp_path, "rings", document, scale=0.1)
+        assert foreign.free.equals(box(0, 0, 2, 1))
+        assert foreign.notes[0] == "a unit is 0.1 m"
+
+
+def test_several_polygons_are_free_together(tmp_path: Path) -> None:
+    assert read(tmp_path, "rings", [HALL, [square(20, 0, 5, 5)]]).free.area == pytest.approx(195 + 25)
+
+
+def test_a_hole_that_sticks_out_and_meets_itself(tmp_path: Path) -> None:
+    bad = [square(0, 0, 20, 10), [[15, 2], [25, 4], [25, 2], [15, 4]]]
+    foreign = read(tmp_path, "rings", bad)
+    # of the bow tie of two triangles of 5 m² the left one is in the outline
+    assert foreign.free.area == pytest.approx(195.0)
+    assert foreign.repaired[0].startswith("the outline met itself: polygon 1: Self-intersection")
+
+
+@pytest.mark.parametrize(
+    ("document", "wanted"),
+    [
+        ([], "[], but a list of rings"),
+        ([[]], "[[]], but at least 3 times 2 numbers"),
+        ("hall", '"hall", but a list of rings'),
+        ([HALL[0], 7], "[1]: 7, but a list of at least 1 point"),
+        ([[[0, 0], [1, 0], [1]]], "[0][2]: [1], but a point"),
+        ([[[0, 0], [1, 0], [1, None]]], "[0][2]: [1, null], but a point"),
+        ([0, 0, 1, 0, 1], "but at least 3 times 2 numbers"),
+        ([0, 0, 1, 0, 1, "1"], '[2]: [1, "1"], but a point'),
+        (
+            {"vertices": [0, 0, 1, 0, 1, 1], "holes": [4]},
+            "holes: [4], but growing indices of vertices, from 1 to 2",
+        ),
+        ({"vertices": [0, 0, 1, 0, 1, 1], "holes": [2, 1]}, "holes: [2, 1], but growing indices"),
+        ({"vertices": [0, 0, 1, 0, 1, 1], "holes": [True]}, "holes: [true], but growing indices"),
+        ({"vertices": [0, 0, 1, 0, 1, 1], "dimensions": 4}, "dimensions: 4, but 2 or 3"),
+        ({"vertices": 3}, "vertices: 3, but at least 3 times 2 numbers"),
+        ([[[[[0, 0]]]]], "but a list of rings"),
+        ([[[0, 0], [1, 1], [2, 2]]], "1 outline without an area"),
+    ],
+)
+def test_what_is_none_is_refused(tmp_path: Path, document: Any, wanted: str) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(MapError) as caught:
+        IMPORTERS["rings"].read(path, ReadOptions())
+    assert str(caught.value).startswith(str(path))
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)

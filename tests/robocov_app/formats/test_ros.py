@@ -1,0 +1,289 @@
+"""ROS maps: what a pixel means in each mode, where the map lies, and what is refused."""
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, drawn, pgm, ros_map
+from shapely import MultiPolygon
+
+from robocov.errors import MapError, ParameterError
+from robocov_app.formats import ReadOptions, Shaping, detect, import_map
+from robocov_app.formats.picture import Brightness
+from robocov_app.formats.ros import IMPORTER, _raw, _scale, _trinary
+
+ROOMS = shapely.box(2, 2, 8, 8) | shapely.box(9, 2, 14, 8) | shapely.box(8, 4, 9, 6)
+"""The free space of `PLAN`, in cells."""
+
+
+def read(path: Path, **options: object) -> MultiPolygon:
+    return IMPORTER.read(path, ReadOptions(**options)).free  # type: ignore[arg-type]
+
+
+def test_a_map_is_read_where_it_lies(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN), origin=[-1.5, 2.0, 0.0])
+    assert detect(path) is IMPORTER
+    foreign = IMPORTER.read(path, ReadOptions())
+    wanted = shapely.transform(ROOMS, lambda p: p * 0.25 + (-1.5, 2.0))
+    assert shapely.equals(foreign.free, wanted)
+    assert (foreign.name, foreign.cell, foreign.vertices_read) == ("plan", 0.25, 12)
+    assert foreign.notes == (
+        "16 x 10 cells of 0.25 m: 42.5 % free, 27.5 % blocked, 30 % unknown, taken as obstacles",
+    )
+
+
+def test_the_top_row_of_the_picture_is_the_highest(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn("..#\n###\n###"), resolution=1.0)
+    assert shapely.equals(read(path), shapely.box(0, 2, 2, 3))
+
+
+def test_yaw_turns_the_map_about_its_lower_left_corner(tmp_path: Path) -> None:
+    pixels = drawn("...\n.##")
+    straight = read(ros_map(tmp_path, pixels, resolution=1.0, origin="[1, 2, 0]"))
+    turned = read(ros_map(tmp_path, pixels, "turned", resolution=1.0, origin=f"[1, 2, {math.pi / 2!r}]"))
+    wanted = shapely.affinity.rotate(straight, 90, origin=(1, 2))
+    assert shapely.equals_exact(turned.normalize(), wanted.normalize(), 1e-9)
+    slanted = ros_map(tmp_path, np.full((30, 40), FREE, np.uint8), "slanted", origin="[0, 0, 0.5]")
+    environment, report, _ = import_map(slanted)
+    assert report.vertices_kept == 4
+    assert environment.free_area == pytest.approx(75, abs=0.01)
+    assert (0.0, 0.0) in environment.boundary
+
+
+def test_unknown_cells(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN), resolution=1.0)
+    assert read(path).area == 68
+    assert read(path, unknown="free").area == 68 + 48
+    foreign = IMPORTER.read(path, ReadOptions(unknown="cut"))
+    assert shapely.equals(foreign.free, ROOMS)
+    assert foreign.boundary is not None
+    # two cells around what is known, which has a side of 14 x 8
+    assert shapely.equals(foreign.boundary, shapely.box(-1, -1, 17, 11))
+
+
+def test_of_a_cut_map_the_island_with_most_free_space_stays(tmp_path: Path) -> None:
+    pixels = drawn("...????\n...????\n???????\n?????..")
+    foreign = IMPORTER.read(ros_map(tmp_path, pixels, resolution=1.0), ReadOptions(unknown="cut"))
+    assert shapely.equals(foreign.free, shapely.box(0, 2, 3, 4))
+    assert foreign.dropped == ("2 m² of free space on other islands of known cells",)
+
+
+def occupancy(level: int, mode: str, negate: bool, low: float, high: float, alpha: int) -> int:
+    """Return what map_server makes of a grey pixel, -1 to 100, word for word as it is documented."""
+    if mode == "raw":
+        return level if level <= 100 else -1
+    x = (3 * level + alpha) / 4 if mode == "trinary" and alpha >= 0 else level
+    p = x / 255 if negate else (255 - x) / 255
+    if mode == "scale" and 0 <= alpha < 255:
+        return -1
+    if p > high:
+        return 100
+    if p < low:
+        return 0
+    return -1 if mode == "trinary" else round(100 * (p - low) / (high - low))
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.sampled_from(["trinary", "scale", "raw"]), st.booleans(), st.booleans(),
+    st.floats(0, 1), st.floats(0, 1), st.integers(0, 255),
+)  # fmt: skip
+def test_every_pixel_means_what_map_server_says(
+    mode: str, negate: bool, with_alpha: bool, one: float, other: float, opacity: int
+) -> None:
+    low, high = sorted((one, other))
+    if high - low < 1e-6:
+        high = low + 1e-6
+    level = np.arange(256, dtype=np.uint8)[None]
+    alpha = np.full((1, 256), opacity, np.uint8) if with_alpha else None
+    picture = Brightness(level, 255, alpha)
+    if mode == "trinary":
+        cells = _trinary(picture, negate, low, high)
+    elif mode == "scale":
+        cells = _scale(picture, negate, low, high, 0.5)
+    else:
+        cells = _raw(picture, 0.5)
+    for value in range(256):
+        wanted = occupancy(value, mode, negate, low, high, opacity if with_alpha else -1)
+        kind = 2 if wanted < 0 else int(wanted >= 50)
+        near = mode != "raw" and any(
+            abs(x - t) < 1e-9 for x in ((255 - value) / 255, value / 255) for t in (low, high)
+        )
+        assert near or cells[0, value] == kind, (value, wanted)
+
+
+def test_colours_count_as_their_mean(tmp_path: Path) -> None:
+    colours = np.zeros((4, 4, 3), dtype=np.uint8)
+    colours[:, :2] = (255, 255, 200)  # mean 237: dark by 0.07
+    colours[:, 2] = (255, 0, 0)  # dark by 0.67
+    colours[:, 3] = (255, 100, 100)  # dark by 0.4: unknown
+    Image.fromarray(colours).save(tmp_path / "plan.png")
+    path = ros_map(tmp_path, b"", image="plan.png", resolution=1.0)
+    assert shapely.equals(read(path), shapely.box(0, 0, 2, 4))
+    assert shapely.equals(read(path, unknown="free"), shapely.box(0, 0, 2, 4) | shapely.box(3, 0, 4, 4))
+
+
+def test_the_threshold_of_scale_and_raw(tmp_path: Path) -> None:
+    levels = np.array([[0, 30, 49, 50, 100, 101, 255]], dtype=np.uint8)
+    path = ros_map(tmp_path, levels, mode="raw", resolution=1.0)
+    assert shapely.equals(read(path), shapely.box(0, 0, 3, 1))
+    assert shapely.equals(read(path, threshold=0.2), shapely.box(0, 0, 1, 1))
+    assert shapely.equals(read(path, threshold=1.0), shapely.box(0, 0, 4, 1))
+    assert shapely.equals(
+        read(path, unknown="free", threshold=0.5), shapely.box(0, 0, 3, 1) | shapely.box(5, 0, 7, 1)
+    )
+    # what is free for sure is free, whatever the threshold
+    assert shapely.equals(read(path, threshold=0.0), shapely.box(0, 0, 1, 1))
+
+
+def test_16_bits(tmp_path: Path) -> None:
+    deep = np.array([[65535, 65535, 52685, 0]])
+    path = ros_map(tmp_path, pgm(deep, 65535), resolution=1.0)
+    assert shapely.equals(read(path), shapely.box(0, 0, 2, 1))
+    assert "25 % unknown" in IMPORTER.read(path, ReadOptions()).notes[-1]
+
+
+def test_what_is_worth_a_word(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN), free_thresh=0.25, occupied_thresh=None, frame="map")
+    environment, report, _ = import_map(path, shaping=Shaping(radius=0.1))
+    assert report.repaired == ("occupied_thresh is missing, 0.65 taken",)
+    assert report.notes[0] == "frame: no key of map_server, not looked at"
+    assert report.notes[1] == (
+        "48 cells have the value 205, which is saved for unknown cells, and are free by free_thresh 0.25"
+    )
+    assert environment.free_area > 0
+
+
+def test_single_cells_are_noise_unless_somebody_says_no(tmp_path: Path) -> None:
+    pixels = np.full((60, 60), FREE, np.uint8)
+    pixels[10, 10] = OCCUPIED
+    pixels[20, 30] = UNKNOWN
+    pixels[40, 40:42] = OCCUPIED
+    path = ros_map(tmp_path, pixels, resolution=0.05)
+    environment, report, _ = import_map(path)
+    assert len(environment.obstacles) == 1
+    assert report.dropped == (
+        "2 obstacles smaller than 0.00375 m², 0.005 m² together (--specks 0 keeps them)",
+    )
+    assert len(import_map(path, shaping=Shaping(specks=0.0))[0].obstacles) == 3
+    assert len(import_map(path, shaping=Shaping(specks=0.01))[0].obstacles) == 0
+
+
+def test_line_ends_marks_and_comments_do_no_harm(tmp_path: Path) -> None:
+    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN), head="# CREATOR: map_saver.cpp 0.250 m/pix\n"))
+    text = (
+        "# saved\r\nimage: plan.pgm\r\nresolution: 2.5e-1\r\norigin: [-1.0, -2.0, 0.0]\r\nnegate: 0\r\n\r\n"
+        "occupied_thresh: 0.65\r\nfree_thresh: 0.196\r\n"
+    )
+    path = tmp_path / "crlf.yaml"
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert read(path).bounds == (-0.5, -1.5, 2.5, 0.0)
+
+
+def test_the_picture_is_looked_for_beside_the_file_and_nowhere_else(tmp_path: Path) -> None:
+    maps = tmp_path / "maps"
+    (maps / "pictures").mkdir(parents=True)
+    (maps / "pictures" / "a.pgm").write_bytes(pgm(drawn(PLAN)))
+    (tmp_path / "secret.pgm").write_bytes(pgm(drawn(PLAN)))
+    assert read(ros_map(maps, b"", image="pictures/a.pgm")).area > 0
+    assert read(ros_map(maps, b"", image="./pictures/../pictures/a.pgm")).area > 0
+    (maps / "link.pgm").symlink_to(tmp_path / "secret.pgm")
+    (maps / "away").symlink_to(tmp_path)
+    (maps / "secret.pgm").symlink_to(tmp_path / "secret.pgm")
+    for image in ("../secret.pgm", str(tmp_path / "secret.pgm"), "link.pgm", "away/secret.pgm", "secret.pgm"):
+        path = ros_map(maps, b"", image=image)
+        with pytest.raises(MapError, match=r"outside of the file's folder.*\(--anywhere allows it\)"):
+            read(path)
+        assert read(path, anywhere=True).area > 0
+    # a link to the whole folder is no way out of it
+    (tmp_path / "linked").symlink_to(maps)
+    assert read(ros_map(tmp_path / "linked", b"", image="pictures/a.pgm")).area > 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/home/somebody/maps/plan.pgm",
+        "../maps/plan.pgm",
+        "maps/plan.pgm",
+        r"C:\maps\plan.pgm",
+        r"..\plan.pgm",
+    ],
+)
+def test_a_picture_that_is_not_there_is_taken_from_beside_the_file(tmp_path: Path, name: str) -> None:
+    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN)))
+    foreign = IMPORTER.read(ros_map(tmp_path, b"", "a", image=name), ReadOptions())
+    assert foreign.free.area > 0
+    assert foreign.repaired == (f"image: {name!r} is not there, 'plan.pgm' beside the file taken",)
+
+
+@pytest.mark.parametrize(
+    ("keys", "wanted"),
+    [
+        ({"image": "none.pgm"}, "none.pgm: no such file"),
+        ({"image": "''"}, "image: empty"),
+        ({"image": "[a, b]"}, "image: ['a', 'b'], but one value"),
+        ({"image": "."}, "is a folder"),
+        ({"image": "x" * 300}, "image: 'xxx"),
+        ({"image": "x/" * 2000}, "4000 characters, but a shorter name was wanted"),
+        ({"image": '"a\\0b"'}, "image: 'a\\x00b'"),
+        ({"image": "pipe"}, "is a pipe or a device"),
+        ({"resolution": None}, "resolution: missing"),
+        ({"resolution": "nan"}, "resolution: 'nan', but a number"),
+        ({"resolution": ".nan"}, "resolution: '.nan', but a number"),
+        ({"resolution": "inf"}, "resolution: 'inf', but a number"),
+        ({"resolution": -0.05}, "resolution: -0.05, but a number from 0.0001 to 1000 (m)"),
+        ({"resolution": 0}, "resolution: 0.0, but a number"),
+        ({"resolution": 1e-9}, "resolution: 1e-09, but a number"),
+        ({"resolution": "{a: 1}"}, "resolution: {'a': '1'}, but one value"),
+        ({"origin": "[1, 2, nan]"}, "origin[2]: 'nan'"),
+        ({"origin": "[1, 1e30, 0]"}, "origin[1]: 1e+30"),
+        ({"origin": "[1]"}, "origin: ['1'], but [x, y, yaw]"),
+        ({"origin": "[[1, 2], 0]"}, "origin[0]: ['1', '2'], but a number"),
+        ({"origin": 5}, "origin: '5', but [x, y, yaw]"),
+        ({"negate": 2}, "negate: '2', but 0 or 1"),
+        ({"free_thresh": 0.9}, "free_thresh, occupied_thresh: 0.9, 0.65"),
+        ({"free_thresh": -1}, "free_thresh, occupied_thresh: -1, 0.65"),
+        ({"occupied_thresh": "much"}, "occupied_thresh: 'much', but a number"),
+        ({"mode": "quaternary"}, "mode: 'quaternary', but one of trinary, scale, raw"),
+        ({"mode": "!!str raw"}, "the tag 'tag:yaml.org,2002:str'"),
+    ],
+)
+def test_what_is_refused(tmp_path: Path, keys: dict[str, object], wanted: str) -> None:
+    (tmp_path / "plan.pgm").write_bytes(pgm(drawn(PLAN)))
+    os.mkfifo(tmp_path / "pipe")
+    keys = {"image": "plan.pgm"} | keys
+    path = ros_map(tmp_path, b"", **keys)  # type: ignore[arg-type]
+    with pytest.raises(MapError) as caught:
+        IMPORTER.read(path, ReadOptions())
+    assert wanted in str(caught.value)
+    assert len(str(caught.value)) < 700
+    assert str(caught.value).startswith(str(tmp_path))
+    assert "\n" not in str(caught.value)
+
+
+def test_nothing_free(tmp_path: Path) -> None:
+    with pytest.raises(
+        MapError, match=r"no cell is free, but some were wanted \(--unknown free takes unknown"
+    ):
+        read(ros_map(tmp_path, drawn("##\n??")))
+    with pytest.raises(MapError, match=r"no cell is free, but some were wanted$"):
+        read(ros_map(tmp_path, drawn("##\n##")))
+
+
+def test_options_of_other_formats(tmp_path: Path) -> None:
+    path = ros_map(tmp_path, drawn(PLAN))
+    with pytest.raises(
+        ParameterError, match="--trees: no option of the format ros, whose options are: --anywhere, --"
+    ):
+        import_map(path, options=ReadOptions(trees="free"))
+    with pytest.raises(ParameterError, match=r"--threshold: of no use here: .*plan\.yaml is of mode trinary"):
+        import_map(path, options=ReadOptions(threshold=0.4))
+    with pytest.raises(ParameterError, match="unknown format 'rose': did you mean 'ros'"):
+        import_map(path, format="rose")

@@ -1,0 +1,338 @@
+"""From foreign free space to a map: what stays, what goes, what is said, and that it can be saved."""
+
+import math
+from typing import Any
+
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import MultiPolygon, Polygon, box
+
+from robocov.environment import DiscStart, UniformStart
+from robocov.errors import MapError, ParameterError
+from robocov.mapfile import from_json, to_json
+from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.enclosing import bounded, rounded
+from robocov_app.formats.geometry.passages import roomiest
+from robocov_app.formats.geometry.shaping import Shaping, shaped
+
+ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
+CLOSET = box(20, 0, 23, 3)
+
+
+def foreign(*free: Polygon, **others: Any) -> ForeignMap:
+    given = {"name": "plan", "description": "A plan.", "format": "test", "vertices_read": 12} | others
+    return ForeignMap(free=MultiPolygon(list(free)), **given)
+
+
+def lines(report: Any) -> str:
+    return "\n".join(report.lines())
+
+
+def test_the_largest_part_and_its_obstacles() -> None:
+    environment, report = shaped(foreign(CLOSET, ROOM), Shaping(), "plan.wkt")
+    assert (environment.name, environment.description) == ("plan", "A plan.")
+    assert environment.boundary == ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0), (0.0, 8.0))
+    assert [shape.polygon.area for shape in environment.obstacles] == pytest.approx([4, 0.0025])
+    assert report.dropped == ("1 separate part of the free space, 9 m²",)
+    assert (report.area_read, report.area_kept) == (pytest.approx(84.9975), pytest.approx(75.9975))
+    assert (report.size, report.obstacles, report.vertices_kept) == ((10.0, 8.0), 2, 12)
+    assert lines(report).splitlines()[:2] == [
+        "test: 12 vertices read, 12 kept; free area 85 m² read, 76 m² kept",
+        "10 x 8 m, 2 obstacles",
+    ]
+    assert report.to_dict()["size_m"] == [10.0, 8.0]
+
+
+def test_the_part_around_a_place() -> None:
+    track = box(30, 0, 60, 20) - box(32, 2, 58, 18)
+    whole = foreign(ROOM, CLOSET, track, boundary=box(-1, -1, 61, 21))
+    environment, report = shaped(whole, Shaping(inside=(21.0, 1.0)), "plan")
+    # the boundary is around all of the file, and not around this part
+    assert environment.boundary_polygon.equals(CLOSET)
+    (note,) = report.notes
+    assert note.startswith("only 3.3 % of the free area stays: --inside ")
+    assert note.endswith("keeps another part, --keep all every part")
+    assert len(report.others) == 2
+    for x, y in report.others:
+        assert f"--inside {x:g} {y:g} (" in note
+        assert shaped(whole, Shaping(inside=(x, y)), "plan")[1].area_kept > 50
+    wanted = r"plan: inside: 45 10 is solid, .*; 31 \S+ is one in the nearest part, 8 m away"
+    with pytest.raises(MapError, match=wanted):
+        shaped(whole, Shaping(inside=(45.0, 10.0)), "plan")
+
+
+def test_a_word_where_a_considerable_part_is_left_out() -> None:
+    _, report = shaped(foreign(CLOSET, ROOM), Shaping(), "plan")
+    assert report.notes[0].startswith(
+        "89 % of the free area stays: --inside 21.5 1.5 (9 m²) keeps another part"
+    )
+    assert shaped(foreign(box(20, 0, 22, 3), ROOM), Shaping(), "plan")[1].notes == ()
+    assert "stays" not in lines(shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")[1])
+
+
+@pytest.mark.parametrize("tiny", [1e-320, -1e-310, 1e-160])
+def test_what_is_all_but_zero_is_zero(tiny: float) -> None:
+    environment, _ = shaped(foreign(Polygon([(0, 0), (6, 7), (0, 7), (0, tiny)])), Shaping(), "plan")
+    assert sorted(environment.boundary) == [(0, 0), (0, 7), (6, 7)]
+
+
+def test_all_parts_lie_in_their_convex_hull() -> None:
+    environment, report = shaped(foreign(CLOSET, ROOM), Shaping(keep="all"), "plan")
+    assert environment.free_area == pytest.approx(ROOM.area + 9)
+    assert len(environment.free.geoms) == 2
+    assert environment.boundary_polygon.equals(shapely.union(ROOM, CLOSET).convex_hull)
+    assert "note: the free space is of 2 separate parts: robots cannot pass between them" in report.lines()
+
+
+def test_specks() -> None:
+    environment, report = shaped(foreign(ROOM), Shaping(specks=0.01), "plan")
+    assert len(environment.obstacles) == 1
+    assert report.dropped == ("1 obstacle smaller than 0.01 m², 0.0025 m² (--specks 0 keeps them)",)
+    parts = [box(20 + k, 0, 20.05 + k, 0.05) for k in range(3)]
+    environment, _ = shaped(foreign(ROOM, *parts), Shaping(specks=0.01, keep="all"), "plan")
+    assert len(environment.free.geoms) == 1
+    many = ROOM
+    for k in range(12):
+        many -= box(2 + k / 4, 7, 2.04 + k / 4, 7.04)
+    _, report = shaped(foreign(many), Shaping(), "plan")
+    assert report.notes == ("13 obstacles are smaller than 0.01 m² (--specks 0.01 drops them)",)
+    crumb = ROOM - box(7, 7, 7.001, 7.02)
+    environment, report = shaped(foreign(crumb), Shaping(), "plan")
+    assert len(environment.obstacles) == 2
+    assert report.dropped == ("1 hole of 2e-05 m², which come of rounding",)
+
+
+def test_what_a_format_takes_for_noise() -> None:
+    noisy = foreign(ROOM, specks=0.003)
+    assert len(shaped(noisy, Shaping(), "plan")[0].obstacles) == 1
+    assert len(shaped(noisy, Shaping(specks=0.0), "plan")[0].obstacles) == 2
+
+
+def test_hull_and_margin() -> None:
+    corner = box(0, 0, 10, 8) - box(5, 4, 10, 8)
+    environment, _ = shaped(foreign(corner), Shaping(hull=True), "plan")
+    assert environment.boundary_polygon.equals(corner.convex_hull)
+    assert environment.free.equals(corner)
+    environment, _ = shaped(foreign(corner), Shaping(margin=0.5), "plan")
+    assert environment.boundary_polygon.bounds == (-0.5, -0.5, 10.5, 8.5)
+    assert environment.free.equals(corner)
+    assert len(environment.obstacles) == 1
+    environment, _ = shaped(foreign(corner), Shaping(margin=0.25, hull=True), "plan")
+    assert environment.free.equals(corner)
+    assert environment.region.area == pytest.approx(environment.area)
+
+
+def test_a_boundary_that_is_given() -> None:
+    outer = box(-1, -1, 11, 9)
+    environment, _ = shaped(foreign(ROOM, boundary=outer), Shaping(), "plan")
+    assert environment.boundary_polygon.equals(outer)
+    assert environment.free_area == pytest.approx(ROOM.area)
+    assert [len(shape.holes) for shape in environment.obstacles if hasattr(shape, "holes")] == [1, 0, 0]
+    environment, report = shaped(foreign(ROOM, boundary=box(0, 0, 10, 7)), Shaping(), "plan")
+    assert environment.area == 70
+    assert report.dropped == ("10 m² of free space outside the boundary",)
+    crossed = Polygon([(-1, -1), (11, -1), (11, 9), (-1, 9), (-1, 3), (-2, 4), (-2, 3), (-1, 4)])
+    environment, report = shaped(foreign(ROOM, boundary=crossed), Shaping(), "plan")
+    assert report.repaired[0].startswith("the boundary met itself: self-intersection at [")
+    assert environment.free_area == pytest.approx(ROOM.area)
+
+
+def test_no_slivers_along_a_boundary_that_the_free_space_touches() -> None:
+    # the free space runs along the boundary, and walls of both are straightened a bit differently
+    wavy = [(x / 10, 0.008 * math.sin(x)) for x in range(101)]
+    outer = Polygon([*wavy, (10, 8), (0, 8)])
+    room = outer - box(3, -1, 4, 2) - box(5, 5, 6, 6)
+    environment, _ = shaped(foreign(room, boundary=outer), Shaping(), "plan")
+    assert len(environment.obstacles) == 2
+    assert environment.free_area == pytest.approx(room.area, abs=0.2)
+
+
+def test_outlines_that_meet_themselves() -> None:
+    bow = Polygon([(0, 0), (0, 4), (6, -2), (6, 0)])
+    environment, report = shaped(foreign(bow), Shaping(), "plan")
+    assert environment.area == pytest.approx(8.0)
+    assert report.repaired == ("outlines met themselves or each other: self-intersection at [4, 0]",)
+    assert report.area_read == pytest.approx(10.0)
+    overlapping = foreign(box(0, 0, 4, 4), box(3, 3, 6, 6))
+    environment, report = shaped(overlapping, Shaping(), "plan")
+    assert environment.area == pytest.approx(16 + 9 - 1)
+    assert len(report.repaired) == 1
+
+
+def test_the_starts() -> None:
+    environment, _ = shaped(foreign(ROOM), Shaping(), "plan")
+    assert [type(spec) for spec in environment.starts.values()] == [DiscStart, UniformStart]
+    assert len(environment.start().sample(6)) == 6
+    environment, _ = shaped(foreign(ROOM), Shaping(default_start="uniform"), "plan")
+    assert list(environment.starts) == ["uniform", "room"]
+    narrow, _ = shaped(foreign(box(0, 0, 9, 0.21)), Shaping(), "plan")
+    assert list(narrow.starts) == ["uniform"]
+
+
+def test_cells_larger_than_robots() -> None:
+    _, report = shaped(foreign(ROOM, cell=1.0), Shaping(), "plan")
+    assert report.tolerance == 0.2
+    assert (
+        "cells are larger than robots: walls move by at most 0.2 m, not by one (--simplify 1)" in report.notes
+    )
+    assert shaped(foreign(ROOM, cell=0.05), Shaping(), "plan")[1].tolerance == 0.05
+    assert shaped(foreign(ROOM), Shaping(), "plan")[1].tolerance == 0.02
+    assert shaped(foreign(ROOM), Shaping(simplify=0.0), "plan")[1].tolerance == 0.0
+
+
+def test_where_robots_do_not_get() -> None:
+    rooms = box(0, 0, 4, 4) | box(4, 1, 5, 1.15) | box(5, 0, 7, 4)
+    _, report = shaped(foreign(rooms), Shaping(), "plan")
+    (note,) = report.notes
+    assert note.startswith("1 place of 6.8")
+    assert note.endswith("m² no robot of radius 0.1 m reaches from the largest one")
+    assert shaped(foreign(rooms), Shaping(radius=0.05), "plan")[1].notes == ()
+
+
+@pytest.mark.parametrize(
+    ("parts", "shaping", "wanted"),
+    [
+        ((), {}, "plan: nothing is free, but some free space was wanted"),
+        ((Polygon([(0, 0), (1, 1), (2, 2)]),), {}, "plan: nothing is free"),
+        ((box(0, 0, 9, 0.15),), {}, "(the widest is for one of 0.0735 m): is the scale right?"),
+        ((ROOM,), {"radius": 30.0}, "plan: no place is wide enough for a robot of radius 30 m"),
+        ((box(0, 0, 1e-4, 1e-4),), {}, "is the scale right?"),
+        ((box(0, 0, 20_000, 9),), {}, "boundary: 20000 x 9 m, but at most 10 km"),
+        ((box(0, 0, 1, 1),), {"keep": "all", "specks": 5.0}, "larger than 1 m², but one of at least 5 m²"),
+        ((Polygon([(0, 0), (math.inf, 0), (1, 1)]),), {}, "a coordinate is not finite"),
+    ],
+    ids=map(str, range(99)),
+)  # fmt: skip
+def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wanted: str) -> None:
+    with pytest.raises(MapError) as caught:
+        shaped(foreign(*parts), Shaping(**shaping), "plan")
+    assert wanted in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        ({"simplify": -1.0}, r"simplify: -1\.0, but a number from 0 to 10 \(m\)"),
+        ({"simplify": math.nan}, "simplify: nan"),
+        ({"specks": math.inf}, "specks: inf"),
+        ({"margin": 200.0}, "margin: 200"),
+        ({"radius": 0.0}, "radius: 0"),
+        ({"keep": "some"}, "keep: 'some', but one of largest, all"),
+        ({"inside": (math.nan, 1.0)}, r"inside: \(nan, 1\.0\), but two numbers from -10000000 to"),
+        ({"inside": (0.0, 1.0), "keep": "all"}, "inside: keeps one part of the free space, but keep is all"),
+        ({"default_start": "door"}, "default_start: 'door', but one of room, uniform"),
+    ],
+)
+def test_options_out_of_range(options: dict[str, Any], wanted: str) -> None:
+    with pytest.raises(ParameterError, match=wanted):
+        Shaping(**options)
+
+
+def test_rounding_keeps_polygons_valid() -> None:
+    sharp = Polygon([(0, 0), (1, 0.00004), (2, 0), (2, 1), (1, 0.00006), (0, 1)])
+    for digits in (4, 3, 2):
+        result = rounded(sharp, digits)
+        assert result.is_valid
+        assert result.area == pytest.approx(1.0, abs=0.05)
+    assert "-0" not in rounded(box(-1e-9, 0, 1, 1), 4).wkt
+
+
+def test_a_hole_that_leaves_its_outline_is_rounded_too() -> None:
+    crossed = Polygon(box(0, 0, 9, 9).exterior, [[(-1, 4), (5, 4.00001), (5, 5), (-1, 5)]])
+    assert shapely.equals(rounded(crossed, 4), box(0, 0, 9, 9) - box(0, 4, 5, 5))
+
+
+points = st.tuples(st.integers(0, 40), st.integers(0, 40))
+
+
+@settings(deadline=None, max_examples=80)
+@given(
+    st.lists(st.lists(points, min_size=3, max_size=8), min_size=1, max_size=4),
+    st.sampled_from([0.0, 0.05, 0.5, 3.0]), st.sampled_from(["largest", "all"]),
+    st.booleans(), st.sampled_from([0.0, 0.3]), st.booleans(),
+)  # fmt: skip
+def test_any_rings_make_a_map_or_one_line(
+    rings: list[list[tuple[int, int]]], tolerance: float, keep: Any, hull: bool, margin: float, given: bool
+) -> None:
+    parts = [Polygon([(x / 4, y / 4) for x, y in ring]) for ring in rings]
+    outer = box(1, 1, 9, 9) if given else None
+    shaping = Shaping(simplify=tolerance, keep=keep, hull=hull, margin=margin)
+    try:
+        environment, report = shaped(foreign(*parts, boundary=outer), shaping, "plan")
+    except MapError as error:
+        assert str(error).startswith("plan: ")
+        assert "\n" not in str(error)
+        return
+    assert from_json(to_json(environment)) == environment
+    assert report.area_kept == environment.free_area
+    assert environment.free.is_valid
+    if tolerance == 0.0 and keep == "all":
+        assert report.area_kept == pytest.approx(report.area_read, abs=0.02)
+    if hull or margin:
+        assert environment.boundary_polygon.buffer(1e-3).covers(environment.free)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(points, min_size=3, max_size=9), st.booleans(), st.sampled_from([0.0, 0.4]))
+def test_boundary_and_obstacles_leave_what_was_free(
+    ring: list[tuple[int, int]], hull: bool, margin: float
+) -> None:
+    free = rounded(shapely.make_valid(Polygon(ring)), 4)
+    if free.is_empty:
+        return
+    boundary, solid = bounded(free, None, hull=hull, margin=margin, digits=4)
+    left = shapely.difference(boundary, shapely.union_all(solid))
+    assert shapely.symmetric_difference(left, free).area < 1e-3 * (1 + free.area)
+
+
+def test_by_how_much_walls_moved() -> None:
+    # a bump of 15 mm goes: a triangle of 30 cm² changes sides
+    bumpy = Polygon([(0, 0), (4.8, 0), (5, 0.015), (5.2, 0), (10, 0), (10, 8), (0, 8)])
+    _, report = shaped(foreign(bumpy), Shaping(), "plan")
+    assert (report.moved, report.moved_area) == (pytest.approx(0.015), pytest.approx(0.003))
+    assert report.changed == (
+        "walls moved by at most 0.015 m; 0.003 m² changed sides, 0.0038 % of the free area",
+    )
+    assert (report.to_dict()["moved_m"], report.to_dict()["moved_area_m2"]) == (
+        report.moved,
+        report.moved_area,
+    )
+    _, report = shaped(foreign(bumpy), Shaping(simplify=0.0), "plan")
+    assert (report.changed, report.moved, report.moved_area) == ((), 0.0, 0.0)
+
+
+def test_a_map_of_many_vertices_says_what_that_means() -> None:
+    angle = [k * math.tau / 6000 for k in range(6000)]
+    round_room = Polygon([(20 * math.cos(a), 20 * math.sin(a)) for a in angle])
+    _, report = shaped(foreign(round_room), Shaping(simplify=0.0), "plan")
+    assert report.notes[-1].startswith(
+        "6000 vertices are many: before a run the exact distances among them take"
+    )
+    assert "many" not in lines(shaped(foreign(round_room), Shaping(), "plan")[1])
+
+
+@pytest.mark.parametrize(("most", "wanted"), [("MAX_OBSTACLES", "obstacles"), ("MAX_KEPT", "vertices")])
+def test_a_map_that_takes_too_long_is_refused(
+    monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
+) -> None:
+    monkeypatch.setattr(f"robocov_app.formats.geometry.shaping.{most}", 0)
+    with pytest.raises(MapError, match=rf"plan: \d+ {wanted}, but at most 0 were wanted: --specks AREA"):
+        shaped(foreign(ROOM), Shaping(), "plan")
+
+
+_RECTANGLES = st.tuples(*[st.integers(0, 10)] * 2, *[st.integers(1, 5)] * 2)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(_RECTANGLES, max_size=6))
+def test_the_roomiest_place(blocks: list[tuple[int, int, int, int]]) -> None:
+    solid = shapely.union_all([box(x, y, x + width, y + height) for x, y, width, height in blocks])
+    room = max(shapely.get_parts(box(-1, -1, 16, 16) - solid), key=lambda part: part.area)
+    (x, y), away = roomiest(room, 0.01)
+    assert room.contains(shapely.Point(x, y))
+    assert away == pytest.approx(room.boundary.distance(shapely.Point(x, y)))
+    assert away >= shapely.maximum_inscribed_circle(room, tolerance=0.001).length - 0.0101
+    assert roomiest(room, 0.01, enough=0.5)[1] >= min(0.5, away - 0.01)

@@ -1,0 +1,194 @@
+"""Worlds of Stage: macros, includes, poses, blocks and bitmaps, each as the manual has it."""
+
+from pathlib import Path
+
+import pytest
+import shapely
+from raster_files import drawn, pgm
+from shapely import affinity, box
+
+from robocov.environment import PointsStart
+from robocov.errors import MapError
+from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
+from robocov_app.formats.stage import IMPORTER
+
+
+def read(folder: Path, text: str, **options: object) -> ForeignMap:
+    path = folder / "hall.world"
+    path.write_text(text)
+    assert detect(path) is IMPORTER
+    return IMPORTER.read(path, ReadOptions(**options))  # type: ignore[arg-type]
+
+
+ROOM = """
+define room model ( size [20 10 1] boundary 1
+                    block ( points 3 point[0] [0 0] point[1] [0 5] point[2] [9 5] ) )
+"""
+"""A model whose triangle fills its box, which is the boundary."""
+
+
+def test_a_bitmap_is_scaled_to_the_size_of_its_model(tmp_path: Path) -> None:
+    # the white around the dark is not part of it, and its cells are no squares
+    (tmp_path / "maps").mkdir()
+    rooms = ".........\n.#######.\n.#..#..#.\n.#.....#.\n.#######.\n........."
+    (tmp_path / "maps" / "rooms.pgm").write_bytes(pgm(drawn(rooms)))
+    foreign = read(
+        tmp_path,
+        "define floorplan model ( boundary 1 obstacle_return 0 ranger_return 0.5 )\n"
+        'floorplan ( name "rooms" size [14.000 8.000 0.8] pose [1 2 0 0] bitmap "maps/rooms.pgm" )',
+    )
+    # cells of 2 x 2 m: the box is 14 x 8 m about [1, 2]
+    wanted = (box(-4, 0, 6, 4)) - box(0, 2, 2, 4)
+    assert shapely.equals(foreign.free, wanted)
+    assert (foreign.cell, foreign.vertices_read, foreign.name) == (2.0, 8, "hall")
+    turned = read(
+        tmp_path, 'model ( size [14 16] pose [1 2 0 90] obstacle_return 0 bitmap "maps/rooms.pgm" )'
+    )
+    wanted = affinity.rotate(affinity.scale(wanted, 1, 2, origin=(1, 2)), 90, origin=(1, 2))
+    assert shapely.equals(shapely.set_precision(wanted, 1e-9), turned.free)
+    assert turned.cell == 4.0
+
+
+def test_what_macros_say_is_inherited_and_overridden(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        ROOM
+        + """
+        define thing model ( size [2 1 1] color "red" )
+        define long_thing thing ( size [4 1 1] model ( size [0.5 0.5] pose [0 3 0 0] ) )
+        room ( )
+        thing ( pose [-2 3 0 0] )
+        long_thing ( pose [4 -3 0 90] )
+        """,
+    )
+    solid = box(-10, -5, 10, 5) - foreign.free
+    triangle = shapely.Polygon([(-10, -5), (-10, 5), (10, 5)])
+    # what is in a model lies in its frame
+    inside = [triangle, box(-3, 2.5, -1, 3.5), box(3.5, -5, 4.5, -1), box(0.75, -3.25, 1.25, -2.75)]
+    assert shapely.equals(shapely.normalize(solid), shapely.normalize(shapely.union_all(inside)))
+    assert foreign.boundary is not None and foreign.boundary.equals(box(-10, -5, 10, 5))
+
+
+def test_blocks_fill_the_size_of_their_model_and_turn_about_its_origin(tmp_path: Path) -> None:
+    text = """
+        define table model
+        (
+          size [3 2 1]
+          origin [1 0 0 0]
+          block ( points 4 point[0] [0 0] point[1] [6 0] point[2] [6 1] point[3] [0 1] z [0 1] )
+          block ( points 3 point[0] [0 1] point[1] [1 1] point[2] [0 2] )
+        )
+        table ( pose [5 1 0 90] )
+    """
+    foreign = read(tmp_path, text, around=0.5)
+    parts = shapely.MultiPolygon([box(0, 0, 3, 1), shapely.Polygon([(0, 1), (0.5, 1), (0, 2)])])
+    table = affinity.translate(affinity.rotate(affinity.translate(parts, -0.5, -1), 90, origin=(0, 0)), 5, 1)
+    low_x, low_y, high_x, high_y = table.bounds
+    hull = box(low_x - 0.5, low_y - 0.5, high_x + 0.5, high_y + 0.5)
+    assert (hull - foreign.free).symmetric_difference(table.buffer(0)).area == pytest.approx(0, abs=1e-9)
+
+
+def test_units_and_the_forms_of_older_versions(tmp_path: Path) -> None:
+    foreign = read(
+        tmp_path,
+        ROOM.replace("20 10 1", "2000 1000")
+        + """
+        unit_length "cm"  unit_angle "radians"
+        room ( )
+        model ( size [200 100] pose [400 0 1.5707963267948966]
+                block[0].points 3 block[0].point[0] [0 0] block[0].point[1] [1 0] block[0].point[2] [0 1] )
+        """,
+    )
+    triangle = shapely.Polygon([(3.5, -1), (4.5, -1), (4.5, 1)])
+    assert shapely.area(foreign.free) == pytest.approx(100 - 1, abs=1e-9)
+    assert not foreign.free.intersects(triangle.buffer(-1e-6))
+
+
+def test_robots_are_places_to_start_and_sensors_are_nothing(tmp_path: Path) -> None:
+    text = (
+        ROOM
+        + """
+        define pioneer position ( size [0.4 0.4] ranger ( size [0.1 0.1] ) )
+        define zone model ( obstacle_return 0 ranger_return -1 )
+        window ( size [600 400] )
+        room ( )
+        pioneer ( name "r0" pose [2 -2 0 45] )
+        pioneer ( name "r1" pose [-9.5 4.5 0 0] )
+        zone ( pose [5 -3 0 0] size [2 2 0.01] )
+        laser ( pose [0 0 0 0] )
+        """
+    )
+    foreign = read(tmp_path, text)
+    assert foreign.robots == ((2.0, -2.0), (-9.5, 4.5))
+    assert foreign.free.area == pytest.approx(100)
+    assert foreign.dropped == ("1 laser", "1 model that nothing meets")
+    environment, report, _ = import_map(tmp_path / "hall.world")
+    # one of them stands in the triangle
+    assert environment.starts["robots"] == PointsStart(((2.0, -2.0),))
+    assert list(environment.starts)[-1] == "robots"
+    assert (
+        'start "robots": 1 of 2 places of robots in the file; there is no room at the others' in report.notes
+    )
+    # names are those of models and of their macros
+    assert read(tmp_path, text, skip=("pioneer",)).robots == ()
+    # as long as a report's line may be
+    assert len(read(tmp_path, ROOM + "room ( )" + "x" * 5000 + " ( )").dropped[0]) < 50
+
+
+def test_only_what_is_in_the_folder_is_included(tmp_path: Path) -> None:
+    folder = tmp_path / "worlds"
+    folder.mkdir()
+    (tmp_path / "far.inc").write_text(ROOM)
+    (folder / "near.inc").write_text('include "more.inc"\n')
+    (folder / "more.inc").write_text(ROOM)
+    assert read(folder, 'include "near.inc"\nroom ( )').free.area == pytest.approx(100)
+    far = 'window ( )\ninclude "../far.inc"\nroom ( )'
+    with pytest.raises(MapError, match=r"hall\.world:2: '\.\./far\.inc' is outside of the file's folder"):
+        read(folder, far)
+    assert read(folder, far, anywhere=True).free.area == pytest.approx(100)
+    # an absolute name of a world that has moved with its includes
+    moved = read(folder, f'include "{tmp_path}/elsewhere/near.inc"\nroom ( )')
+    assert "near.inc' beside the file taken" in moved.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("model (\n", ":1: 'the end of the file', but a \\) after what begins here"),
+        ("model ( )\n)", ":2: '\\)', but the name of a model"),
+        ("model ( pose [1 2 0 0 )", ":1: 'pose', but a \\] after its values"),
+        ("model ( pose [1 x 0 0] )", ":1: 'pose', but a value"),
+        ('model ( size ["a" 1] )', ":1: size 'a 1', but numbers within 1e7"),
+        ("model ( size [0 1] )", ":1: size: 0.0, but a number from"),
+        ("model ( ) ~", ":1: '~', but a word, a number or a bracket"),
+        ("\ndefine a b ( )\ndefine b a ( )\na ( )", ":4: 'a' is made of itself"),
+        ("model ( block ( points 4 point[0] [0 0] ) )", ":1: 1 points, but 4, as it says"),
+        ('\nmodel ( bitmap "no.png" )', r"no\.png: no such file"),
+        ('include "hall.world"\nmodel ( )', "a file to include, which does not include itself"),
+        ("include model\nmodel ( )", "a file to include"),
+        ("window ( )", "but a drawing was wanted"),
+        ("model ( " * 40, "nested deeper than 32"),
+        ("define a model ( a ( ) )\na ( )", ":1: in more than 32 models"),
+        ("model ( pose [1e300 0 0 0] )", "pose '1e300 0 0 0', but numbers within"),
+        (
+            "define a model ( b ( ) b ( ) ) define b model ( c ( ) c ( ) )" + "a ( )" * 9000,
+            "more than 10000 models",
+        ),
+    ],
+    ids=range(17),
+)
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, wanted: str) -> None:
+    path = tmp_path / "hall.world"
+    path.write_text(text)
+    with pytest.raises(MapError, match=f"hall.world.*{wanted}" if wanted[0] == ":" else wanted) as caught:
+        IMPORTER.read(path, ReadOptions())
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bitmap_without_walls_is_refused_and_one_that_is_all_wall_is_solid(tmp_path: Path) -> None:
+    (tmp_path / "a.pgm").write_bytes(pgm(drawn("...\n...")))
+    with pytest.raises(MapError, match=r"a\.pgm: all is light"):
+        read(tmp_path, 'model ( bitmap "a.pgm" )')
+    (tmp_path / "a.pgm").write_bytes(pgm(drawn("###\n###")))
+    foreign = read(tmp_path, ROOM + 'room ( ) model ( bitmap "a.pgm" size [2 1] pose [5 -3 0 0] )')
+    assert foreign.free.area == pytest.approx(100 - 2)

@@ -1,0 +1,221 @@
+"""Path data and transforms, against the equations that the standard gives for them."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from robocov_app.formats.svg.path import (
+    affine,
+    composed,
+    fitted,
+    length,
+    moved,
+    numbers,
+    stretch,
+    subpaths,
+    transform,
+)
+
+
+def points(text: str, tolerance: float = 1e-3) -> list[list[float]]:
+    [(found, _)], _ = subpaths(text, tolerance, 10_000)
+    return [[round(x, 9) + 0.0, round(y, 9) + 0.0] for x, y in found.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("M1 2L3 4", [[1, 2], [3, 4]]),
+        ("m1,2 2,2", [[1, 2], [3, 4]]),
+        ("M1 2 3 4-5.5.5", [[1, 2], [3, 4], [-5.5, 0.5]]),
+        ("M0 0h4v3H0V1", [[0, 0], [4, 0], [4, 3], [0, 3], [0, 1]]),
+        ("M1e1 0l+.5-1E-1", [[10, 0], [10.5, -0.1]]),
+        ("M0 0 0 1\n\t1 1", [[0, 0], [0, 1], [1, 1]]),
+        ("M0 0C1 0 2 0 3 0S5 0 6 0", [[0, 0], [3, 0], [6, 0]]),
+        ("M0 0Q1 0 2 0T4 0t2 0", [[0, 0], [2, 0], [4, 0], [6, 0]]),
+        ("M0 0A0 5 0 0 1 4 4", [[0, 0], [4, 4]]),
+    ],
+)
+def test_commands(text: str, wanted: list[list[float]]) -> None:
+    assert points(text) == wanted
+
+
+def test_subpaths_begin_where_the_last_one_did() -> None:
+    found, draws = subpaths("M1 1h2v2z l1 0 M5 5zh1m1 1", 1e-3, 100)
+    assert draws == 7
+    assert [(part.tolist(), closed) for part, closed in found] == [
+        ([[1, 1], [3, 1], [3, 3]], True),
+        ([[1, 1], [2, 1]], False),
+        ([[5, 5], [6, 5]], False),
+    ]
+    assert subpaths("", 1e-3, 10) == ([], 0)
+    assert subpaths("M1 1", 1e-3, 10) == ([], 1)
+
+
+def test_smooth_curves_mirror_the_handle_before_them() -> None:
+    smooth = points("M0 0C0 3 2 3 3 0S6-3 6 0", 1e-2)
+    assert smooth == points("M0 0C0 3 2 3 3 0C4-3 6-3 6 0", 1e-2)
+    assert points("M0 0Q2 4 4 0T8 0", 1e-2) == points("M0 0Q2 4 4 0Q6-4 8 0", 1e-2)
+    # after another command there is no handle
+    straight = points("M0 0L4 0T8 4")[1:]
+    assert straight[-1] == [8, 4]
+    assert all(x - y == pytest.approx(4.0) for x, y in straight)
+
+
+_COORDINATE = st.integers(-100, 100).map(lambda n: n / 4)
+
+
+@given(*[_COORDINATE] * 4, *[st.integers(1, 60).map(float)] * 2, st.integers(-180, 360), *[st.booleans()] * 2)
+def test_arcs_obey_the_equation_of_their_ellipse(
+    x1: float, y1: float, x2: float, y2: float, rx: float, ry: float, turn: int, large: bool, clockwise: bool
+) -> None:
+    assume((x1, y1) != (x2, y2))
+    flags = f"{int(large)}{int(clockwise)}"  # compressed, as optimisers write them
+    [(found, _)], _ = subpaths(f"M{x1} {y1}A{rx} {ry} {turn} {flags}{x2} {y2}", 1e-3, 100_000)
+    assert found[0].tolist() == [x1, y1]
+    assert found[-1].tolist() == [x2, y2]
+    # in the plane where the ellipse is a circle of radius 1
+    angle = math.radians(turn)
+    to_circle = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]) / [
+        [rx],
+        [ry],
+    ]
+    flat = found @ to_circle.T
+    chord = math.dist(flat[0], flat[-1])
+    if chord >= 2.0:  # it has to grow
+        flat, chord = flat * (2.0 / chord), 2.0
+    a, b = flat[0], flat[-1]
+    height = math.sqrt(max(1.0 - chord**2 / 4, 0.0))
+    across = np.array([a[1] - b[1], b[0] - a[0]]) / chord
+    centre = (a + b) / 2 + across * height * (1 if large != clockwise else -1)
+    assert np.hypot(*(flat - centre).T) == pytest.approx(1.0, abs=1e-6)
+    turned = np.diff(np.unwrap(np.arctan2(*(flat - centre).T[::-1])))
+    assert (turned > -1e-6).all() if clockwise else (turned < 1e-6).all()
+    if chord < 1.9999:
+        assert (abs(turned.sum()) > math.pi) == large
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("L1 1", "character 1: L, but M was wanted first"),
+        ("M1", "character 3: 'the end', but a number"),
+        ("M0 0 L 10 x", "character 10: 'x', but a number"),
+        ("M0 0 X 1", "character 5: 'X 1', but a command"),
+        ("M0 0 A 1 1 0 2 0 3 3", "character 13: '2 0 3 3', but a number"),
+        ("M0 0 L 1e300 0", "1e300, but a number up to 1e+30"),
+        ("M0 0 L nan 0", "'nan 0', but a number"),
+        ("?", "character 1: '?', but a command"),
+        ("M" + "1 1 " * 200, "more than 100 points, but fewer"),
+        ("M0 0 A 1e20 1e20 0 1 1 5 5", "more than 100 points, but fewer"),
+    ],
+)
+def test_what_is_no_path_is_refused_with_its_place(text: str, wanted: str) -> None:
+    with pytest.raises(ValueError, match="but") as caught:
+        subpaths(text, 1e-3, 100)
+    assert wanted in str(caught.value)
+
+
+def test_arcs_whose_ends_meet_are_nothing_and_tiny_radii_are_lines() -> None:
+    assert subpaths("M1 1A5 5 0 1 1 1 1", 1e-3, 100) == ([], 2)
+    assert points("M0 0A1e-40 1e-40 0 1 1 3 0") == [[0, 0], [3, 0]]
+    huge = points("M0 0A1e25 1e25 0 0 1 3 0")
+    assert huge == [[0, 0], [3, 0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "point", "wanted"),
+    [
+        ("translate(2)", (1, 1), (3, 1)),
+        ("translate(2, 3)", (1, 1), (3, 4)),
+        ("scale(2)", (1, 3), (2, 6)),
+        ("scale(2 -1)", (1, 3), (2, -3)),
+        ("rotate(90)", (1, 0), (0, 1)),
+        ("rotate(90 1 1)", (2, 1), (1, 2)),
+        ("skewX(45)", (0, 1), (1, 1)),
+        ("skewY(45)", (1, 0), (1, 1)),
+        ("matrix(1 2 3 4 5 6)", (1, 1), (9, 12)),
+        ("translate(10)scale(2) , rotate(90)", (1, 0), (10, 2)),
+        ("translate(3px, 4px) rotate(90deg)", (1, 0), (3, 5)),
+        ("none", (1, 2), (1, 2)),
+        ("", (1, 2), (1, 2)),
+    ],
+)
+def test_transforms(text: str, point: tuple[float, float], wanted: tuple[float, float]) -> None:
+    assert moved(transform(text), np.array([point], dtype=float))[0] == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    "text", ["spin(3)", "rotate(1 2)", "matrix(1 2 3)", "scale(x)", "translate(1) oops", "scale(1e99)"]
+)
+def test_what_is_no_transform_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="but"):
+        transform(text)
+
+
+def test_transforms_that_grow_without_end_are_refused() -> None:
+    with pytest.raises(ValueError, match="beyond 1e"):
+        transform("scale(1e20) scale(1e20)")
+    with pytest.raises(ValueError, match="beyond"):
+        composed(affine(1e29, d=1e29), affine(1e29, d=1e29))
+
+
+def test_stretch_is_what_happens_to_a_circle() -> None:
+    matrix = transform("rotate(30) scale(2 5) skewX(20)")
+    angle = np.linspace(0, math.tau, 100_000)
+    lengths = np.hypot(*moved(matrix, np.column_stack([np.cos(angle), np.sin(angle)])).T)
+    assert stretch(matrix) == pytest.approx((lengths.min(), lengths.max()), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("10", 10),
+        ("10px", 10),
+        ("1in", 96),
+        ("2.54cm", 96),
+        ("25.4mm", 96),
+        ("72pt", 96),
+        ("6pc", 96),
+        ("50%", 40),
+        (" 1e1 ", 10),
+    ],
+)
+def test_lengths(text: str, wanted: float) -> None:
+    assert length(text, 80.0) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("text", ["", "x", "10em", "10 px x", "%", "1e99px", "nan"])
+def test_what_is_no_length_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="wanted"):
+        length(text, 80.0)
+    with pytest.raises(ValueError, match="wanted"):
+        length("50%")
+
+
+def test_lists_of_numbers() -> None:
+    assert numbers("1,2 3-4.5.5e1,") == [1, 2, 3, -4.5, 5]
+    assert numbers("") == []
+    with pytest.raises(ValueError, match="'two', but a number"):
+        numbers("1 two")
+
+
+@pytest.mark.parametrize(
+    ("how", "corner", "centre"),
+    [
+        ("", (0, 50), (50, 100)),
+        ("xMinYMin", (0, 0), (50, 50)),
+        ("xMaxYMax meet", (0, 100), (50, 150)),
+        ("none", (0, 0), (50, 100)),
+        ("xMidYMid slice", (-50, 0), (50, 100)),
+    ],
+)
+def test_view_boxes_fit_as_they_are_told(
+    how: str, corner: tuple[float, float], centre: tuple[float, float]
+) -> None:
+    matrix = fitted((10.0, 10.0, 20.0, 20.0), 100.0, 200.0, how)
+    places = moved(matrix, np.array([[10.0, 10.0], [20.0, 20.0]]))
+    assert places.tolist() == [list(map(float, corner)), list(map(float, centre))]

@@ -1,0 +1,105 @@
+"""Which style an element has: attributes, style sheets, what is inherited."""
+
+import pytest
+
+from robocov.errors import MapError
+from robocov_app.formats.svg.style import (
+    INHERITED,
+    MOST_TEXT,
+    MOST_WORK,
+    StyleSheet,
+    declarations,
+    inherited,
+    is_hidden,
+    is_painted,
+)
+from robocov_app.formats.xml_tree import Element
+
+
+def element(tag: str = "rect", **attributes: str) -> Element:
+    return Element(
+        tag, {name.replace("_", "-").removesuffix("-"): text for name, text in attributes.items()}, 1
+    )
+
+
+def sheet(*texts: str) -> StyleSheet:
+    found = StyleSheet("plan.svg")
+    for text in texts:
+        found.add(text)
+    return found
+
+
+def test_the_more_particular_rule_wins_wherever_it_stands() -> None:
+    rules = sheet("#a{fill:red} .b{fill:green} rect{fill:blue} *{fill:white}")
+    assert rules.of(element(id="a", class_="b"))["fill"] == "red"
+    assert rules.of(element(class_="x b"))["fill"] == "green"
+    assert rules.of(element(class_="B"))["fill"] == "blue"
+    assert rules.of(element("path", fill="black"))["fill"] == "white"
+    assert rules.of(element(id="a", style="fill:none"))["fill"] == "none"
+    assert sheet("rect.b{fill:red} .b{fill:green}").of(element(class_="b"))["fill"] == "red"
+    assert sheet(".b{fill:red}", ".b{fill:green}").of(element(class_="b"))["fill"] == "green"
+    assert sheet(".b{fill:red !important}").of(element(class_="b", style="fill:green"))["fill"] == "red"
+
+
+def test_style_sheets_of_drawing_programs() -> None:
+    text = "<!-- .cls-1,\n.cls-2{fill:none;stroke:#000;} /* a; {comment} */ .cls-2{stroke-width:2px} -->"
+    assert sheet(text).of(element(class_="cls-2")) == {
+        "fill": "none",
+        "stroke": "#000",
+        "stroke-width": "2px",
+    }
+
+
+def test_what_is_beyond_is_counted() -> None:
+    rules = sheet(
+        "@import url(http://example.org/x.css); @media print { rect { fill: none } }"
+        "@supports (x:y) {rect{fill:none}} g > rect {fill:none} rect:hover{fill:none} rect{fill:red}"
+    )
+    assert rules.of(element())["fill"] == "red"
+    assert rules.strange == 4
+
+
+def test_unfinished_rules_are_left_out() -> None:
+    assert (
+        sheet("@media {").of(element())
+        == sheet("rect{fill:red").of(element())
+        == sheet("}{").of(element())
+        == {}
+    )
+
+
+def test_inheritance() -> None:
+    group = inherited(INHERITED, {"fill": "none", "stroke": "red", "stroke-width": "3"})
+    inner = inherited(group, {"fill": "inherit", "stroke": "unset", "stroke-width": "1"})
+    assert (inner["fill"], inner["stroke"], inner["stroke-width"]) == ("none", "red", "1")
+    assert inherited(group, {"opacity": "0"}).keys() == INHERITED.keys()
+
+
+@pytest.mark.parametrize("paint", ["none", "transparent", "NONE"])
+def test_what_is_not_painted(paint: str) -> None:
+    assert not is_painted(inherited(INHERITED, {"fill": paint}), "fill")
+    assert not is_painted(inherited(INHERITED, {"fill-opacity": "0"}), "fill")
+    assert not is_painted(inherited(INHERITED, {"fill-opacity": "0%"}), "fill")
+    assert is_painted(inherited(INHERITED, {"fill": "url(#gradient)", "fill-opacity": "x"}), "fill")
+    assert not is_painted(INHERITED, "stroke")
+
+
+def test_what_is_hidden() -> None:
+    assert is_hidden({"display": "None"})
+    assert is_hidden({"opacity": "0.0"})
+    assert not is_hidden({"display": "inline", "opacity": ".5"})
+
+
+def test_declarations() -> None:
+    assert declarations(" Fill : url(a:b) ;; x ; stroke:red") == {"fill": "url(a:b)", "stroke": "red"}
+
+
+def test_sheets_that_take_for_ever_are_refused() -> None:
+    with pytest.raises(MapError, match=rf"plan\.svg: style sheets of over {MOST_TEXT} characters"):
+        sheet("*" * (MOST_TEXT + 1))
+    rules = sheet("*{fill:red} " * 9000)
+    with pytest.raises(MapError, match=r"plan\.svg: too many rules for too many elements"):
+        for _ in range(MOST_WORK // 9000 + 1):
+            rules.of(element())
+    sheet("@" * 500_000)
+    sheet("@media{" * 100_000)

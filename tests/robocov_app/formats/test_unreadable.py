@@ -1,0 +1,114 @@
+"""Files of kinds that are not read: each is named, and so is the way out."""
+
+import gzip
+import io
+import json
+import pickle
+import struct
+import tarfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fuzz_seeds import MAP, SEEDS
+from PIL import Image
+
+from robocov.errors import MapError
+from robocov_app.formats import detect
+from robocov_app.formats.unreadable import named_kind
+
+XML = b'<?xml version="1.0" encoding="UTF-8"?>\n<!-- a comment -->\n'
+
+
+def zipped() -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("a.txt", "a")
+    return stream.getvalue()
+
+
+def tarred() -> bytes:
+    stream = io.BytesIO()
+    with tarfile.open(fileobj=stream, mode="w") as archive:
+        archive.addfile(tarfile.TarInfo("a"))
+    return stream.getvalue()
+
+
+def picture(kind: str) -> bytes:
+    stream = io.BytesIO()
+    Image.new("L", (2, 2)).save(stream, kind)
+    return stream.getvalue()
+
+
+def array() -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, np.zeros(3))
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "wanted"),
+    [
+        ("a.json", b"", "empty"),
+        ("a.json", json.dumps(MAP, indent=1).encode(), "a map of robocov already: robocov check"),
+        ("run.json", b'{"format": "robocov-run", "version": 1}', "a result of robocov: robocov replay"),
+        ("a.json", b'{"format": "robocov-study"}', "robocov's own, but no map: "),
+        ("a b.shp", struct.pack(">7i", 9994, *[0] * 6), "a shapefile, .*: ogr2ogr .* 'a b.shp'$"),
+        ("a.dbf", b"\x03\x5f\x07\x1a", "a part of a shapefile, .* ogr2ogr .* out.geojson a.shp$"),
+        ("a.gpkg", b"SQLite format 3\0" + b"\0" * 52 + b"GPKG", "a GeoPackage, .*: ogr2ogr"),
+        ("a.db3", b"SQLite format 3\0" + b"\0" * 56, "a database of SQLite, .*: of a ROS 2 bag"),
+        ("a.kml", XML + b'<kml xmlns="http://www.opengis.net/kml/2.2">', "KML, .*: ogr2ogr"),
+        ("a.gpx", b"\xef\xbb\xbf" + XML + b"<gpx>", "GPX, .*: ogr2ogr"),
+        ("a.gml", XML + b"<gml:FeatureCollection>", "GML, .*: ogr2ogr"),
+        ("a.osm.pbf", b"\0\0\0\x0e\x0a\x09OSMHeader", "OpenStreetMap packed as PBF, .*: osmium cat"),
+        ("a.world", XML + b'<sdf version="1.6"><world>', "a world of Gazebo .SDF., .*map_saver"),
+        ("a.urdf", b'<robot name="a">', "a model of a robot .*map_saver"),
+        ("a.wbt", b"#VRML_SIM R2023b utf8", "a world in 3D .VRML, Webots.,"),
+        ("a.pdf", b"%PDF-1.4", "a PDF, .*: pdftocairo -svg a.pdf out.svg"),
+        ("a.dwg", b"AC1032\0\0", "a DWG, .*: save it as DXF, or dwg2dxf a.dwg"),
+        ("a.dxf", b"AC1.50\0\0", "a DWG"),
+        ("a.ifc", b"ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));", "a building model .IFC., .*IfcConvert"),
+        ("a.step", b"ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AP214'));", "a model in 3D .STEP.,"),
+        ("a.stl", b"solid a\n facet normal 0 0 1\n", "a mesh .STL., .*: cut it at the height"),
+        ("a.stl", bytes(80) + struct.pack("<I", 1) + bytes(50), "a mesh .STL.,"),
+        ("a.obj", b"# a\nmtllib a.mtl\no a\nv 1.0 2 3\nv 1 2 3\n", "a mesh .OBJ.,"),
+        ("a.dae", XML + b"<COLLADA>", "a mesh .COLLADA.,"),
+        ("a.ply", b"ply\nformat ascii 1.0", "a mesh .PLY, glTF.,"),
+        ("a.pcd", b"# .PCD v0.7", "a cloud of points,"),
+        ("a.bt", b"# Octomap OcTree binary file", "an octree of OctoMap, .*octomap_server"),
+        ("a.bag", b"#ROSBAG V2.0\n", "a bag of ROS, .*map_saver"),
+        ("a.mcap", b"\x89MCAP0\r\n", "a bag of ROS,"),
+        ("a.gif", picture("GIF"), "a picture, .*: save it as a PNG"),
+        ("a.webp", picture("WEBP"), "a picture,"),
+        *(("a.pkl", pickle.dumps([1, 2], protocol), "a pickle of Python,") for protocol in (2, 3, 4, 5)),
+        ("a.npy", array(), "an array of numpy,"),
+        ("a.zip", zipped(), "a zip archive, .*: unpack it first"),
+        ("a.svg.gz", gzip.compress(b"<svg/>", mtime=0), "a packed file, .*: unpack it first"),
+        ("a.tar", tarred(), "a packed file,"),
+        ("plan.svg", b"<!DOCTYPE html>\n<html><svg>", "a web page, not the file itself, .*raw file"),
+        ("plan.dxf", b"version https://git-lfs.github.com/spec/v1", "a pointer of Git LFS,"),
+        ("a.xyz", b"Once upon a time there was a map", "text that begins with 'Once upon a time"),
+        ("a.xyz", b"\0\1\2", "binary data that begins with"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "-",
+)  # fmt: skip
+def test_what_a_file_is(tmp_path: Path, name: str, content: bytes, wanted: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(MapError, match=wanted) as caught:
+        detect(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("target", [name for name in SEEDS if name not in ("map", "check", "study")])
+def test_what_is_read_is_none_of_them(target: str) -> None:
+    for case in SEEDS[target]:
+        assert named_kind(Path(case.main), case.files[case.main]) is None
+
+
+@pytest.mark.parametrize("piece", [b"<!a>", b"<!--", b"<?", b" ", b"#\n", b'{"format"', b"solid ", b"v 1 "])
+def test_a_long_beginning_is_what_a_short_one_is(piece: bytes) -> None:
+    path = Path("a.txt")
+    assert named_kind(path, piece * (2**20 // len(piece))) == named_kind(path, piece * 8)
