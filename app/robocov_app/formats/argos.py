@@ -38,20 +38,11 @@ def is_argos(path: Path, head: bytes) -> bool:
 def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the arena of an ARGoS experiment.
 
-    Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose
-    places are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
+    Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places
+    are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
     distributed at random is left out and counted: only ARGoS itself can tell from the seed where it puts
-    them, and the walls of the arena are a map without.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood; with the line.
+    them, and the walls of the arena are a map without. Raises MapError when the file cannot be read or
+    understood; with the line.
     """
     root, where = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = next((child for child in root.children if child.tag == "arena"), None)

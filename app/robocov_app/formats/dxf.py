@@ -33,18 +33,8 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
     """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
 
     A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
-
-    Parameters
-    ----------
-    points : (k, 2)
-    bulges : (k,)
-        The last one is not used.
-    tolerance : float
-
-    Raises
-    ------
-    ValueError
-        When there would be more than `MOST_POINTS`.
+    `points`: (k, 2). `bulges`, (k,): the last one is not used. Raises ValueError when there would be more
+    than `MOST_POINTS`.
     """
     arcs = extra("ezdxf.math", "dxf")
     drawn = [points[:1]]
@@ -65,13 +55,9 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
 def spline(entity: Any, tolerance: float) -> Array:
     """Return points of an ezdxf spline: a rational B-spline, between the knots where it is defined.
 
-    Its own `flattening` goes on to where it is not, which spoils closed ones (ezdxf 1.4).
-    L. Piegl, W. Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2.
-
-    Raises
-    ------
-    ValueError
-        When knots and control points do not fit together.
+    Its own `flattening` goes on to where it is not, which spoils closed ones (ezdxf 1.4). L. Piegl, W.
+    Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2. Raises ValueError when knots and control
+    points do not fit together.
     """
     tool = entity.construction_tool()
     control, knots, degree = flat(tool.control_points), np.array(tool.knots(), dtype=float), tool.degree
@@ -109,14 +95,7 @@ _CLOSED = 1e-9
 class DxfDrawing:
     """Goes through the entities and adds them to the shapes.
 
-    Parameters
-    ----------
-    document : ezdxf drawing
-    where : str
-        What messages call the file.
-    shapes : Shapes
-    scale : float, m
-        Of a unit.
+    `where`: what messages call the file. `scale`, m: of a unit.
     """
 
     def __init__(self, document: Any, where: str, shapes: Shapes, scale: float) -> None:
@@ -133,10 +112,7 @@ class DxfDrawing:
     def draw(self) -> None:
         """Add all that is drawn.
 
-        Raises
-        ------
-        MapError
-            When a block is inserted within itself, or too much is drawn.
+        Raises MapError when a block is inserted within itself, or too much is drawn.
         """
         space = self.document.modelspace()
         self._require_few(space)
@@ -380,21 +356,12 @@ def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
 
     Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
     the boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option
-    ``thickness``. Names are those of layers and blocks: see `enclosing.foreign_map`.
-    Blocks are carried out wherever they are inserted. Layers that are off or frozen, texts, dimensions and
-    what has a third dimension are left out; so are hatches without the option ``hatches``. Curves become
-    lines that stay within a millimetre.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-        ``scale`` overrules the unit of the file's header; without either the file is refused.
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood, has no unit, or ezdxf is not installed.
+    ``thickness``. Names are those of layers and blocks: see `enclosing.foreign_map`. Blocks are carried out
+    wherever they are inserted. Layers that are off or frozen, texts, dimensions and what has a third
+    dimension are left out; so are hatches without the option ``hatches``. Curves become lines that stay
+    within a millimetre. `options`: ``scale`` overrules the unit of the file's header; without either the file
+    is refused. Raises MapError when the file cannot be read or understood, has no unit, or ezdxf is not
+    installed.
     """
     where = one_line(path)
     _check(path, where)

@@ -48,11 +48,8 @@ HEAD = 1 << 20
 def head(path: Path) -> bytes:
     """Return the first `HEAD` bytes of the file at `path`.
 
-    Raises
-    ------
-    MapError
-        When there is no such file, it is no ordinary one (a folder, a pipe, a device), or it
-        cannot be read.
+    Raises MapError when there is no such file, it is no ordinary one (a folder, a pipe, a device), or it
+    cannot be read.
     """
     return _read(path, HEAD)
 
@@ -60,10 +57,7 @@ def head(path: Path) -> bytes:
 def content(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of the file at `path`, of at most `most` bytes.
 
-    Raises
-    ------
-    MapError
-        As `head`, and when the file is larger; its size is looked at first.
+    Raises MapError as `head`, and when the file is larger; its size is looked at first.
     """
     where = one_line(path)
     data = b""
@@ -77,10 +71,7 @@ def content(path: Path, most: int = MAX_BYTES) -> bytes:
 def require_cells(width: int, height: int, where: str) -> None:
     """Check the size of a raster as its header gives it.
 
-    Raises
-    ------
-    MapError
-        When a side is not positive, or there are more than `MAX_CELLS`.
+    Raises MapError when a side is not positive, or there are more than `MAX_CELLS`.
     """
     if width < 1 or height < 1:
         raise MapError(f"{where}: {width} x {height} cells, but at least 1 x 1 was wanted")
@@ -92,23 +83,14 @@ def require_cells(width: int, height: int, where: str) -> None:
 def require_vertices(count: int, where: str) -> None:
     """Check the number of vertices of a map, or the least that it can be.
 
-    Raises
-    ------
-    MapError
-        When there are more than `MAX_VERTICES`.
+    Raises MapError when there are more than `MAX_VERTICES`.
     """
     if count > MAX_VERTICES:
         raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
 
 
 def require_shapes(count: int, where: str) -> None:
-    """Check the number of shapes of a drawing.
-
-    Raises
-    ------
-    MapError
-        When there are more than `MAX_SHAPES`.
-    """
+    """Check the number of shapes of a drawing. Raises MapError when there are more than `MAX_SHAPES`."""
     if count > MAX_SHAPES:
         raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
 
@@ -116,10 +98,7 @@ def require_shapes(count: int, where: str) -> None:
 def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
     """Check a length in metres: a cell, a thickness, a unit.
 
-    Raises
-    ------
-    MapError
-        When it is not a finite number from `smallest` to `largest`.
+    Raises MapError when it is not a finite number from `smallest` to `largest`.
     """
     if not (math.isfinite(value) and smallest <= value <= largest):
         raise MapError(
@@ -130,10 +109,7 @@ def require_length(value: float, where: str, smallest: float = 1e-6, largest: fl
 def require_coordinate(value: float, where: str) -> None:
     """Check a coordinate in metres.
 
-    Raises
-    ------
-    MapError
-        When it is not a finite number within `robocov.mapfile.models.FARTHEST`.
+    Raises MapError when it is not a finite number within `robocov.mapfile.models.FARTHEST`.
     """
     if not abs(value) <= FARTHEST:
         raise MapError(
@@ -180,16 +156,8 @@ _MARKS = (
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
     """Return the text of a file, and what messages call it.
 
-    Parameters
-    ----------
-    path : Path
-    separator : bytes
-        What stands between vertices: where there are too many, nothing is read.
-
-    Raises
-    ------
-    MapError
-        When it cannot be read, is too large, or is neither UTF-8 nor marked as UTF-16.
+    `separator`: what stands between vertices: where there are too many, nothing is read. Raises MapError when
+    it cannot be read, is too large, or is neither UTF-8 nor marked as UTF-16.
     """
     where = one_line(path)
     data = content(path, MAX_TEXT_BYTES)
@@ -209,23 +177,11 @@ _LONG = 400
 def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> tuple[Path, str | None]:
     """Return the file that the one at `path` names, and what was put right about it.
 
-    It must be in the file's folder or below. Programs write where it was when it was saved, often from
-    the root, and it may have moved with the file: one of the same name beside it is as good.
-
-    Parameters
-    ----------
-    path : Path
-    name : str
-        As it is written there, relative to the folder of `path`.
-    anywhere : bool
-        Whether it may be outside of that folder.
-    at, what : str
-        The place that names it, and what kind of file it is, for messages.
-
-    Raises
-    ------
-    MapError
-        When it is no name of a file, or outside of the folder.
+    It must be in the file's folder or below. Programs write where it was when it was saved, often from the
+    root, and it may have moved with the file: one of the same name beside it is as good. `name`: as it is
+    written there, relative to the folder of `path`. `anywhere`: whether it may be outside of that folder.
+    `at`, `what`: the place that names it, and what kind of file it is, for messages. Raises MapError when it
+    is no name of a file, or outside of the folder.
     """
     if not name:
         raise MapError(f"{at}: empty, but the name of a {what} was wanted")
@@ -274,10 +230,8 @@ def begins_with(head: bytes, bracket: bytes) -> bool:
 def read_json(path: Path) -> tuple[Any, bytes, str]:
     """Return what the JSON file at `path` holds, its content, and what messages call it.
 
-    Raises
-    ------
-    MapError
-        When it cannot be read, is too large, or is not JSON; see `robocov.files.strictjson.parse`.
+    Raises MapError when it cannot be read, is too large, or is not JSON; see
+    `robocov.files.strictjson.parse`.
     """
     where = one_line(path)
     data = content(path, MAX_TEXT_BYTES)
@@ -298,22 +252,9 @@ def located_errors(content: bytes, where: str) -> Iterator[None]:
 def positions(value: Any, at: Steps, where: str, *, least: int, dimensions: tuple[int, int]) -> Array:
     """Return the points of a JSON list as (k, d); missing dimensions are nan.
 
-    Parameters
-    ----------
-    value : JSON value
-    at : path of keys and indices
-        Where it is in the document.
-    where : str
-        What messages call the file.
-    least : int
-        So many points are wanted.
-    dimensions : (least, most)
-        So many numbers are wanted of each; d is the most that there are.
-
-    Raises
-    ------
-    MapError
-        When it is not such a list.
+    `at`: where it is in the document. `where`: what messages call the file. `least`: so many points are
+    wanted. `dimensions`, (least, most): so many numbers are wanted of each; d is the most that there are.
+    Raises MapError when it is not such a list.
     """
     if not isinstance(value, list) or len(value) < least:
         points = "point" if least == 1 else "points"
@@ -351,17 +292,9 @@ DEEPEST = 12
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
     """Return the mapping in `text`.
 
-    Parameters
-    ----------
-    text : bytes
-        UTF-8, with or without a byte order mark.
-    where : str
-        What messages call it: a file's name.
-
-    Raises
-    ------
-    MapError
-        When it is not YAML (with the line), no mapping, has a key twice, or has tags, anchors or aliases.
+    `text`: UTF-8, with or without a byte order mark. `where`: what messages call it: a file's name. Raises
+    MapError when it is not YAML (with the line), no mapping, has a key twice, or has tags, anchors or
+    aliases.
 
     Examples
     --------

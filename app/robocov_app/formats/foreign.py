@@ -15,37 +15,20 @@ from robocov_app.formats.geometry.primitives import Primitive
 class ForeignMap:
     """What a reader found in a file. Readers only read: `robocov_app.formats.geometry.shaping` cleans.
 
-    Attributes
-    ----------
-    name : str
-        The map's name, for people: from the file where it has one, else the file's stem.
-    description : str
-        A sentence about it.
-    format : str
-        Name of its format, as in `robocov_app.importers.IMPORTERS`.
-    free : MultiPolygon, m
-        What is free, y up. May be invalid (rings that cross themselves or each other), empty, of
-        many parts, and may stick out of `boundary`: nothing is cleaned yet.
-    boundary : Polygon or None, m
-        The outer boundary where the format gives one; what is inside of it and not free becomes
-        obstacles. Without it the outline of the free space is the boundary.
-    vertices_read : int
-        Vertices in the file; of a raster, corners of the outline of its free cells.
-    cell : float or None, m
-        Side of a cell, of rasters; of cells that are no squares the longer one.
-    specks : float, m²
-        Smaller obstacles are noise of how such maps are made, unless somebody says otherwise.
-    cut_corners : bool
-        Whether corners are cut by a step or two of a grid: simplifying then makes them whole, as
-        `robocov_app.formats.geometry.corners` does.
-    primitives : tuple of CircleObstacle and WallObstacle
-        Obstacles that the file draws as such, with their names: they are not in `free`, and are kept instead
-        of the polygons that they cover where nothing speaks against it.
-    robots : (n, 2) m
-        Where the file places robots.
-    repaired, dropped, notes : tuple of str
-        What the reader had to put right, what it left out, and what is worth knowing besides (how
-        unknown cells were taken, say): one line each, with counts and areas.
+    `name`: the map's name, for people: from the file where it has one, else the file's stem. `description`: a
+    sentence about it. `format`: name of its format, as in `robocov_app.formats.IMPORTERS`. `free`, m: what
+    is free, y up. May be invalid (rings that cross themselves or each other), empty, of many parts, and may
+    stick out of `boundary`: nothing is cleaned yet. `boundary`, m: the outer boundary where the format gives
+    one; what is inside of it and not free becomes obstacles. Without it the outline of the free space is the
+    boundary. `vertices_read`: vertices in the file; of a raster, corners of the outline of its free cells.
+    `cell`, m: side of a cell, of rasters; of cells that are no squares the longer one. `specks`, m²: smaller
+    obstacles are noise of how such maps are made, unless somebody says otherwise. `cut_corners`: whether
+    corners are cut by a step or two of a grid: simplifying then makes them whole, as
+    `robocov_app.formats.geometry.corners` does. `primitives`: obstacles that the file draws as such, with
+    their names: they are not in `free`, and are kept instead of the polygons that they cover where nothing
+    speaks against it. `robots`, (n, 2) m: where the file places robots. `repaired`, `dropped`, `notes`: what
+    the reader had to put right, what it left out, and what is worth knowing besides (how unknown cells were
+    taken, say): one line each, with counts and areas.
     """
 
     name: str
@@ -77,32 +60,15 @@ def square_metres(area: float, digits: int = 4) -> str:
 class ImportReport:
     """What came of a foreign map, so that nothing is repaired in silence.
 
-    Attributes
-    ----------
-    source : str
-        The file.
-    format : str
-        Name of its format.
-    vertices_read, vertices_kept : int
-        Vertices in the file, and in the map.
-    area_read, area_kept : float, m²
-        Free area that the file encloses, and that of the map.
-    repaired, dropped, changed, notes : tuple of str
-        What was put right, what was left out, what was changed on purpose (simplified, grown), and
-        what is worth knowing besides; one line each.
-    size : (width, height), m
-        Of the map's boundary.
-    obstacles : int
-        Obstacles of the map.
-    tolerance : float, m
-        By how much walls were allowed to move.
-    moved_area : float, m²
-        Area that was free and is not, or is and was not, for the simplification.
-    moved : float, m
-        By how much a wall moved for it, at most.
-    others : tuple of (x, y), m
-        A place in each of the largest parts of the free space that were left out, as `Shaping.inside` takes
-        it; empty where what was left out is not worth a word.
+    `source`: the file. `format`: name of its format. `vertices_read`, `vertices_kept`: vertices in the file,
+    and in the map. `area_read`, `area_kept`, m²: free area that the file encloses, and that of the map.
+    `repaired`, `dropped`, `changed`, `notes`: what was put right, what was left out, what was changed on
+    purpose (simplified, grown), and what is worth knowing besides; one line each. `size`, (width, height) m:
+    of the map's boundary. `obstacles`: obstacles of the map. `tolerance`, m: by how much walls were allowed
+    to move. `moved_area`, m²: area that was free and is not, or is and was not, for the simplification.
+    `moved`, m: by how much a wall moved for it, at most. `others`, m: a place in each of the largest parts of
+    the free space that were left out, as `Shaping.inside` takes it; empty where what was left out is not
+    worth a word.
     """
 
     source: str

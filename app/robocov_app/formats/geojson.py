@@ -50,15 +50,7 @@ def read_geojson(path: Path, options: ReadOptions) -> ForeignMap:
     a map of at most 10 km; else they are metres. The member ``crs`` of the older standard is obeyed, as is
     a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes; the option overrules both.
 
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood; with line and column.
+    Raises MapError when the file cannot be read or understood; with line and column.
     """
     document, content, where = read_json(path)
     shapes = Shapes(where, options)

@@ -43,25 +43,12 @@ def in_metres(
 ) -> tuple[list[Figure], list[str]]:
     """Return figures with coordinates in metres, and what was done to them, in words.
 
-    Parameters
-    ----------
-    figures : sequence of Figure
-    options : ReadOptions
-        ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
-    where : str
-        What messages call the file.
-    crs : str or None
-        The reference system that the file names, as ``EPSG:25832`` or an OGC URN.
-    globe : bool
-        Whether coordinates without a system are degrees where that makes a map of at most 10 km.
-    origin : (longitude, latitude) or None
-        Where the file says that [0, 0] m is; by default the middle of what is there.
-
-    Raises
-    ------
-    MapError
-        When a system is needed that is unknown, or that needs pyproj where it is not installed; or there are
-        too many shapes.
+    `options`: ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
+    `where`: what messages call the file. `crs`: the reference system that the file names, as ``EPSG:25832``
+    or an OGC URN. `globe`: whether coordinates without a system are degrees where that makes a map of at most
+    10 km. `origin`, (longitude, latitude) or None: where the file says that [0, 0] m is; by default the
+    middle of what is there. Raises MapError when a system is needed that is unknown, or that needs pyproj
+    where it is not installed; or there are too many shapes.
     """
     if not figures:
         return [], []
@@ -167,11 +154,6 @@ class LocalPlane:
 
     Azimuthal equidistant on the ellipsoid of WGS 84 (Snyder 1987, Map Projections: A Working Manual,
     section 25): within 5 km of the place lengths are true to better than a millimetre.
-
-    Parameters
-    ----------
-    pyproj : module
-    longitude, latitude : float, degrees
     """
 
     def __init__(self, pyproj: Any, longitude: float, latitude: float) -> None:

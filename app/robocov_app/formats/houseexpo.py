@@ -28,19 +28,9 @@ def is_houseexpo(path: Path, head: bytes) -> bool:
 def read_houseexpo(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the floor plan at `path`.
 
-    The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm,
-    with corners cut by a step or two of it. Doors and furniture are not in the format.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-        None of them means anything here.
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read, or is not such a plan.
+    The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
+    corners cut by a step or two of it. Doors and furniture are not in the format. `options`: None of them
+    means anything here. Raises MapError when the file cannot be read, or is not such a plan.
     """
     document, content, where = read_json(path)
     with located_errors(content, where):

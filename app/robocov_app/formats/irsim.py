@@ -44,18 +44,9 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map of an IR-SIM world.
 
     Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
-    ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left
-    out and counted. The states of robots are a start.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood, or its world is generated.
+    ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out
+    and counted. The states of robots are a start. Raises MapError when the file cannot be read or understood,
+    or its world is generated.
     """
     where = one_line(path)
     shapes = Shapes(where, options)

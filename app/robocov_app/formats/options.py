@@ -114,22 +114,11 @@ _CHOICES = {
 class Importer:
     """A foreign format.
 
-    Attributes
-    ----------
-    name : str
-        As in ``--format``.
-    title : str
-        One line for people.
-    suffixes : tuple of str
-        Lower case, with the dot: ``(".yaml", ".yml")``.
-    sniff : callable
-        ``sniff(path, head)``: whether a file that begins with these bytes (`limits.HEAD` of them, or
-        all) is of the format. Cheap, and never raises.
-    read : callable
-        ``read(path, options)``: the `ForeignMap` in the file. Raises MapError, one line, on whatever
-        it cannot use, within a second and 200 MB.
-    options : frozenset of str
-        Names of the `ReadOptions` that mean something here.
+    `name`: as in ``--format``. `title`: one line for people. `suffixes`: lower case, with the dot:
+    ``(".yaml", ".yml")``. `sniff`: ``sniff(path, head)``: whether a file that begins with these bytes
+    (`files.HEAD` of them, or all) is of the format. Cheap, and never raises. `read`: ``read(path,
+    options)``: the `ForeignMap` in the file. Raises MapError, one line, on whatever it cannot use, within a
+    second and 200 MB. `options`: names of the `ReadOptions` that mean something here.
     """
 
     name: str
@@ -198,19 +187,10 @@ class WriteOptions:
 class ExportReport:
     """What came of a map in a foreign format.
 
-    Attributes
-    ----------
-    format : str
-    files : tuple of Path
-        What was written; the first is the one that was asked for.
-    area : float, m²
-        Free area of the map.
-    area_written : float, m²
-        Free area of what was written.
-    dropped, notes : tuple of str
-        What the format cannot hold (names, starts), and what is worth knowing besides; one line each.
-    warnings : tuple of str
-        What is wrong in the file: where robots cannot drive any more; one line each.
+    `files`: what was written; the first is the one that was asked for. `area`, m²: free area of the map.
+    `area_written`, m²: free area of what was written. `dropped`, `notes`: what the format cannot hold (names,
+    starts), and what is worth knowing besides; one line each. `warnings`: what is wrong in the file: where
+    robots cannot drive any more; one line each.
     """
 
     format: str
@@ -252,21 +232,11 @@ def _only(path: Path, options: WriteOptions) -> tuple[Path, ...]:
 class Exporter:
     """A foreign format to write.
 
-    Attributes
-    ----------
-    name : str
-        As in ``--format``.
-    title : str
-        One line for people.
-    suffixes : tuple of str
-        Lower case, with the dot.
-    write : callable
-        ``write(environment, path, options)`` writes the map whole or not at all
-        (`robocov.files.atomic.written`) and returns an `ExportReport`. Raises ParameterError or OutputError.
-    options : frozenset of str
-        Names of the `WriteOptions` that mean something here.
-    files : callable
-        ``files(path, options)``: all files that would be written, the given one first.
+    `name`: as in ``--format``. `title`: one line for people. `suffixes`: lower case, with the dot. `write`:
+    ``write(environment, path, options)`` writes the map whole or not at all (`robocov.files.atomic.written`)
+    and returns an `ExportReport`. Raises ParameterError or OutputError. `options`: names of the
+    `WriteOptions` that mean something here. `files`: ``files(path, options)``: all files that would be
+    written, the given one first.
     """
 
     name: str

@@ -69,17 +69,8 @@ def read_osm(path: Path, options: ReadOptions) -> ForeignMap:
     Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says
     that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
     option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below
-    the ground, roofs, and ways whose nodes the extract lacks are left out.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood; with the line.
+    the ground, roofs, and ways whose nodes the extract lacks are left out. Raises MapError when the file
+    cannot be read or understood; with the line.
     """
     where = one_line(path)
     extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))

@@ -64,18 +64,10 @@ _MOST_OF_JPEG = 512
 class Brightness:
     """A picture without its colours.
 
-    Attributes
-    ----------
-    level : (rows, columns)
-        Whole numbers from 0, black, to `full`, white, the top row first: of colours the sum of red,
-        green and blue.
-    full : int
-    alpha : (rows, columns) uint8, or None
-        From 0, transparent, to 255, opaque; None where the picture has no such thing.
-    texts : dict of str
-        What a PNG says of itself.
-    lossy : bool
-        Whether pixels may have got another brightness when it was saved, as in a JPEG.
+    `level`, (rows, columns): whole numbers from 0, black, to `full`, white, the top row first: of colours the
+    sum of red, green and blue. `alpha`, (rows, columns) uint8: from 0, transparent, to 255, opaque; None
+    where the picture has no such thing. `texts`: what a PNG says of itself. `lossy`: whether pixels may have
+    got another brightness when it was saved, as in a JPEG.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
@@ -93,17 +85,8 @@ def is_picture(head: bytes) -> bool:
 def read_picture(path: Path, where: str) -> Brightness:
     """Return the picture at `path`.
 
-    Parameters
-    ----------
-    path : Path
-    where : str
-        What messages call it.
-
-    Raises
-    ------
-    MapError
-        When there is no such file, it is no picture that can be read, broken, cut off, or has more than
-        `files.MAX_CELLS` pixels.
+    `where`: what messages call it. Raises MapError when there is no such file, it is no picture that can be
+    read, broken, cut off, or has more than `files.MAX_CELLS` pixels.
     """
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):

@@ -49,21 +49,8 @@ def preview(
 ) -> None:
     """Draw an import to a file: `plot_import`, saved.
 
-    Parameters
-    ----------
-    foreign : ForeignMap
-    environment : Environment
-    report : ImportReport
-    path : Path
-        A .png, .svg or .pdf.
-    theme : Theme or {"light", "dark"}
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
-    ParameterError
-        When its suffix is another.
+    `path`: a .png, .svg or .pdf. Raises OutputError when the file cannot be written; ParameterError when its
+    suffix is another.
     """
     check_figure_path(path)
     save_figure(plot_import(foreign, environment, report, theme=theme), path)
@@ -76,17 +63,6 @@ def plot_import(
 
     In the first, free space that is not in the map any more is marked, with a place in each large part of it;
     in the second, places that were solid and are free, and the narrowest passage.
-
-    Parameters
-    ----------
-    foreign : ForeignMap
-    environment : Environment
-    report : ImportReport
-    theme : Theme or {"light", "dark"}
-
-    Returns
-    -------
-    matplotlib Figure
     """
     theme = theme_named(theme)
     compared = compare(foreign, environment, report)

@@ -33,17 +33,8 @@ def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
     It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free
     space and the others are obstacles; or one ring alone; or a list of such lists; or, flat, an object with
     ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and ``dimensions``.
-    There are no units: the option ``scale`` is metres a unit, 1 by default.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood; with line and column.
+    There are no units: the option ``scale`` is metres a unit, 1 by default. Raises MapError when the file
+    cannot be read or understood; with line and column.
     """
     document, content, where = read_json(path)
     shapes = Shapes(where, options)

@@ -106,18 +106,9 @@ def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map of a Stage world.
 
     Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
-    (``position``) are places to start; sensors and the like are left out. The map is the largest model with
-    a bitmap or a ``boundary``, if most of the others are in it.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When a file cannot be read or understood, with the line; or when it is not in the world's folder.
+    (``position``) are places to start; sensors and the like are left out. The map is the largest model with a
+    bitmap or a ``boundary``, if most of the others are in it. Raises MapError when a file cannot be read or
+    understood, with the line; or when it is not in the world's folder.
     """
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)

@@ -59,10 +59,8 @@ _IDs: TypeAlias = NDArray[np.uint32]
 class _Tile:
     """A tile that is solid: as a whole, or in the shape of its collision objects, if it has `parts`.
 
-    Attributes
-    ----------
-    size, offset : (x, y), px
-        Of its picture, and by how much that is drawn away from the lower left of the cell.
+    `size`, `offset`, (x, y) px: of its picture, and by how much that is drawn away from the lower left of the
+    cell.
     """
 
     parts: tuple[Element, ...]
@@ -75,14 +73,8 @@ class _Tile:
 class _Layer:
     """A layer of tiles or objects.
 
-    Attributes
-    ----------
-    labels : tuple of str
-        Its name and class, and those of the groups around it.
-    offset : (x, y), px
-        To the right and down.
-    wall : bool
-        Whether it is asked for, or says itself that it is solid.
+    `labels`: its name and class, and those of the groups around it. `offset`, (x, y) px: to the right and
+    down. `wall`: whether it is asked for, or says itself that it is solid.
     """
 
     element: Element
@@ -102,19 +94,9 @@ def read_tmx(path: Path, options: ReadOptions) -> ForeignMap:
     Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like)
     or by collision objects; of a layer without any such tile all, if the option ``only`` names it, or its
     name, class or a property says so. Objects are solid if they or their layer say so or are asked for, and
-    all of them where nothing else is. Hidden layers count: those of walls mostly are hidden.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-        ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel.
-
-    Raises
-    ------
-    MapError
-        When a file cannot be read or understood, with the line; when the map is not orthogonal, or nothing
-        in it is solid.
+    all of them where nothing else is. Hidden layers count: those of walls mostly are hidden. `options`:
+    ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel. Raises MapError when a file
+    cannot be read or understood, with the line; when the map is not orthogonal, or nothing in it is solid.
     """
     root, where = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
     return _Map(path, root, Shapes(where, options)).read()

@@ -48,20 +48,9 @@ _COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
 class WktText:
     """Well-known text that is read from its beginning to its end.
 
-    Parameters
-    ----------
-    text : str
-        Geometries one after the other, with a comma, a semicolon or nothing between them; lines that
-        begin with # or -- are comments.
-    where : str
-        What messages call the file.
-    shapes : Shapes
-        Is told what is left out.
-
-    Attributes
-    ----------
-    srid : int or None
-        The reference system that the geometries name, once they are read.
+    `text`: geometries one after the other, with a comma, a semicolon or nothing between them; lines that
+    begin with # or -- are comments. `where`: what messages call the file. `shapes`: is told what is left out.
+    `srid`: the reference system that the geometries name, once they are read.
     """
 
     def __init__(self, text: str, where: str, shapes: Shapes) -> None:
@@ -76,10 +65,7 @@ class WktText:
     def figures(self) -> list[Figure]:
         """Return all geometries; the parts of collections one by one.
 
-        Raises
-        ------
-        MapError
-            Where the text is no well-known text, or names two reference systems.
+        Raises MapError where the text is no well-known text, or names two reference systems.
         """
         count = 0
         while self._skip_space() < len(self.text):
@@ -267,18 +253,9 @@ def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
     Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
     Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
     it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-    `enclosing.foreign_map`. Third coordinates and measures are left out. Coordinates
-    are metres, unless a prefix ``SRID=...;`` names a system other than 0.
-
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood; with line and column.
+    `enclosing.foreign_map`. Third coordinates and measures are left out. Coordinates are metres, unless a
+    prefix ``SRID=...;`` names a system other than 0. Raises MapError when the file cannot be read or
+    understood; with line and column.
     """
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)

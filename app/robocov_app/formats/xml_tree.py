@@ -35,17 +35,8 @@ _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 class Element:
     """An element of SVG, or of a format without namespaces; others are left out when it is read.
 
-    Attributes
-    ----------
-    tag : str
-        Without its namespace.
-    attributes : dict of str
-        Their names without namespaces.
-    children : list of Element
-    text : str
-        Of elements whose text means something only.
-    line : int
-        Of the file, counted from 1.
+    `tag`: without its namespace. `attributes`: their names without namespaces. `text`: of elements whose text
+    means something only. `line`: of the file, counted from 1.
     """
 
     tag: str
@@ -71,20 +62,9 @@ class Element:
     ) -> Array:
         """Return the numbers of an attribute, which commas or blanks separate.
 
-        Parameters
-        ----------
-        where : str
-            What messages call the file.
-        name : str
-        count : int or None
-            So many are wanted.
-        default : str or None
-            What stands for an attribute that is missing.
-
-        Raises
-        ------
-        MapError
-            When there are no such numbers, or one is too large for a map.
+        `where`: what messages call the file. `count`: so many are wanted. `default`: what stands for an
+        attribute that is missing. Raises MapError when there are no such numbers, or one is too large for a
+        map.
         """
         text = self.attributes.get(name, default)
         try:
@@ -109,10 +89,7 @@ class Element:
 def read_svg_tree(path: Path) -> tuple[Element, str]:
     """Return the root of the SVG file at `path`, and what messages call the file.
 
-    Raises
-    ------
-    MapError
-        As `read_xml_tree`.
+    Raises MapError as `read_xml_tree`.
     """
     return read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
 
@@ -120,21 +97,10 @@ def read_svg_tree(path: Path) -> tuple[Element, str]:
 def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> tuple[Element, str]:
     """Return the root of the XML file at `path`, and what messages call the file.
 
-    Parameters
-    ----------
-    path : Path
-    root : str
-        Tag that the root has.
-    kind : str
-        What messages call the format.
-    texts : collection of str
-        Tags of elements whose text means something.
-
-    Raises
-    ------
-    MapError
-        When it cannot be read, is too large, is not XML or has another root; when it has entities
-        that stand for other files or other entities, or for too much; or too many elements, or too deep ones.
+    `root`: tag that the root has. `kind`: what messages call the format. `texts`: tags of elements whose text
+    means something. Raises MapError when it cannot be read, is too large, is not XML or has another root;
+    when it has entities that stand for other files or other entities, or for too much; or too many elements,
+    or too deep ones.
     """
     where = one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)

@@ -35,12 +35,7 @@ _DIGITS = 6
 class Grid:
     """A grid over a map, with one cell to spare on each side.
 
-    Attributes
-    ----------
-    rows, columns : int
-    cell : float, m
-    origin : (x, y), m
-        Lower left corner of the lower left cell.
+    `cell` in m. `origin`, (x, y) m: lower left corner of the lower left cell.
     """
 
     rows: int
@@ -117,18 +112,8 @@ class Grid:
 def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
     """Return a grid over the boundary of `environment`; what was made of cells of that size meets them again.
 
-    Parameters
-    ----------
-    environment : Environment
-    cell : float or None, m
-        Side of a cell; `CELL` by default.
-    most : int
-        Cells.
-
-    Raises
-    ------
-    ParameterError
-        When there are more than `most`.
+    `cell`, m: side of a cell; `CELL` by default. `most`: cells. Raises ParameterError when there are more
+    than `most`.
     """
     cell = CELL if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
@@ -147,13 +132,8 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
     """Return which cells of `grid` are free, (rows, columns), the lowest row first.
 
     A cell is free if its centre is, and if nothing solid would be lost: no wall is too thin, and no pillar
-    too small, to block a cell. Where one can drive from cell to cell through their sides one can drive on
-    the map.
-
-    Raises
-    ------
-    ParameterError
-        When none is.
+    too small, to block a cell. Where one can drive from cell to cell through their sides one can drive on the
+    map. Raises ParameterError when none is.
     """
     free = grid.covered(environment.free) & ~grid.between(environment.free)
     # what is smaller than a cell may lie between all lines of centres

@@ -18,13 +18,9 @@ sine of the angle below which two walls count as parallel."""
 def sharpened(plan: Polygon, tolerance: float) -> Polygon:
     """Return `plan` with its cut corners made whole, or as it is where that would break it.
 
-    Parameters
-    ----------
-    plan : Polygon, m
-    tolerance : float, m
-        A run of edges of at most 1.5 `tolerance` becomes the point where the long edges before and
-        after it meet when they are drawn on, if all of the run is within 2 `tolerance` of that
-        point: unlike a plain simplification, it keeps the directions of the walls.
+    `plan` in m. `tolerance`, m: a run of edges of at most 1.5 `tolerance` becomes the point where the long
+    edges before and after it meet when they are drawn on, if all of the run is within 2 `tolerance` of that
+    point: unlike a plain simplification, it keeps the directions of the walls.
 
     Examples
     --------

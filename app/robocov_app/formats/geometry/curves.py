@@ -30,26 +30,9 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
 
     The number of equal steps of the parameter is that of Wang's formula: the second differences of the
     control points bound the curvature. (G. Wang, The subdivision method for finding the intersection between
-    two Bézier curves or surfaces, Zhejiang University Journal, 1984.)
-
-    Parameters
-    ----------
-    control : (n, 4, 2)
-    tolerance : float
-        In the same unit.
-    most : int
-        So many points are made at most.
-
-    Returns
-    -------
-    points : (k, 2)
-    count : (n,)
-        Points of each.
-
-    Raises
-    ------
-    ValueError
-        When there would be more.
+    two Bézier curves or surfaces, Zhejiang University Journal, 1984.) `control`: (n, 4, 2). `tolerance`: in
+    the same unit. `most`: so many points are made at most. Returns: `points`, (k, 2). `count`, (n,): points
+    of each. Raises ValueError when there would be more.
 
     Examples
     --------
@@ -71,25 +54,9 @@ def arcs(
 ) -> tuple[Array, IntArray]:
     """Return points of elliptic arcs: all of the first one without its begin, then of the next.
 
-    Parameters
-    ----------
-    centre, u, v : (n, 2)
-        A point of an arc is centre + u cos(angle) + v sin(angle).
-    begin, sweep : (n,) rad
-        First angle, and how far it goes on, either way.
-    tolerance : float
-        In the same unit.
-    most : int
-
-    Returns
-    -------
-    points, count
-        As of `beziers`.
-
-    Raises
-    ------
-    ValueError
-        As `beziers`.
+    `centre`, `u`, `v`, (n, 2): a point of an arc is centre + u cos(angle) + v sin(angle). `begin`, `sweep`,
+    (n,) rad: first angle, and how far it goes on, either way. `tolerance`: in the same unit. Returns: points,
+    count: as of `beziers`. Raises ValueError as `beziers`.
     """
     # the longer half axis: the greater singular value of [u v]
     square, area = (u**2 + v**2).sum(axis=1), u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
@@ -112,14 +79,8 @@ def arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance
 def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
     """Return points of any smooth curve, (k, 2): steps are halved until their middles are near their chords.
 
-    Parameters
-    ----------
-    curve : callable
-        Takes parameters (k,) to points (k, 2).
-    breaks : (b,)
-        Growing parameters, from the curve's begin to its end; smooth between one and the next.
-    tolerance : float
-        In the unit of the points.
+    `curve`: takes parameters (k,) to points (k, 2). `breaks`, (b,): growing parameters, from the curve's
+    begin to its end; smooth between one and the next. `tolerance`: in the unit of the points.
     """
     part = np.arange(_FIRST) / _FIRST
     t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])

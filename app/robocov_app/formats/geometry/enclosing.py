@@ -53,19 +53,10 @@ def bounded(
 ) -> tuple[Polygon, list[Polygon]]:
     """Return a boundary around `free`, and what is solid in it.
 
-    Parameters
-    ----------
-    free : MultiPolygon, m
-        With coordinates of so many `digits`.
-    given : Polygon or None, m
-        A boundary without holes, which may run along the free space as it was before walls moved.
-        None: the outline of the free space, or its convex hull where it is of several parts.
-    hull : bool
-        Whether the convex hull of that is wanted.
-    margin : float, m
-        So much is solid around it.
-    digits : int
-        Decimals of the coordinates.
+    `free`, m: with coordinates of so many `digits`. `given`, m: a boundary without holes, which may run along
+    the free space as it was before walls moved. None: the outline of the free space, or its convex hull where
+    it is of several parts. `hull`: whether the convex hull of that is wanted. `margin`, m: so much is solid
+    around it. `digits`: decimals of the coordinates.
 
     Examples
     --------
@@ -139,28 +130,14 @@ def foreign_map(
     3. the outer edge of the walls, if they close and what they enclose is mostly open;
     4. a rectangle around everything, at the distance of the option ``around``.
 
-    Parameters
-    ----------
-    shapes : Shapes
-    format, name, description : str
-    solid : bool
-        What closed outlines are unless the option ``outlines`` says it: True is solid; False is free, but
-        solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
-    accessible : bool
-        Whether outlines are all free in files of that format, as JuPedSim's accessible area, so that one may
-        overlap another: then 2 holds only where all others lie wholly in the largest, which would add nothing
-        to it as free space.
-    world : MultiPolygon or None, m
-        What is free before the shapes stand in it, where the format says so: then no boundary is looked for.
-    notes : sequence of str
-        What else is worth knowing.
-
-    Raises
-    ------
-    MapError
-        When there are no shapes, the boundary has no area, or the shapes cross each other too often.
-    ParameterError
-        When a name in the options is none of the file's.
+    `solid`: what closed outlines are unless the option ``outlines`` says it: True is solid; False is free,
+    but solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
+    `accessible`: whether outlines are all free in files of that format, as JuPedSim's accessible area, so
+    that one may overlap another: then 2 holds only where all others lie wholly in the largest, which would
+    add nothing to it as free space. `world`, m: what is free before the shapes stand in it, where the format
+    says so: then no boundary is looked for. `notes`: what else is worth knowing. Raises MapError when there
+    are no shapes, the boundary has no area, or the shapes cross each other too often; ParameterError when a
+    name in the options is none of the file's.
     """
     shapes.require_known_names()
     if world is None and not shapes.outlines and not shapes.lines:

@@ -38,12 +38,7 @@ most, and crossings that are enough for one."""
 class Crossings:
     """Count of edge crossings in a file, over all of its shapes, with `MAX_CROSSINGS` at most.
 
-    Attributes
-    ----------
-    where : str
-        What messages call the file.
-    count : float
-        So far; an estimate where edges are many.
+    `where`: what messages call the file. `count`: so far; an estimate where edges are many.
     """
 
     where: str = "rings"
@@ -53,11 +48,7 @@ class Crossings:
         """Count the crossings of some edges, (n, 2, 2) m: start and end of each.
 
         Ends that meet, and edges on each other, do not count. Where edges are many, some are looked at.
-
-        Raises
-        ------
-        MapError
-            When there are too many.
+        Raises MapError when there are too many.
         """
         n = len(edges)
         lines = shapely.linestrings(edges)
@@ -95,29 +86,12 @@ def enclosed(
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
     """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
 
-    Parameters
-    ----------
-    rings : sequence of (k, 2) m
-        Closed or not; repeated vertices do no harm.
-    rule : str
-        ``holes``: the first ring without the others. ``evenodd``, ``nonzero``: what a ray from there
-        crosses an odd number of times, or what the rings wind around (SVG 2, 13.3.3).
-    crossings : Crossings or None
-        Of the file so far.
-
-    Returns
-    -------
-    area : MultiPolygon, m
-        The largest part first; empty where nothing is enclosed.
-    reason : str or None
-        Where a ring meets itself or another one, of polygons with holes; fills may.
-    lost : dict of str to int
-        How many holes of a polygon take nothing out of it, by the reason.
-
-    Raises
-    ------
-    MapError
-        When the rings cross each other too often.
+    `rings`, each (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring without the
+    others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or what the rings
+    wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the largest part first;
+    empty where nothing is enclosed. `reason`: where a ring meets itself or another one, of polygons with
+    holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the reason. Raises
+    MapError when the rings cross each other too often.
 
     Examples
     --------

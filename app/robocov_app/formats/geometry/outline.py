@@ -49,17 +49,10 @@ _LONGEST = 1024
 class Outline:
     """The k vertices of the rings of polygons, ring after ring, no first one repeated.
 
-    Attributes
-    ----------
-    points : (k, 2) m
-    begin : (r,)
-        Where each ring begins.
-    owner : (r,)
-        The polygon that each ring belongs to; its outer ring comes first.
-    neck : (k,)
-        Whether two obstacles touch there: the vertex stands for a neck as `tracing` makes them.
-    cell : float or None, m
-        Side of the cells that it is the outline of, the longer one.
+    `points`: (k, 2) m. `begin`, (r,): where each ring begins. `owner`, (r,): the polygon that each ring
+    belongs to; its outer ring comes first. `neck`, (k,): whether two obstacles touch there: the vertex stands
+    for a neck as `tracing` makes them. `cell`, m: side of the cells that it is the outline of, the longer
+    one.
     """
 
     points: Array
@@ -83,14 +76,9 @@ class Outline:
 class Drawing:
     """An outline with fewer vertices: its own, and middles of its sides.
 
-    Attributes
-    ----------
-    points : (m, 2) m
-    begin : (r,)
-        Where each ring begins; rings may have fewer than three vertices.
-    source : (m,)
-        The vertex of the outline that each one is; with a half added, the middle of the side after it.
-        Along a ring they grow, but for one step back to the ring's lowest.
+    `points`: (m, 2) m. `begin`, (r,): where each ring begins; rings may have fewer than three vertices.
+    `source`, (m,): the vertex of the outline that each one is; with a half added, the middle of the side
+    after it. Along a ring they grow, but for one step back to the ring's lowest.
     """
 
     points: Array
@@ -102,16 +90,8 @@ class Drawing:
 class _Path:
     """An outline on its way to a drawing: p vertices.
 
-    Attributes
-    ----------
-    points : (p, 2) m
-    begin : (r,)
-    source : (p,)
-        As of a `Drawing`.
-    allowed : (p,) m
-        The tolerance at each.
-    fixed : (p,)
-        Which of them stay in any case.
+    `points`: (p, 2) m. `begin`: (r,). `source`, (p,): as of a `Drawing`. `allowed`, (p,) m: the tolerance at
+    each. `fixed`, (p,): which of them stay in any case.
     """
 
     points: Array
@@ -150,13 +130,8 @@ def outline_of(parts: MultiPolygon | list[Polygon], cell: float | None) -> Outli
 def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Drawing:
     """Return `outline` with what is within the tolerance left out.
 
-    Parameters
-    ----------
-    outline : Outline
-    tolerance : (k,) m
-        Of each of its vertices; where it is 0 they all stay.
-    fixed : (k,)
-        Which of them stay besides, or the middles that stand for them.
+    `tolerance`, (k,) m: of each of its vertices; where it is 0 they all stay. `fixed`, (k,): which of them
+    stay besides, or the middles that stand for them.
     """
     path = _without_stairs(outline, tolerance, fixed)
     if not len(path.points):
@@ -283,13 +258,8 @@ def _foot(p: Array, a: Array, u: Array) -> Array:
 def with_necks(outline: Outline, drawing: Drawing) -> tuple[Array, IntArray, IntArray]:
     """Return `drawing` with the outline's necks again.
 
-    Returns
-    -------
-    points : (n, 2) m
-    begin : (r,)
-        Where each ring begins.
-    vertex : (n,)
-        The vertex of the drawing that each point stands for.
+    Returns: `points`, (n, 2) m. `begin`, (r,): where each ring begins. `vertex`, (n,): the vertex of the
+    drawing that each point stands for.
     """
     points, begin, source = drawing.points, drawing.begin, drawing.source
     whole = source.astype(np.intp)

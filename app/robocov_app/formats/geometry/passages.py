@@ -78,12 +78,8 @@ def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple
 class Moved:
     """By how much the walls of a free space moved.
 
-    Attributes
-    ----------
-    area : float, m²
-        That was free and is not, or is and was not.
-    distance : float, m
-        From a vertex of one outline to the other outline, at most.
+    `area`, m²: that was free and is not, or is and was not. `distance`, m: from a vertex of one outline to
+    the other outline, at most.
     """
 
     area: float
@@ -122,27 +118,10 @@ def closed_gaps(
     """Return which gaps have become too narrow; None where there are too many to look at.
 
     A gap is where two sides face each other across the free space. It was wide enough if what these sides
-    stand for is further apart there.
-
-    Parameters
-    ----------
-    sides : (m, 2, 2) m
-        The sides of walls as they are now, from point to point.
-    paths : (m,) linestrings, m
-        What each stands for: the wall as it was.
-    free : MultiPolygon, m
-        The free space now.
-    width : float, m
-        A robot's diameter.
-    moved : float, m
-        No wall has moved further.
-
-    Returns
-    -------
-    pairs : (p, 2)
-        The two sides.
-    places : (p, 2) m
-        The middle of the gap.
+    stand for is further apart there. `sides`, (m, 2, 2) m: the sides of walls as they are now, from point to
+    point. `paths`, (m,) linestrings m: what each stands for: the wall as it was. `free`, m: the free space
+    now. `width`, m: a robot's diameter. `moved`, m: no wall has moved further. Returns: `pairs`, (p, 2): the
+    two sides. `places`, (p, 2) m: the middle of the gap.
     """
     lines = shapely.linestrings(sides)
     tree = STRtree(lines)
@@ -178,14 +157,9 @@ def closed_gaps(
 def paths_of(points: Array, begin: IntArray, size: IntArray, first: IntArray, last: IntArray) -> Array:
     """Return runs of vertices of rings as linestrings, (m,).
 
-    Parameters
-    ----------
-    points : (k, 2) m
-        Vertices of rings, ring after ring.
-    begin, size : (m,)
-        Where each run's ring begins, and how many vertices it has.
-    first, last : (m,)
-        The first and the last vertex of each run, along the ring; the same for all of a ring.
+    `points`, (k, 2) m: vertices of rings, ring after ring. `begin`, `size`, (m,): where each run's ring
+    begins, and how many vertices it has. `first`, `last`, (m,): the first and the last vertex of each run,
+    along the ring; the same for all of a ring.
     """
     count = (last - first - 1) % size + 2
     at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)

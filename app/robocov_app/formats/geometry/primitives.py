@@ -34,22 +34,10 @@ def with_primitives(
     A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
     twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
     along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
-    where there would be more places for a robot, apart from each other.
-
-    Parameters
-    ----------
-    solid : sequence of Polygon, m
-    primitives : iterable of obstacles
-        As the file draws them; they may overlap and stick out of the boundary.
-    boundary : Polygon, m
-    tolerance : float, m
-        By so much walls were allowed to move.
-    digits : int
-        Decimals of the coordinates.
-    places : int
-        So many separate places a robot may be at; see `robocov_app.formats.geometry.passages.rooms`.
-    radius : float, m
-        Of the robot.
+    where there would be more places for a robot, apart from each other. `solid` in m. `primitives`: as the
+    file draws them; they may overlap and stick out of the boundary. `boundary` in m. `tolerance`, m: by so
+    much walls were allowed to move. `digits`: decimals of the coordinates. `places`: so many separate places
+    a robot may be at; see `robocov_app.formats.geometry.passages.rooms`. `radius`, m: of the robot.
 
     Examples
     --------

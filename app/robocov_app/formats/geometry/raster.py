@@ -47,31 +47,12 @@ def foreign_map(
 ) -> ForeignMap:
     """Return `cells` as a map.
 
-    Parameters
-    ----------
-    cells : (rows, columns)
-    name, description, format : str
-    cell : float, m
-        Side of a cell.
-    origin : (x, y), m
-        Lower left corner of the lower left cell.
-    yaw : float, rad
-        By so much the grid is turned about that corner, counter-clockwise.
-    unknown : str
-        What unknown cells are; ``cut``: outside of the map, which ends around the known ones.
-    called : str
-        What the report calls unknown cells.
-    noise : float
-        Obstacles of fewer cells are noise.
-    where : str
-        What messages call the file.
-    repaired, notes : tuple of str
-        What the report says besides.
-
-    Raises
-    ------
-    MapError
-        When no cell is free, or the grid is too rough or too far away.
+    `cells`: (rows, columns). `cell`, m: side of a cell. `origin`, (x, y) m: lower left corner of the lower
+    left cell. `yaw`, rad: by so much the grid is turned about that corner, counter-clockwise. `unknown`: what
+    unknown cells are; ``cut``: outside of the map, which ends around the known ones. `called`: what the
+    report calls unknown cells. `noise`: obstacles of fewer cells are noise. `where`: what messages call the
+    file. `repaired`, `notes`: what the report says besides. Raises MapError when no cell is free, or the grid
+    is too rough or too far away.
     """
     rows, columns = cells.shape
     corners = _placed(np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float), cell, origin, yaw)
@@ -121,21 +102,9 @@ def free_area(
 ) -> MultiPolygon:
     """Return the free cells as polygons, in metres.
 
-    Parameters
-    ----------
-    free : (rows, columns)
-        The top row first.
-    cell : (width, height), m
-        Sides of a cell.
-    origin : (x, y), m
-        Lower left corner of the lower left cell.
-    where : str
-        What messages call the file.
-
-    Raises
-    ------
-    MapError
-        When no cell is free, or their outline is too rough.
+    `free`, (rows, columns): the top row first. `cell`, (width, height) m: sides of a cell. `origin`, (x, y)
+    m: lower left corner of the lower left cell. `where`: what messages call the file. Raises MapError when no
+    cell is free, or their outline is too rough.
     """
     if not free.any():
         raise MapError(f"{where}: no cell is free, but some were wanted")

@@ -38,18 +38,9 @@ _MITRE_LIMIT = 4.0
 class Figure:
     """A geometry of a file, before it is known what its coordinates are.
 
-    Attributes
-    ----------
-    kind : str
-        ``polygon`` (a ring and its holes), ``line`` or ``point``.
-    rings : tuple of (k, 2)
-    labels : tuple of str
-    at : str
-        Its place in the file, for messages.
-    rule : str
-        What the rings of a polygon enclose; see `robocov_app.formats.geometry.fills.enclosed`.
-    width : float or None, m
-        Of a line, where the file says it.
+    `kind`: ``polygon`` (a ring and its holes), ``line`` or ``point``. `at`: its place in the file, for
+    messages. `rule`: what the rings of a polygon enclose; see `robocov_app.formats.geometry.fills.enclosed`.
+    `width`, m: of a line, where the file says it.
     """
 
     kind: Kind
@@ -64,14 +55,8 @@ class Figure:
 class Outline:
     """A closed outline.
 
-    Attributes
-    ----------
-    area : MultiPolygon, m
-        What it encloses; valid.
-    labels : tuple of str
-        Its names, ids, classes, layers; the most particular first.
-    circle : CircleObstacle or None
-        The same as an obstacle of a map, where it is a disc.
+    `area`, m: what it encloses; valid. `labels`: its names, ids, classes, layers; the most particular first.
+    `circle`: the same as an obstacle of a map, where it is a disc.
     """
 
     area: MultiPolygon
@@ -83,17 +68,9 @@ class Outline:
 class Line:
     """An open or closed line that is a wall.
 
-    Attributes
-    ----------
-    points : (k, 2) m
-    width : float, m
-    labels : tuple of str
-    cap, join : str
-        Shapes of its ends and corners, in the words of shapely.
-    mitre_limit : float
-    stretched : (points, width, matrix) or None
-        A pen that is no circle: (k, 2) points and a width in other units, and the (3, 3) matrix that
-        makes them metres.
+    `points`: (k, 2) m. `width` in m. `cap`, `join`: shapes of its ends and corners, in the words of shapely.
+    `stretched`, (points, width, matrix) or None: a pen that is no circle: (k, 2) points and a width in other
+    units, and the (3, 3) matrix that makes them metres.
     """
 
     points: Array
@@ -132,21 +109,10 @@ class Line:
 class Shapes:
     """What a reader has found, as it finds it: checked, counted, chosen by name.
 
-    Attributes
-    ----------
-    where : str
-        What messages call the file.
-    options : ReadOptions
-    outlines, lines, pillars : lists
-        Pillars are obstacles whatever outlines are.
-    vertices : int
-        All that were read.
-    left_out : Counter
-        Things that are no part of the map, with the reason where it needs one, and how many there are.
-    labels : dict
-        All labels, as they are compared and as they are written.
-    mended : Counter
-        Things that had to be put right, what was done to them, and how many there are.
+    `where`: what messages call the file. `outlines`, `lines`, `pillars`: pillars are obstacles whatever
+    outlines are. `vertices`: all that were read. `left_out`: things that are no part of the map, with the
+    reason where it needs one, and how many there are. `labels`: all labels, as they are compared and as they
+    are written. `mended`: things that had to be put right, what was done to them, and how many there are.
     """
 
     where: str
@@ -176,13 +142,7 @@ class Shapes:
         return False
 
     def add(self, figure: Figure) -> None:
-        """Add a geometry whose coordinates are metres.
-
-        Raises
-        ------
-        MapError
-            As `add_outline`.
-        """
+        """Add a geometry whose coordinates are metres. Raises MapError as `add_outline`."""
         if not self.wants(figure.labels):
             return
         if figure.kind == "point":
@@ -198,10 +158,7 @@ class Shapes:
     ) -> bool:
         """Add the area that rings, each (k, 2) m, enclose; return whether there is any.
 
-        Raises
-        ------
-        MapError
-            When a coordinate is out of range, or there are too many vertices or crossings.
+        Raises MapError when a coordinate is out of range, or there are too many vertices or crossings.
         """
         rings = self._checked(rings, at)
         area, reason, lost = enclosed(rings, rule, self._crossings)
@@ -214,13 +171,7 @@ class Shapes:
         return not area.is_empty
 
     def add_line(self, line: Line, *, at: str = "") -> None:
-        """Add a wall.
-
-        Raises
-        ------
-        MapError
-            As `add_outline`.
-        """
+        """Add a wall. Raises MapError as `add_outline`."""
         (points,) = self._checked([line.points], at)
         width = max(line.width, 0.0)
         files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
@@ -244,26 +195,14 @@ class Shapes:
         ]
 
     def add_circle(self, centre: Array, radius: float, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a disc, as the polygon that stands for a round obstacle.
-
-        Raises
-        ------
-        MapError
-            As `add_outline`.
-        """
+        """Add a disc, as the polygon that stands for a round obstacle. Raises MapError as `add_outline`."""
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
         circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
         (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
         self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle))
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a pillar, if points were asked for.
-
-        Raises
-        ------
-        MapError
-            As `add_outline`.
-        """
+        """Add a pillar, if points were asked for. Raises MapError as `add_outline`."""
         ((x, y),) = self._checked([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
@@ -310,10 +249,7 @@ class Shapes:
     def require_known_names(self) -> None:
         """Check that every name of the options is one of the file's.
 
-        Raises
-        ------
-        ParameterError
-            On the first that is none; the message names the nearest.
+        Raises ParameterError on the first that is none; the message names the nearest.
         """
         options = self.options
         for name, labels in (
@@ -330,10 +266,7 @@ class Shapes:
     def require_untangled(self) -> None:
         """Check that what is free among the shapes can be computed.
 
-        Raises
-        ------
-        MapError
-            When they cross each other too often.
+        Raises MapError when they cross each other too often.
         """
         rings = [
             np.asarray(ring.coords)[:-1]

@@ -147,17 +147,8 @@ class _Told:
 def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
     """Return the environment that `foreign` stands for, and what was done to it.
 
-    Parameters
-    ----------
-    foreign : ForeignMap
-    shaping : Shaping
-    where : str
-        What messages call the map: a file's name.
-
-    Raises
-    ------
-    MapError
-        When nothing is free, no place is wide enough for a robot, or the map breaks another rule.
+    `where`: what messages call the map: a file's name. Raises MapError when nothing is free, no place is wide
+    enough for a robot, or the map breaks another rule.
     """
     told = _Told(list(foreign.repaired), list(foreign.dropped), [], list(foreign.notes))
     outer = _valid_boundary(foreign.boundary, told)
@@ -515,15 +506,9 @@ _SLIVER = 2.0
 class Comparison:
     """Free space as it was read and as it became, and what differs; all in metres.
 
-    Attributes
-    ----------
-    before, after : geometry
-    lost, opened : geometry
-        What is free in the first alone, and in the second alone, without the slivers along walls that moved.
-    region : geometry
-        Convex, around all of it.
-    gap : Gap or None
-        The narrowest passage of the second, if that is soon known.
+    `lost`, `opened`: what is free in the first alone, and in the second alone, without the slivers along
+    walls that moved. `region`: convex, around all of it. `gap`: the narrowest passage of the second, if that
+    is soon known.
     """
 
     before: BaseGeometry

@@ -50,13 +50,8 @@ _ROUNDS, _WORK = 60, 1_000_000
 class Simplified:
     """A free space with fewer vertices.
 
-    Attributes
-    ----------
-    free : MultiPolygon, m
-    tolerance : float, m
-        Walls may have moved by so much.
-    changed : tuple of str
-        Where less was done than wanted, and why; one line each.
+    `free` in m. `tolerance`, m: walls may have moved by so much. `changed`: where less was done than wanted,
+    and why; one line each.
     """
 
     free: MultiPolygon
@@ -93,16 +88,9 @@ class _Found:
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
     """Return `free` with fewer vertices.
 
-    Parameters
-    ----------
-    free : MultiPolygon, m
-        Valid; of a raster as `tracing.traced` makes it.
-    tolerance : float, m
-        Walls may move by so much; 0 changes nothing.
-    cell : float or None, m
-        Side of the cells that it is the outline of.
-    radius : float, m
-        Of a robot: where it passes, it still passes.
+    `free`, m: valid; of a raster as `tracing.traced` makes it. `tolerance`, m: walls may move by so much; 0
+    changes nothing. `cell`, m: side of the cells that it is the outline of. `radius`, m: of a robot: where it
+    passes, it still passes.
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)

@@ -26,21 +26,11 @@ _STRIP = 512
 def traced(free: BoolArray, where: str) -> MultiPolygon:
     """Return the union of the free cells, one polygon for each of their connected parts.
 
-    Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row): the
-    lowest row comes first. It is exact but for the necks between obstacles that touch at a corner,
-    `NECK` squared for each. Every vertex is a true corner, none lies within a straight wall, and no
-    two rings touch.
-
-    Parameters
-    ----------
-    free : (rows, columns) bool
-    where : str
-        What messages call the grid.
-
-    Raises
-    ------
-    MapError
-        When the outline has more vertices than `limits.MAX_VERTICES`.
+    Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row): the lowest row
+    comes first. It is exact but for the necks between obstacles that touch at a corner, `NECK` squared for
+    each. Every vertex is a true corner, none lies within a straight wall, and no two rings touch. `free`:
+    (rows, columns) bool. `where`: what messages call the grid. Raises MapError when the outline has more
+    vertices than `files.MAX_VERTICES`.
 
     Examples
     --------
@@ -94,17 +84,10 @@ def _links(
 ) -> tuple[NDArray[np.int32], IntArray, Array]:
     """Return what the outline is made of, corner by corner.
 
-    Where two corners meet, each is one of a free cell, and the one with the side to the west stands
-    first. The free cells are on the left of the outline.
-
-    Returns
-    -------
-    part : (k,)
-        The part of the free cells that the corner belongs to.
-    following : (k,)
-        The corner that follows it.
-    points : (k, 2, 2)
-        Where the outline comes to it, and where it leaves it: the same but for necks.
+    Where two corners meet, each is one of a free cell, and the one with the side to the west stands first.
+    The free cells are on the left of the outline. Returns: `part`, (k,): the part of the free cells that the
+    corner belongs to. `following`, (k,): the corner that follows it. `points`, (k, 2, 2): where the outline
+    comes to it, and where it leaves it: the same but for necks.
     """
     labels = ndimage.label(free)[0]
 

@@ -42,16 +42,8 @@ _EVEN = 1.0 + 1e-6
 class _Place:
     """Where an element stands, and what it has from the groups around it.
 
-    Attributes
-    ----------
-    matrix : (3, 3)
-        From its units to metres.
-    style : properties
-    labels : tuple of str
-        Of the groups, the innermost first.
-    width, height : float
-        Of the innermost viewport, in its units.
-    depth : int
+    `matrix`, (3, 3): from its units to metres. `labels`: of the groups, the innermost first. `width`,
+    `height`: of the innermost viewport, in its units.
     """
 
     matrix: Array
@@ -70,12 +62,7 @@ class _Place:
 class SvgDrawing:
     """Goes through the elements as they are drawn and adds them to the shapes.
 
-    Parameters
-    ----------
-    root : Element
-    where : str
-        What messages call the file.
-    shapes : Shapes
+    `where`: what messages call the file.
     """
 
     def __init__(self, root: Element, where: str, shapes: Shapes) -> None:
@@ -96,17 +83,8 @@ class SvgDrawing:
     def draw(self, matrix: Array, width: float, height: float) -> None:
         """Add all that is drawn.
 
-        Parameters
-        ----------
-        matrix : (3, 3)
-            From the units of the root's content to metres.
-        width, height : float
-            Of the viewport, in these units.
-
-        Raises
-        ------
-        MapError
-            When an element cannot be understood, or too much is drawn.
+        `matrix`, (3, 3): from the units of the root's content to metres. `width`, `height`: of the viewport,
+        in these units. Raises MapError when an element cannot be understood, or too much is drawn.
         """
         self._require_few()
         style = inherited(INHERITED, self.sheet.of(self.root))
@@ -362,10 +340,7 @@ class SvgDrawing:
 def view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None:
     """Return the ``viewBox`` among attributes, None where there is none of positive size.
 
-    Raises
-    ------
-    ValueError
-        When it is no four numbers.
+    Raises ValueError when it is no four numbers.
     """
     if "viewBox" not in given:
         return None

@@ -38,10 +38,7 @@ PIXEL = 0.0254 / 96
 def number(text: str) -> float:
     """Return a number; what is next to nothing is nothing.
 
-    Raises
-    ------
-    ValueError
-        When it is so large that calculating with it would go wrong.
+    Raises ValueError when it is so large that calculating with it would go wrong.
     """
     value = float(text)
     if not abs(value) <= _LARGEST:
@@ -52,10 +49,7 @@ def number(text: str) -> float:
 def numbers(text: str) -> list[float]:
     """Return the numbers of a list as that of ``points``.
 
-    Raises
-    ------
-    ValueError
-        When there is something else in it.
+    Raises ValueError when there is something else in it.
     """
     found, at = [], 0
     while match := NUMBER.match(text, at):
@@ -69,16 +63,8 @@ def numbers(text: str) -> list[float]:
 def length(text: str, whole: float | None = None) -> float:
     """Return a length in user units.
 
-    Parameters
-    ----------
-    text : str
-    whole : float or None
-        What a percentage is of; None allows none.
-
-    Raises
-    ------
-    ValueError
-        When it is no length, or of a unit that depends on a font.
+    `whole`: what a percentage is of; None allows none. Raises ValueError when it is no length, or of a unit
+    that depends on a font.
     """
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""
@@ -98,10 +84,7 @@ def affine(
 def composed(outer: Array, inner: Array) -> Array:
     """Return the matrix of both, the inner one first.
 
-    Raises
-    ------
-    ValueError
-        When it makes things so large that calculating with them would go wrong.
+    Raises ValueError when it makes things so large that calculating with them would go wrong.
     """
     both = outer @ inner
     if not (np.abs(both) <= _LARGEST).all():
@@ -125,10 +108,7 @@ def stretch(matrix: Array) -> tuple[float, float]:
 def transform(text: str) -> Array:
     """Return the matrix of a ``transform``; the last of its functions comes first.
 
-    Raises
-    ------
-    ValueError
-        When there is something else in it.
+    Raises ValueError when there is something else in it.
     """
     matrix, at = affine(), 0
     while match := _FUNCTION.match(text, at):
@@ -167,14 +147,8 @@ _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
 def fitted(box: tuple[float, float, float, float], width: float, height: float, how: str = "") -> Array:
     """Return the matrix that fits a ``viewBox`` into a viewport (SVG 2, section 8.2).
 
-    Parameters
-    ----------
-    box : x, y, width, height
-        Of positive size.
-    width, height : float
-        Of the viewport, whose corner is [0, 0].
-    how : str
-        ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
+    `box`: of positive size. `width`, `height`: of the viewport, whose corner is [0, 0]. `how`:
+    ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
     """
     align, _, rule = how.strip().partition(" ")
     x, y = width / box[2], height / box[3]
@@ -201,25 +175,10 @@ def subpaths(
 ) -> tuple[list[tuple[Array, bool]], int]:
     """Return the subpaths of path data: points (k, 2), and whether they were closed.
 
-    Parameters
-    ----------
-    text : str
-        The attribute ``d``.
-    tolerance : float
-        Largest distance of a curve from its points, in the unit of the path.
-    most, draws : int
-        So many points are made at most, and so many commands carried out.
-
-    Returns
-    -------
-    subpaths : list of (points, closed)
-    draws : int
-        How many commands were carried out.
-
-    Raises
-    ------
-    ValueError
-        Where it is no path data, or where it has more; the message says which character.
+    `text`: the attribute ``d``. `tolerance`: largest distance of a curve from its points, in the unit of the
+    path. `most`, `draws`: so many points are made at most, and so many commands carried out. Returns:
+    `subpaths`. `draws`: how many commands were carried out. Raises ValueError where it is no path data, or
+    where it has more; the message says which character.
 
     Examples
     --------

@@ -41,15 +41,7 @@ def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     inch, mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an
     attribute ``data-origin`` of the root says.
 
-    Parameters
-    ----------
-    path : Path
-    options : ReadOptions
-
-    Raises
-    ------
-    MapError
-        When the file cannot be read or understood, or is smaller than a metre at its own scale.
+    Raises MapError when the file cannot be read or understood, or is smaller than a metre at its own scale.
     """
     root, where = read_svg_tree(path)
     shapes = Shapes(where, options)

@@ -62,12 +62,8 @@ class _Rule:
 class StyleSheet:
     """The rules of all ``style`` elements of a file: of those with selectors of tags, classes and ids.
 
-    Attributes
-    ----------
-    where : str
-        What messages call the file.
-    strange : int
-        Rules that are left out: of other selectors, or within @media and the like.
+    `where`: what messages call the file. `strange`: rules that are left out: of other selectors, or within
+    @media and the like.
     """
 
     where: str
@@ -78,13 +74,7 @@ class StyleSheet:
     _work: int = 0
 
     def add(self, text: str) -> None:
-        """Add the rules of a text.
-
-        Raises
-        ------
-        MapError
-            When there are too many.
-        """
+        """Add the rules of a text. Raises MapError when there are too many."""
         self._size += len(text)
         if self._size > MOST_TEXT:
             raise MapError(f"{self.where}: style sheets of over {MOST_TEXT} characters, but less was wanted")
@@ -101,10 +91,7 @@ class StyleSheet:
     def of(self, element: Element) -> dict[str, str]:
         """Return the properties that an element has of itself: attributes, then rules, then its own style.
 
-        Raises
-        ------
-        MapError
-            When there are too many elements with too many rules each.
+        Raises MapError when there are too many elements with too many rules each.
         """
         attributes = element.attributes
         found = {name: attributes[name].strip() for name in (*INHERITED, *OWN) if name in attributes}
