@@ -52,15 +52,8 @@ _Content = Callable[[], Mapping[str, Any]]
 class Record:
     """What the folder of a document holds.
 
-    Attributes
-    ----------
-    folder : Path
-    path : Path or None
-        The file that the document belongs to; None if it never had one.
-    when : datetime
-        Local time of writing.
-    content : dict
-        The work, as `Autosaver.keep` was given it; without it where everything was saved.
+    `path`: the file that the document belongs to; None if it never had one. `when`: local time of writing.
+    `content`: the work, as `Autosaver.keep` was given it; without it where everything was saved.
     """
 
     folder: Path
@@ -72,16 +65,9 @@ class Record:
 class Autosaver:
     """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk.
 
-    Parameters
-    ----------
-    folder : Path or None
-        `autosave_folder()`; None keeps nothing.
-    kind : str
-        The format that its records name, such as ``robocov-draft``.
-    path : Path or None
-        The document's file.
-    resumed : Path or None
-        The folder of a record whose work goes on; OutputError when another program has taken it over.
+    `folder`: `autosave_folder()`; None keeps nothing. `kind`: the format that its records name, such as
+    ``robocov-draft``. `path`: the document's file. `resumed`: the folder of a record whose work goes on;
+    OutputError when another program has taken it over.
     """
 
     def __init__(

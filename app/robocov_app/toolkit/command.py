@@ -42,14 +42,8 @@ def _as_typed(text: str) -> object:
 class Takes:
     """What is typed after a command's name.
 
-    Attributes
-    ----------
-    name : str
-        What it is, for the palette: ``number of robots``.
-    read : callable
-        Makes a value of what was typed, or raises an InputError.
-    options : callable
-        Returns the words that can be typed, if they can be listed.
+    `name`: what it is, for the palette: ``number of robots``. `read`: makes a value of what was typed, or
+    raises an InputError. `options`: returns the words that can be typed, if they can be listed.
     """
 
     name: str
@@ -61,23 +55,11 @@ class Takes:
 class Command:
     """Something that can be done in a window.
 
-    Attributes
-    ----------
-    name : str
-        Unique; what is typed where it takes something, ``kind:what`` otherwise.
-    title, group : str
-        What people read, and under which heading.
-    run : callable
-        Does it; called with what was typed where it takes something. Returned words are told.
-    keys : names of keys
-        As ``ctrl+shift+z``; the last part is what pygame calls the key.
-    when : callable
-        Returns why it cannot be done now, an empty text where it can.
-    takes : Takes or None
-    repeats : bool
-        Whether it is done again and again while its key is held down.
-    hidden : bool
-        Left out of palette and help.
+    `name`: unique; what is typed where it takes something, ``kind:what`` otherwise. `title`, `group`: what
+    people read, and under which heading. `run`: does it; called with what was typed where it takes something.
+    Returned words are told. `keys`: as ``ctrl+shift+z``; the last part is what pygame calls the key. `when`:
+    returns why it cannot be done now, an empty text where it can. `repeats`: whether it is done again and
+    again while its key is held down. `hidden`: left out of palette and help.
     """
 
     name: str
@@ -101,16 +83,8 @@ class Command:
 class Offer:
     """A line of the palette.
 
-    Attributes
-    ----------
-    text, aside : str
-        What it says, and its keys or what it takes.
-    fills : str
-        What completion makes of what was typed.
-    call : callable or None
-        Does it; None where more is to be typed first.
-    why : str
-        Why it cannot be done now.
+    `text`, `aside`: what it says, and its keys or what it takes. `fills`: what completion makes of what was
+    typed. `call`: does it; None where more is to be typed first. `why`: why it cannot be done now.
     """
 
     text: str
@@ -123,13 +97,8 @@ class Offer:
 class Commands:
     """The list of a window's commands.
 
-    Parameters
-    ----------
-    listed : commands
-    attempt : callable
-        Calls what it is given, and tells returned words or the error.
-    more : callable
-        Returns commands that come and go, such as the gains of the controller in use.
+    `attempt`: calls what it is given, and tells returned words or the error. `more`: returns commands that
+    come and go, such as the gains of the controller in use.
     """
 
     def __init__(
@@ -198,10 +167,7 @@ class Commands:
     def typed(self, text: str) -> object:
         """Do what was typed: the name of a command and what it takes.
 
-        Raises
-        ------
-        RobocovError
-            When that means nothing, or cannot be done.
+        Raises RobocovError when that means nothing, or cannot be done.
         """
         word, rest = parted(text)
         known = self._typable()

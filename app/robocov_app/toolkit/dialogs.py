@@ -143,15 +143,9 @@ class Option:
 class Choice:
     """A list that typing narrows down.
 
-    Attributes
-    ----------
-    options : callable
-        Returns the lines for what is typed.
-    accept : callable
-        Called with what is typed and the chosen line, None where there is none; an error it raises is
-        told below the field, and nothing typed is lost. What it returns is typed in place, if it is a text.
-    ghost, hint : str
-        In the empty field, and at the foot.
+    `options`: returns the lines for what is typed. `accept`: called with what is typed and the chosen line,
+    None where there is none; an error it raises is told below the field, and nothing typed is lost. What it
+    returns is typed in place, if it is a text. `ghost`, `hint`: in the empty field, and at the foot.
     """
 
     title: str

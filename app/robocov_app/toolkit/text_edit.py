@@ -14,12 +14,8 @@ _State = tuple[str, int, int]
 class TextEdit:
     """A line of text that is being edited.
 
-    Attributes
-    ----------
-    caret, anchor : int
-        What is between them is selected.
-    composed : str
-        Shown at the caret while an input method is still at it; not part of the text yet.
+    `caret`, `anchor`: what is between them is selected. `composed`: shown at the caret while an input method
+    is still at it; not part of the text yet.
     """
 
     text: str = ""

@@ -114,16 +114,9 @@ class _List:
 class Ui:
     """Runs a page in a box of the window.
 
-    Attributes
-    ----------
-    box : pygame.Rect
-        Where the page is, px.
-    stale : bool
-        Whether what was drawn is not what there is any more; otherwise `draw` copies its last picture.
-    shown : dict of ``kind:key`` to Shown
-        The widgets of the last run.
-    surface : pygame.Surface or None
-        What a page may draw on in its cells; None while it runs for an event.
+    `box`: where the page is, px. `stale`: whether what was drawn is not what there is any more; otherwise
+    `draw` copies its last picture. `shown`: the widgets of the last run. `surface`: what a page may draw on
+    in its cells; None while it runs for an event.
     """
 
     def __init__(self, page: Callable[[Ui], None], theme: Theme, scale: float = 1.0) -> None:

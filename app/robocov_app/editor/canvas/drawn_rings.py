@@ -25,16 +25,8 @@ _FORGOTTEN = 4
 class Outline:
     """What an obstacle looks like.
 
-    Attributes
-    ----------
-    rings : list of (k, 2) m
-        Of each of its parts the outer ring, then its holes.
-    outer : list of bool
-        Which of them are outer rings.
-    lines : list of (k, 2) m
-        Of what covers nothing.
-    bounds : (4,) m
-    geometry : shapely geometry
+    `rings`, (k, 2) m: of each of its parts the outer ring, then its holes. `outer`: which of them are outer
+    rings. `lines`, (k, 2) m: of what covers nothing. `bounds`: (4,) m.
     """
 
     rings: list[Array]

@@ -52,16 +52,7 @@ SEEN_THROUGH = 0.62
 class View:
     """How a sheet is looked at.
 
-    Attributes
-    ----------
-    camera : Camera
-    theme : Theme
-    scale : float
-    size : (width, height), px
-    shown : names of `settings.SHOWN`
-    grid : float, m
-    folder : Path
-        What a picture's path counts from.
+    `size`: (width, height) px. `grid` in m. `folder`: what a picture's path counts from.
     """
 
     camera: Camera
@@ -91,10 +82,7 @@ def outside_colour(theme: Theme) -> Colour:
 class Sheet:
     """Draws the page, and keeps it.
 
-    Attributes
-    ----------
-    full, patched, scrolled : int
-        How often the page was drawn as a whole, in part, and moved.
+    `full`, `patched`, `scrolled`: how often the page was drawn as a whole, in part, and moved.
     """
 
     def __init__(self) -> None:

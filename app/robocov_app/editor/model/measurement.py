@@ -76,13 +76,8 @@ def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[BaseGeometry, ...
     part of that is what it sweeps (their union is the free space's opening by a disc). What is left of the
     free space are long passages and niches that are too narrow, and crumbs in corners, which are left out:
     they touch the rest in one arc, and no point of them is farther from it than the radius. Curves are
-    polygons of 64 sides, so that this is right to about a hundredth of the radius.
-
-    Returns
-    -------
-    swept : tuple of geometries
-        The largest first.
-    untouched : MultiPolygon
+    polygons of 64 sides, so that this is right to about a hundredth of the radius. Returns: `swept`: the
+    largest first. `untouched`.
     """
     centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
     swept = [part.buffer(radius) & free for part in centres]

@@ -60,23 +60,10 @@ class Pasteboard(Protocol):
 class Editor:
     """What the user does, and what of it is shown.
 
-    Attributes
-    ----------
-    tool : Tool
-    version : int
-        Grows whenever panel and sheet have to look again at what there is.
-    message : str
-        What was said last, empty when it is old.
-    pixel : float, m
-        What a pixel at scale 1 is on the sheet.
-    cursor : (x, y) or None, m
-        Where the mouse is.
-    moves_since : float or None, s
-        Since when obstacles that move are shown moving.
-    dialogs : Dialogs
-        What is waiting for an answer.
-    problem : Problem or None
-        The one that is shown with its words.
+    `version`: grows whenever panel and sheet have to look again at what there is. `message`: what was said
+    last, empty when it is old. `pixel`, m: what a pixel at scale 1 is on the sheet. `cursor`, (x, y) or None
+    m: where the mouse is. `moves_since`, s: since when obstacles that move are shown moving. `dialogs`: what
+    is waiting for an answer. `problem`: the one that is shown with its words.
     """
 
     def __init__(

@@ -26,13 +26,7 @@ if TYPE_CHECKING:
 class Field:
     """A field of the panel.
 
-    Attributes
-    ----------
-    text : callable
-        Returns what it shows.
-    take : callable
-        Takes what was typed; raises a MapError where that means nothing.
-    tip : str
+    `text`: returns what it shows. `take`: takes what was typed; raises a MapError where that means nothing.
     """
 
     text: Callable[[Editor], str]

@@ -29,17 +29,9 @@ ON = "yes"
 class Option:
     """An option of an import.
 
-    Attributes
-    ----------
-    name : str
-        As of the field of `ReadOptions` or `Shaping`.
-    kind : str
-        What is typed: a number, two for a place, words between commas, any text; or one of the choices.
-    choices : tuple of str
-        The first is the default.
-    default : str
-        What stands where nothing was given.
-    help : str
+    `name`: as of the field of `ReadOptions` or `Shaping`. `kind`: what is typed: a number, two for a place,
+    words between commas, any text; or one of the choices. `choices`: the first is the default. `default`:
+    what stands where nothing was given.
     """
 
     name: str

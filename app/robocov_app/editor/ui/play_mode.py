@@ -31,10 +31,7 @@ BACK = ("f5",)
 class PlayPresenter(DemoDesk):
     """The demo's desk, which knows whether the map is still the one that is tried.
 
-    Attributes
-    ----------
-    elsewhere : bool
-        Another map was opened meanwhile.
+    `elsewhere`: another map was opened meanwhile.
     """
 
     elsewhere = False
@@ -60,12 +57,8 @@ class PlayPresenter(DemoDesk):
 class PlayWindow(Window):
     """The demo's window, out of which F5 and Escape lead back.
 
-    Attributes
-    ----------
-    ended : bool
-        Back to the editor.
-    held : int or None
-        The key that began it, until it comes up: its repeated presses are none of their own.
+    `ended`: back to the editor. `held`: the key that began it, until it comes up: its repeated presses are
+    none of their own.
     """
 
     desk: PlayPresenter

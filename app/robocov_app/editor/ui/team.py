@@ -17,16 +17,8 @@ if TYPE_CHECKING:
 class Team:
     """A team at a start.
 
-    Attributes
-    ----------
-    start : str or None
-        None for anywhere in the free space.
-    robots, seed : int
-    radius : float, m
-    places : tuple of (x, y), m
-        Empty where it cannot stand there.
-    words : str
-        Why not.
+    `start`: None for anywhere in the free space. `radius` in m. `places`, m: empty where it cannot stand
+    there. `words`: why not.
     """
 
     start: str | None

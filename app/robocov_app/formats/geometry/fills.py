@@ -86,8 +86,8 @@ def enclosed(
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
     """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
 
-    `rings`, each (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring without the
-    others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or what the rings
+    `rings`, (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring without
+    the others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or what the rings
     wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the largest part first;
     empty where nothing is enclosed. `reason`: where a ring meets itself or another one, of polygons with
     holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the reason. Raises
