@@ -86,18 +86,14 @@ def enclosed(
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
     """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
 
-    `rings`, (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring without
-    the others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or what the rings
-    wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the largest part first;
-    empty where nothing is enclosed. `reason`: where a ring meets itself or another one, of polygons with
-    holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the reason. Raises
-    MapError when the rings cross each other too often.
-
-    Examples
-    --------
-    >>> square, inner = np.array([[0, 0], [4, 0], [4, 4], [0, 4]]), np.array([[1, 1], [3, 1], [3, 3], [1, 3]])
-    >>> [enclosed([square, inner], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
-    [12.0, 12.0, 16.0]
+    `rings`, (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring
+    without the others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or
+    what the rings wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the
+    largest part first; empty where nothing is enclosed. `reason`: where a ring meets itself or another one,
+    of polygons with holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the
+    reason. Raises MapError when the rings cross each other too often. Examples -------- >>> square, inner =
+    np.array([[0, 0], [4, 0], [4, 4], [0, 4]]), np.array([[1, 1], [3, 1], [3, 3], [1, 3]]) >>>
+    [enclosed([square, inner], rule)[0].area for rule in ("holes", "evenodd", "nonzero")] [12.0, 12.0, 16.0]
     """
     crossings = Crossings() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
