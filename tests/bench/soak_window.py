@@ -15,12 +15,12 @@ import numpy as np
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.window import FPS, display
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.scenario import Law, Scenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import FPS, Window
+from robocov_app.viewer.window import Window
 
 WARM = 10
 """Minutes until all that is kept is there."""

@@ -20,7 +20,7 @@ from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.viewer.opening import display
+from robocov_app.toolkit.window import display
 
 SIZE = (900, 600)
 

@@ -15,10 +15,10 @@ from robocov.environment import Environment
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.ui import Shown
+from robocov_app.toolkit.window import display
 from robocov_app.viewer.commands import desk_commands, parameter_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import Law

@@ -13,13 +13,12 @@ import pygame
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row
 from robocov_app.render.picture import standard_layers
+from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.opening import display
 from robocov_app.viewer.presenter import Desk
-from robocov_app.viewer.screen import undisturbed
 from robocov_app.viewer.session.scenario import Law, Limits, Scenario
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.window import FPS, Window
+from robocov_app.viewer.window import Window
 
 SIZE = (1280, 720)
 

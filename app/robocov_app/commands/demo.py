@@ -110,8 +110,8 @@ def command(options: Arguments) -> int:
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.render.picture import checked_layers
+    from robocov_app.toolkit.window import show_compiling
     from robocov_app.viewer.opening import Opening
-    from robocov_app.viewer.screen import show_compiling
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Snapshot
     from robocov_app.render.theme import Theme
-    from robocov_app.viewer.layout import Layout
+    from robocov_app.toolkit.layout import Layout
     from robocov_app.viewer.presenter import Desk
     from robocov_app.viewer.session.pane import Lane
     from robocov_app.viewer.tool import Point, Preview

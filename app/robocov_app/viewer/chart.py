@@ -13,8 +13,8 @@ from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
 from robocov_app.render.theme import mix
+from robocov_app.toolkit.layout import inside
 from robocov_app.toolkit.overlay import tag
-from robocov_app.viewer.layout import inside
 from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, curve_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from robocov.arrays import Array
     from robocov_app.render.theme import Colour, Theme
-    from robocov_app.viewer.layout import Box, Layout
+    from robocov_app.toolkit.layout import Box, Layout
     from robocov_app.viewer.presenter import Desk
     from robocov_app.viewer.session.curves import Event, Plotted
     from robocov_app.viewer.session.pane import Lane

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robocov.errors import InputError
 from robocov_app.toolkit.autosave import autosave_folder
-from robocov_app.toolkit.input import KEY_REPEAT
+from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
+from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.layout import SMALLEST
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings
@@ -32,49 +30,6 @@ NO_DISPLAY = (
 
 HEADLESS_FPS = 30
 """Frames per second of what is rendered without a display."""
-
-
-@contextmanager
-def display(*, headless: bool, otherwise: str = NO_DISPLAY) -> Iterator[None]:
-    """Start pygame's display, real or not.
-
-    Raises
-    ------
-    InputError
-        When there is none: SDL would silently open a window that nobody sees, and run for ever.
-    """
-    if headless:
-        os.environ["SDL_VIDEODRIVER"] = "dummy"
-    elif sys.platform == "linux" and not any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    ):
-        raise InputError(otherwise)
-    import pygame
-
-    try:
-        pygame.display.init()
-    except pygame.error:
-        raise InputError(otherwise) from None
-    if not headless and pygame.display.get_driver() in ("offscreen", "dummy", "evdev"):
-        wanted = os.environ.get("SDL_VIDEODRIVER", "")
-        if pygame.display.get_driver() != wanted:
-            pygame.display.quit()
-            raise InputError(otherwise)
-    pygame.font.init()
-    pygame.key.set_repeat(*KEY_REPEAT)
-    try:
-        yield
-    finally:
-        pygame.display.quit()
-
-
-def screen_scale() -> float:
-    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
-    import pygame
-
-    sizes = pygame.display.get_desktop_sizes()
-    height = max((size[1] for size in sizes), default=1080)
-    return float(min(max(round(height / 1080 * 4) / 4, 1.0), 3.0))
 
 
 class Opening:
@@ -130,7 +85,7 @@ class Opening:
         """
         keeper = None
         try:
-            with display(headless=self.headless):
+            with display(headless=self.headless, otherwise=NO_DISPLAY):
                 file = None if self.headless else settings_file()
                 settings, trouble = loaded(Settings, file)
                 window = self._opened(settings)
@@ -207,11 +162,3 @@ class Opening:
             "height": min(max(height, 600), 4320),
         }
         return before.model_copy(update=changes)
-
-
-def fitting(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the size, or what of it the desktop has room for."""
-    import pygame
-
-    wide, high = max(pygame.display.get_desktop_sizes(), default=size)
-    return min(size[0], wide), min(size[1], high)

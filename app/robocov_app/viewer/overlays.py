@@ -16,7 +16,7 @@ from robocov_app.toolkit.overlay import FLAT, card, wrapped
 
 if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
-    from robocov_app.viewer.layout import Layout
+    from robocov_app.toolkit.layout import Layout
     from robocov_app.viewer.lessons import LessonPlayer
 
 

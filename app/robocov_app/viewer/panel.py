@@ -14,10 +14,10 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import FLAT
 from robocov_app.toolkit.ui import SMALL, Ui
 from robocov_app.viewer.inspector import NOTHING, Line, Report
-from robocov_app.viewer.layout import Layout
 from robocov_app.viewer.parameters import Parameter, Pick
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words

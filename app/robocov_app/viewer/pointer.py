@@ -8,8 +8,8 @@ import numpy as np
 import pygame
 
 from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
+from robocov_app.toolkit.layout import inside
 from robocov_app.viewer.brush import Brush
-from robocov_app.viewer.layout import inside
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -15,7 +15,7 @@ from robocov_app.viewer.session.clock import speed_words
 
 if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
-    from robocov_app.viewer.layout import Layout
+    from robocov_app.toolkit.layout import Layout
     from robocov_app.viewer.presenter import Desk
 
 HINT = "Space pause · F1 keys"

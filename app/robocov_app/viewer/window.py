@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
 from robocov.errors import RobocovError
-from robocov.files.atomic import written
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
-from robocov_app.runs.recording import png_bytes
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Command, Commands
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
+from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.palette import palette
+from robocov_app.toolkit.window import PAUSE, BaseWindow
 from robocov_app.viewer.arena import Arena
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, desk_commands, parameter_commands
 from robocov_app.viewer.film import FPS as FILM_FPS
-from robocov_app.viewer.film import Film, pixels
+from robocov_app.viewer.film import Film
 from robocov_app.viewer.inspector import report_on
-from robocov_app.viewer.layout import laid_out
 from robocov_app.viewer.lessons import LessonPlayer, load_lesson
 from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import plain
 from robocov_app.viewer.saving import RunSaver
-from robocov_app.viewer.screen import shown, undisturbed
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, draw_status, facts
@@ -43,8 +40,8 @@ from robocov_app.viewer.suggestions import suggestion
 if TYPE_CHECKING:
     from robocov_app.viewer.presenter import Desk
 
-FPS = 60
-"""Frames per second that are aimed at."""
+PAUSE_AT_REST = 0.25
+"""Seconds between two frames while time goes on, but nothing moves any more."""
 
 _ASKED_AGAIN = 0.2
 """Seconds between two looks of the inspector."""
@@ -63,7 +60,7 @@ _GOES_ON_WITH = frozenset(
 _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 
 
-class Window:
+class Window(BaseWindow):
     """Shows a desk and lets it be touched.
 
     Parameters
@@ -89,16 +86,13 @@ class Window:
         patient: bool = False,
         screen: pygame.Surface | None = None,
     ) -> None:
-        self.desk = desk
-        self.scale = scale
-        self.closed = False
+        super().__init__(size, screen)
+        self.desk, self.scale = desk, scale
         self.help = False
         self.tour: LessonPlayer | None = None
         self.film: Film | None = None
         self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
-        self.windowed: tuple[int, int] | None = None
-        self.screen = screen or shown(size)
         pygame.display.set_caption("robocov")
         self.arena = Arena(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
@@ -110,8 +104,10 @@ class Window:
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._report_at = 0.0
+        self._reported: object = None
         self._now = 0.0
-        self._rate = float(FPS)
+        self._unfilmed = 0.0
+        self._answers = 0
         self._steps_rate = 0.0
         self._serial = -1
         self._arrange()
@@ -119,43 +115,16 @@ class Window:
 
     # frames
 
-    def run(self) -> None:
-        """Go on until the window is closed."""
-        clock = pygame.time.Clock()
-        before = perf_counter()
-        try:
-            with undisturbed():
-                while not self.closed:
-                    now = perf_counter()
-                    self.frame(now - before)
-                    before = now
-                    clock.tick(FPS)
-        finally:
-            self.close()
-
     def close(self) -> None:
         """End what is going on beside the window."""
         if self.film is not None:
             self.desk.attempt(self.toggle_film)
         self.desk.costs.close()
 
-    def frame(self, seconds: float) -> None:
-        """Take what has happened, let so many seconds pass, and draw."""
-        self.advance(seconds)
-        if not self.closed:
-            self.draw()
-            if self.film is not None:
-                self.film.add(self.screen, seconds)
-
-    def advance(self, seconds: float) -> None:
-        """Take what has happened, and let so many seconds pass."""
-        for event in pygame.event.get():
-            self.take(event)
-        if self.closed:
-            return
+    def update(self, seconds: float) -> None:
+        """Let so many seconds pass, for the simulation, its cost and the panel."""
         self._now += seconds
-        if seconds > 0:
-            self._rate += 0.05 * (min(1.0 / seconds, 1000.0) - self._rate)
+        self._unfilmed += seconds
         self._pass_time(seconds)
         self._ask_costs()
         self._arrange()
@@ -163,6 +132,19 @@ class Window:
         self.panel.covered = self._lesson_shown
         self.panel.update(seconds)
         self.pointer.show()
+
+    def look(self) -> object:
+        """Return all that changes the picture without an event; None while something moves."""
+        desk, session, tour = self.desk, self.desk.session, self.tour
+        at_rest = session.settled and session.live
+        self.pause = PAUSE_AT_REST if session.playing else PAUSE
+        if (session.playing and not at_rest) or self.film is not None:
+            return None
+        return (
+            *(desk.version, desk.message, desk.trouble, session.time, session.serial, session.playing),
+            *(self._answers, desk.costs.state, self._arranged, self.panel.ui.stale),
+            tour and (tour.state, tour.number, tour.progress),
+        )
 
     def _pass_time(self, seconds: float) -> None:
         desk, session = self.desk, self.desk.session
@@ -213,6 +195,7 @@ class Window:
                 continue
             desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
         for pane, known in desk.costs.poll():
+            self._answers += 1
             for lane in session.lanes:
                 if lane.number == pane and known.time <= lane.time + 1e-9:
                     lane.curve.add(known.time, known.result.mean_distance)
@@ -248,7 +231,7 @@ class Window:
         self.arena.draw(self.screen)
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
-        line = facts(desk, self._rate, self._steps_rate, filmed)
+        line = facts(desk, self.rate, self._steps_rate, filmed)
         draw_status(self.screen, layout, theme, line, self.hint)
         if layout.panel[2] and self.tour is not None and self._lesson_shown:
             draw_tour(self.screen, layout, theme, self.tour)
@@ -267,14 +250,20 @@ class Window:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
+        if self.film is not None:
+            self.film.add(self.screen, self._unfilmed)
+        self._unfilmed = 0.0
 
     def _inspect(self) -> None:
         """Let the inspector explain the robot that is asked, a few times a second while that is in sight."""
-        number, panel = self.desk.selected, self.panel
+        number, panel, session = self.desk.selected, self.panel, self.desk.session
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
-        elif panel.report is None or not 0.0 <= self._now - self._report_at < _ASKED_AGAIN:
-            self._report_at = self._now
+            return
+        shown = number, session.time, session.serial, self.desk.version
+        old = shown != self._reported and self._now - self._report_at >= _ASKED_AGAIN
+        if panel.report is None or old:
+            self._report_at, self._reported = self._now, shown
             panel.report = report_on(self.desk, number)
 
     # doing
@@ -297,6 +286,7 @@ class Window:
             self.panel.show_tab("robot")
 
     def _own_commands(self) -> list[Command]:
+        desk = self.desk
         return [
             Command("fit", "Show the whole map", "View", self.arena.fit, ("f",)),
             Command(
@@ -335,8 +325,8 @@ class Window:
             ),
             Command("plot", "Plot mean distance or mean time", "View", self.chart.switch, ("y",)),
             Command("tab", "Next page of the panel", "View", self._next_tab, ("ctrl+tab",)),
-            Command("fullscreen", "Full screen", "View", self._fullscreen, ("f11",)),
-            Command("screenshot", "Screenshot", "Keep", self.screenshot, ("f12",)),
+            Command("fullscreen", "Full screen", "View", self.toggle_fullscreen, ("f11",)),
+            Command("screenshot", "Screenshot", "Keep", lambda: self.save_screenshot(desk.folder), ("f12",)),
             Command("film", "Record a film, or end it", "Keep", self.toggle_film, ("f9",)),
             Command("save:run", "Save the run", "Keep", self._save_run, ("ctrl+e",)),
             Command(
@@ -381,11 +371,6 @@ class Window:
 
     def _next_tab(self) -> None:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
-
-    def _fullscreen(self) -> None:
-        # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
-        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
-        self.screen = shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
 
     def _open_palette(self) -> None:
         def told(words: str) -> None:
@@ -459,13 +444,6 @@ class Window:
     def _save_run(self) -> str:
         return self.keeper.save(self.desk.session, self.desk.folder, self.desk.map_name)
 
-    def screenshot(self) -> str:
-        """Save what is in the window as a PNG."""
-        target = free_name(self.desk.folder, "robocov", ".png")
-        with written(target) as part:
-            part.write_bytes(png_bytes(pixels(self.screen)))
-        return f"screenshot saved: {target}"
-
     def toggle_film(self) -> str:
         """Begin to record what is in the window, or end it."""
         if self.film is None:
@@ -491,8 +469,6 @@ class Window:
             self.closed = True
         elif self.dialogs.take(event):
             return
-        elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
-            self.screen = pygame.display.get_surface() or self.screen
         elif event.type == pygame.DROPFILE:
             path = Path(event.file)
             self.desk.attempt(lambda: self.desk.open_file(path))

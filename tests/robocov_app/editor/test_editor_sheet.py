@@ -21,8 +21,8 @@ from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
 from robocov_app.render.camera import Camera
 from robocov_app.render.theme import DARK, LIGHT
+from robocov_app.toolkit.window import display
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.opening import display
 
 SIZE = (420, 360)
 BOX = (10.0, 30.0, 400.0, 300.0)

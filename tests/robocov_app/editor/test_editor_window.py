@@ -19,7 +19,7 @@ from robocov_app.editor.ui.status import facts
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import help as help_page
 from robocov_app.toolkit.dialogs import Choice
-from robocov_app.viewer.layout import SMALLEST
+from robocov_app.toolkit.layout import SMALLEST
 
 BOX = PolygonObstacle(((2, 2), (4, 2), (4, 4), (2, 4)), name="box")
 PILLAR = CircleObstacle((7, 7), 1.0)
@@ -424,7 +424,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         hands.move(300, 300)
         hands.frames(3)
         hands.desk.message = ""
-        hands.frames(2)
+        hands.frames(60)
         drawn: list[int] = []
         monkeypatch.setattr(pygame.display, "flip", lambda: drawn.append(1))
         hands.frames(30)

@@ -19,8 +19,8 @@ from robocov_app.editor.canvas.arena import MARGIN
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
+from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.settings import FOLDER
-from robocov_app.viewer.layout import laid_out
 
 pytestmark = MARKS
 

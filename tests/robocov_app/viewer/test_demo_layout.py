@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.viewer.layout import SMALLEST, Box, Layout, inside, laid_out, largest_scale
+from robocov_app.toolkit.layout import SMALLEST, Box, Layout, inside, laid_out, largest_scale
 
 WIDTHS, HEIGHTS = st.integers(900, 3840), st.integers(600, 2160)
 SCALES = st.floats(1.0, 3.0)

@@ -19,7 +19,8 @@ from touched_run import begun
 from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
 from robocov_app.toolkit.settings import FOLDER
-from robocov_app.viewer.opening import NO_DISPLAY, Opening, display, fitting, screen_scale
+from robocov_app.toolkit.window import display, fitting, screen_scale
+from robocov_app.viewer.opening import NO_DISPLAY, Opening
 
 SHORT = ("--lattice", "8", "--size", "900x600")
 

@@ -14,8 +14,8 @@ from PIL import Image
 from touched_run import RAPF, begun
 
 from robocov_app.toolkit.settings import FOLDER
+from robocov_app.toolkit.window import show_compiling
 from robocov_app.viewer.opening import Opening
-from robocov_app.viewer.screen import show_compiling
 from robocov_app.viewer.status import cursor_words
 
 # playing

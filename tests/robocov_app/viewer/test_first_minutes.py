@@ -14,8 +14,9 @@ from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
+from robocov_app.toolkit.window import display
 from robocov_app.viewer import opening
-from robocov_app.viewer.opening import Opening, display
+from robocov_app.viewer.opening import Opening
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.settings import Settings
 from robocov_app.viewer.status import cursor_words, facts
@@ -120,7 +121,7 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
 def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Opening:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
     monkeypatch.setenv(FOLDER, str(folder))
-    monkeypatch.setattr(opening, "display", lambda headless: display(headless=True))
+    monkeypatch.setattr(opening, "display", lambda headless, otherwise: display(headless=True))
     return Opening(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 

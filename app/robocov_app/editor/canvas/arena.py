@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.ui.team import Team
     from robocov_app.render.canvas import Canvas
     from robocov_app.render.theme import Theme
-    from robocov_app.viewer.layout import Layout
+    from robocov_app.toolkit.layout import Layout
 
 MANY = 200
 """Selected things from which on their outlines are drawn once, and then the picture of them."""

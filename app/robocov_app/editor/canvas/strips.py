@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.team import Team
     from robocov_app.render.canvas import Canvas, LegendEntry
-    from robocov_app.viewer.layout import Box
+    from robocov_app.toolkit.layout import Box
 
 
 class Strips:

@@ -17,7 +17,7 @@ from robocov_app.editor.ui.settings import FILE, SHOWN, SNAPS, EditorSettings
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.autosave import autosave_folder, discard
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
-from robocov_app.viewer.opening import display, fitting, screen_scale
+from robocov_app.toolkit.window import display, fitting, screen_scale
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -20,9 +20,9 @@ from robocov_app.editor.ui.settings import SHOWN, SNAPS
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import FLAT, wrapped
 from robocov_app.toolkit.ui import SMALL, TEXT, Ui
-from robocov_app.viewer.layout import Layout
 
 TABS = ("map", "object", "snap", "problems", "history")
 

@@ -9,7 +9,7 @@ import pygame
 
 from robocov_app.editor.tools.tool import PointerEvent
 from robocov_app.toolkit.input import DOUBLE, WHEEL, show_cursor, wheel_notches
-from robocov_app.viewer.layout import inside
+from robocov_app.toolkit.layout import inside
 
 if TYPE_CHECKING:
     from collections.abc import Callable

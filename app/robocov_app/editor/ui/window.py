@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov.files.atomic import written
 from robocov_app.editor.canvas.arena import Arena
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
@@ -21,31 +19,21 @@ from robocov_app.editor.ui.pointer import Pointer
 from robocov_app.editor.ui.status import HINT, facts
 from robocov_app.editor.ui.team import TeamThread
 from robocov_app.render.theme import theme_named
-from robocov_app.runs.recording import png_bytes
-from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of
+from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message
 from robocov_app.toolkit.palette import palette
-from robocov_app.viewer.film import pixels
-from robocov_app.viewer.layout import laid_out
-from robocov_app.viewer.screen import shown, undisturbed
+from robocov_app.toolkit.window import BaseWindow
 from robocov_app.viewer.status import draw_status
-from robocov_app.viewer.window import FPS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from robocov.environment import Environment
     from robocov_app.editor.ui.editor import Editor
-
-_SELDOM = 0.1
-"""Seconds between two frames while nothing happens."""
-
-_CALM = 0.5
-"""Seconds without anything new after which the window waits for events."""
 
 _PAN = 60
 """Pixels that a key pans."""
@@ -58,18 +46,16 @@ _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 
-class EditorWindow:
+class EditorWindow(BaseWindow):
     """Shows a desk and lets it be touched."""
 
     def __init__(
         self, desk: Editor, size: tuple[int, int], scale: float, drafts: Path | None, *, patient: bool = False
     ) -> None:
+        super().__init__(size)
         self.desk, self.scale = desk, scale
-        self.closed = False
         self.help = False
         self.trial: PlayWindow | None = None
-        self.windowed: tuple[int, int] | None = None
-        self.screen = shown(size)
         self.arena = Arena(desk)
         self.documents = FileCommands(desk, drafts, self.arena.fit, patient=patient)
         self.dialogs = desk.dialogs
@@ -83,31 +69,12 @@ class EditorWindow:
         self._arranged: tuple[object, ...] | None = None
         self._tried: Environment | None = None
         self._caption = ""
-        self._rate = float(FPS)
-        self._calm = 0.0
-        self._come: list[pygame.event.Event] = []
-        self._touched = False
-        self._drawn: tuple[object, ...] | None = None
         self._arrange()
         self.arena.fit()
         desk.ask_readings()
         self.draw()
 
     # frames
-
-    def run(self) -> None:
-        """Go on until the window is closed."""
-        clock = pygame.time.Clock()
-        before = perf_counter()
-        with undisturbed():
-            while not self.closed:
-                now = perf_counter()
-                self.frame(now - before)
-                before = now
-                if self._calm < _CALM or self.trial is not None:
-                    clock.tick(FPS)
-                elif (event := pygame.event.wait(round(1000 * _SELDOM))).type != pygame.NOEVENT:
-                    self._come.append(event)
 
     def close(self) -> None:
         """End what is going on beside the window."""
@@ -117,26 +84,12 @@ class EditorWindow:
         self.documents.close()
         self.desk.snapper.close()
 
-    def frame(self, seconds: float) -> None:
-        """Take what has happened, let so many seconds pass, and draw."""
+    def look(self) -> object:
+        """Return all that changes the picture without an event; None while something moves."""
         if self.trial is not None:
-            self._try_on(seconds)
-            return
-        self.advance(seconds)
-        if self.closed or self.trial is not None:
-            return
-        shown = self._what_is_shown()
-        self._calm = self._calm + seconds if shown is not None and shown == self._drawn else 0.0
-        if self._calm == 0.0:
-            self.draw()
-        self._drawn = shown
-
-    def _what_is_shown(self) -> tuple[object, ...] | None:
-        """Return all on which it depends what the window looks like; None where it always changes."""
-        desk, arena = self.desk, self.arena
-        ui = self.panel.ui
-        animated = self._touched or ui.busy or desk.moves_since is not None or self.dialogs.open
-        if animated or ui.stale or ui.due is not None or self.menu is not None:
+            return self.trial.look()
+        desk, arena, ui = self.desk, self.arena, self.panel.ui
+        if ui.busy or ui.stale or desk.moves_since is not None or self.dialogs.open:
             return None
         return (
             *(desk.version, desk.message, desk.trouble, desk.typed, desk.readings.busy, desk.problem),
@@ -145,19 +98,11 @@ class EditorWindow:
             *(self._arranged, self._caption, desk.grid, frozenset(desk.snaps)),
         )
 
-    def advance(self, seconds: float) -> None:
-        """Take what has happened, and let so many seconds pass."""
-        come, self._come = [*self._come, *pygame.event.get()], []
-        self._touched = bool(come)
-        for event in come:
-            if self.trial is None:
-                self.take(event)
-            else:  # what came while it was opened
-                self.trial.take(event)
+    def update(self, seconds: float) -> None:
+        """Let so many seconds pass."""
         if self.trial is not None:
+            self._play(self.trial, seconds)
             return
-        if seconds > 0 and self._calm < _CALM:
-            self._rate += 0.05 * (min(1.0 / seconds, 1000.0) - self._rate)
         desk = self.desk
         desk.pass_time(seconds)
         if not self.pointer.dragging:
@@ -203,9 +148,12 @@ class EditorWindow:
 
     def draw(self) -> None:
         """Draw everything, and show it."""
+        if self.trial is not None:
+            self.trial.draw()
+            return
         layout, theme, desk = self.layout, self.theme, self.desk
         self.arena.draw(self.screen)
-        draw_status(self.screen, layout, theme, facts(desk, self._rate, self.arena.team), HINT)
+        draw_status(self.screen, layout, theme, facts(desk, self.rate, self.arena.team), HINT)
         if layout.panel[2]:
             self.panel.draw(self.screen)
         draw_message(self.screen, desk.message, layout.arena, theme, layout.scale, desk.trouble)
@@ -263,8 +211,8 @@ class EditorWindow:
             "tab": self._next_tab,
             "name": self._name,
             "menu": lambda: self.open_menu(self.pointer.at),
-            "fullscreen": self._fullscreen,
-            "screenshot": self.screenshot,
+            "fullscreen": self.toggle_fullscreen,
+            "screenshot": lambda: self.save_screenshot(self.desk.folder),
             "help": self._toggle_help,
             "palette": self.open_palette,
             "try": self.try_it,
@@ -293,19 +241,8 @@ class EditorWindow:
         self.panel.show_tab(tab)
         self.panel.focus(field)
 
-    def _fullscreen(self) -> None:
-        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
-        self.screen = shown(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
-
     def _toggle_help(self) -> None:
         self.help = not self.help
-
-    def screenshot(self) -> str:
-        """Save what is in the window as a PNG."""
-        target = free_name(self.desk.folder, "robocov", ".png")
-        with written(target) as part:
-            part.write_bytes(png_bytes(pixels(self.screen)))
-        return f"screenshot saved: {target}"
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the menu for what is at a pixel; what is not selected yet is selected then."""
@@ -329,10 +266,10 @@ class EditorWindow:
         trial.windowed = self.windowed
         self.trial = trial
 
-    def _try_on(self, seconds: float) -> None:
-        trial = self.trial
-        assert trial is not None
-        trial.frame(seconds)
+    def _play(self, trial: PlayWindow, seconds: float) -> None:
+        trial.screen, trial.rate = self.screen, self.rate
+        trial.update(seconds)
+        self.pause = trial.pause
         if not (trial.ended or trial.closed):
             return
         leaving = trial.closed and not trial.ended
@@ -361,6 +298,9 @@ class EditorWindow:
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
+        if self.trial is not None:
+            self.trial.take(event)
+            return
         kind = event.type
         if kind == pygame.KEYUP:
             self.commands.release(event)
@@ -382,8 +322,6 @@ class EditorWindow:
             return
         elif kind == pygame.DROPFILE:
             self.desk.attempt(lambda: self.documents.open(Path(event.file)))
-        elif kind in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
-            self.screen = pygame.display.get_surface() or self.screen
         elif self.menu is not None and self._menu_takes(self.menu, event):
             return
         elif kind == pygame.KEYDOWN:

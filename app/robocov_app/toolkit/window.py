@@ -1,0 +1,209 @@
+"""A window and its loop: display, size and scale; events in, and a picture where something is different."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import BytesIO
+from pathlib import Path
+from time import perf_counter
+
+import pygame
+
+from robocov.errors import InputError
+from robocov.files.atomic import written
+from robocov_app.render.fonts import label
+from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.input import KEY_REPEAT
+from robocov_app.toolkit.layout import SMALLEST
+
+FPS = 60
+"""Frames per second while something moves."""
+
+CALM = 0.8
+"""Seconds without events and movement after which the loop waits for events; tool tips appear earlier."""
+
+PAUSE = 0.1
+"""Seconds between two looks for something new, at most, while it waits."""
+
+
+class BaseWindow:
+    """A window that is drawn while something moves, and otherwise only when something is different.
+
+    A window of its own kind has `take`, `update`, `draw` and `look`.
+    """
+
+    def __init__(self, size: tuple[int, int], screen: pygame.Surface | None = None) -> None:
+        self.screen = screen or open_window(size)
+        self.windowed: tuple[int, int] | None = None  # the size before full screen
+        self.closed = False
+        self.rate = float(FPS)
+        self.pause = PAUSE
+        self._calm = 0.0
+        self._touched = False
+        self._drawn: object = None
+
+    def take(self, event: pygame.event.Event) -> None:
+        """Take one event."""
+        raise NotImplementedError
+
+    def update(self, seconds: float) -> None:
+        """Let so many seconds pass."""
+        raise NotImplementedError
+
+    def draw(self) -> None:
+        """Draw everything, and show it."""
+        raise NotImplementedError
+
+    def look(self) -> object:
+        """Return all that changes the picture without an event; None while something moves."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """End what is going on beside the window."""
+
+    def run(self) -> None:
+        """Go on until the window is closed."""
+        clock, before = pygame.time.Clock(), perf_counter()
+        try:
+            with undisturbed():
+                while not self.closed:
+                    now = perf_counter()
+                    self.frame(now - before)
+                    before = now
+                    clock.tick(FPS)
+                    # SDL's own way to wait for events looks for them a thousand times a second
+                    while self.resting and perf_counter() - now < self.pause and not pygame.event.peek():
+                        clock.tick(FPS)
+        finally:
+            self.close()
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing has moved or come for a while."""
+        return self._calm >= CALM
+
+    def frame(self, seconds: float) -> None:
+        """Take what has happened, let so many seconds pass, and draw what is different."""
+        rested = self.resting
+        self.advance(seconds)
+        if self.closed:
+            return
+        look = self.look()
+        self._calm = 0.0 if self._touched or look is None else self._calm + seconds
+        if not (rested and self.resting and look == self._drawn):
+            self.draw()
+        self._drawn = look
+
+    def advance(self, seconds: float) -> None:
+        """Take what has happened, and let so many seconds pass."""
+        events = pygame.event.get()
+        self._touched = bool(events)
+        for event in events:
+            if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
+                self.screen = pygame.display.get_surface() or self.screen
+            self.take(event)
+        if self.closed:
+            return
+        if seconds > 0 and not self.resting:
+            self.rate += 0.05 * (min(1.0 / seconds, 1000.0) - self.rate)
+        self.update(seconds)
+
+    def toggle_fullscreen(self) -> None:
+        """Fill the screen, or be a window again."""
+        # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
+        windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
+        self.screen = (
+            open_window(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
+        )
+
+    def save_screenshot(self, folder: Path) -> str:
+        """Save what is in the window as a PNG in a folder; return words for it."""
+        target, picture = free_name(folder, "robocov", ".png"), BytesIO()
+        pygame.image.save(self.screen, picture, ".png")
+        with written(target) as part:
+            part.write_bytes(picture.getvalue())
+        return f"screenshot saved: {target}"
+
+
+@contextmanager
+def display(*, headless: bool, otherwise: str = "no display") -> Iterator[None]:
+    """Start pygame's display, real or not; InputError with the words `otherwise` when there is none."""
+    # SDL would silently open a window that nobody sees, and run for ever
+    if headless:
+        os.environ["SDL_VIDEODRIVER"] = "dummy"
+    elif sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    ):
+        raise InputError(otherwise)
+    try:
+        pygame.display.init()
+    except pygame.error:
+        raise InputError(otherwise) from None
+    driver = pygame.display.get_driver()
+    wanted = headless or driver == os.environ.get("SDL_VIDEODRIVER", "")
+    if driver in ("offscreen", "dummy", "evdev") and not wanted:
+        pygame.display.quit()
+        raise InputError(otherwise)
+    pygame.font.init()
+    pygame.key.set_repeat(*KEY_REPEAT)
+    try:
+        yield
+    finally:
+        pygame.display.quit()
+
+
+def screen_scale() -> float:
+    """Return the scale at which text suits the display: 1 up to full HD, 2 for 4K."""
+    height = max((size[1] for size in pygame.display.get_desktop_sizes()), default=1080)
+    return float(min(max(round(height / 1080 * 4) / 4, 1.0), 3.0))
+
+
+def fitting(size: tuple[int, int]) -> tuple[int, int]:
+    """Return the size, or what of it the desktop has room for."""
+    wide, high = max(pygame.display.get_desktop_sizes(), default=size)
+    return min(size[0], wide), min(size[1], high)
+
+
+def open_window(size: tuple[int, int]) -> pygame.Surface:
+    """Show a window of a size, or give the one that is there another; return its surface."""
+    screen = pygame.display.set_mode(size, pygame.RESIZABLE)
+    with suppress(AttributeError, pygame.error), warnings.catch_warnings():
+        # pygame-ce has no other way yet to give a window of the display module a least size
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pygame.Window.from_display_module().minimum_size = SMALLEST
+    return screen
+
+
+def show_compiling(size: tuple[int, int]) -> None:
+    """Say on the window, or on a new one of a size, why nothing else is there yet."""
+    with suppress(pygame.error):
+        pygame.display.init()
+        screen = pygame.display.get_surface() or open_window(size)
+        screen.fill("white")
+        words = label("compiling the simulation, once", 18, (60, 60, 60))
+        screen.blit(words, words.get_rect(center=screen.get_rect().center))
+        pygame.display.flip()
+        pygame.event.pump()
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Keep the garbage collector away from all that is there now, modules most of all.
+
+    It would look at it again every half minute, which holds a frame up by 25 ms. What is new is looked at
+    once a frame or so, not after every 700 coordinates.
+    """
+    before = gc.get_threshold()
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+        gc.unfreeze()
