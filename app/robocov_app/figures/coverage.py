@@ -18,7 +18,14 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.record import Record
 from robocov.robots import Team
-from robocov_app.figures.arena import draw_map, draw_robots, map_handles, robot_handle, ticks_in_metres
+from robocov_app.figures.arena import (
+    draw_map,
+    draw_robots,
+    label_of,
+    map_handles,
+    robot_handle,
+    ticks_in_metres,
+)
 from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Box, Page, tone
@@ -26,6 +33,7 @@ from robocov_app.figures.runs import plot_cost
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
 from robocov_app.render.heatmaps import border_colour
+from robocov_app.render.layout import united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
@@ -36,7 +44,7 @@ _BAR_LABEL = "distance to the nearest robot"
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A team at one moment, with the distances around it and what stands above the map."""
+    """A team at one moment (s), with the distances around it and what stands above the map."""
 
     environment: Environment
     team: Team
@@ -44,6 +52,7 @@ class Moment:
     title: str = ""
     facts: str = ""
     numbers: tuple[int, ...] | None = None
+    time: float = 0.0
 
     @classmethod
     def last_of(
@@ -60,12 +69,11 @@ class Moment:
         """
         cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
         cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
-        facts = f"{cost} after {record.time[-1]:.1f} s".lstrip()
-        environment = record.environment.at(float(record.time[-1]))
-        if counted is None:
-            return cls(environment, record.team, field, record.label, facts)
-        team, numbers = record.team[counted], tuple((counted + 1).tolist())
-        return cls(environment, team, field, record.label, facts, numbers)
+        time = float(record.time[-1])
+        facts = f"{cost} after {time:.1f} s".lstrip()
+        rows = np.arange(len(record.team)) if counted is None else counted
+        numbers = tuple((rows + 1).tolist())
+        return cls(record.environment, record.team[rows], field, record.label, facts, numbers, time)
 
 
 class _Rooms(NamedTuple):
@@ -102,8 +110,7 @@ def plot_coverage(
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
     aspect = (high_x - low_x) / (high_y - low_y)
-    largest = [moment.field.largest for moment in moments]
-    limit = round_limit(max([distance for distance in largest if np.isfinite(distance)], default=1.0))
+    limit = _limit(moments)
     beside = len(moments) == 1 and aspect < 1.9
     handles = _handles(moments, theme)
     page, rooms = _laid_out(theme, size, aspect, len(moments), bool(curves), beside, handles)
@@ -135,8 +142,7 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     not written.
     """
     theme = theme_named(theme)
-    largest = moment.field.largest
-    limit = round_limit(largest if np.isfinite(largest) else 1.0)
+    limit = _limit([moment])
     ticks_in_metres(axes, moment.environment, theme)
     axes.apply_aspect()
     extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
@@ -154,13 +160,18 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     bar.set_ylabel(f"{_BAR_LABEL} (m)")
 
 
-def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
+def _limit(moments: Sequence[Moment]) -> float:
+    """Return the length, m, at which the scale of colours ends."""
+    largest = [moment.field.largest for moment in moments if np.isfinite(moment.field.largest)]
+    return round_limit(max(largest, default=1.0))
 
+
+def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
     line = Line2D([], [], color=tone(border_colour(theme)), linewidth=1.6, label="geodesic cell border")
     handles: list[Artist] = [robot_handle("robot", theme.final, theme), line]
-    obstacles = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
-    for handle in max(obstacles, key=len):
-        handle.set_label("obstacle")
+    every = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
+    for handle in united(every, label_of):
+        handle.set_label(label_of(handle).removesuffix(" (unknown to robots)"))
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
         colour, edge = tone(theme.unreached), tone(theme.obstacle_edge)
@@ -180,30 +191,26 @@ def _laid_out(
 ) -> tuple[Page, _Rooms]:
     """Return the page, and its rooms for curves and maps: beside or below each other."""
     page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
-    s, margin = page.scale, page.margin
+    s, margin, below = page.scale, page.margin, with_curves and not beside
     part = 0.5 if with_curves and beside else 1.0
-    begin = (1.0 - part) * page.size[0] + margin
-    caption, footer = 50 * s, page.footer_height(handles, begin)
-    room = part * page.size[0] - 2 * margin
-    highest = 290 * s
+    footer = page.footer_height(handles, (1.0 - part) * page.size[0] + margin)
+    room, head, highest = part * page.size[0] - 2 * margin, 46 * s, 290 * s
     if size is None:
         columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / aspect)))) if maps > 3 else maps
         slot = (room - (columns - 1) * 16 * s) / columns
-        tall = -(-maps // columns) * (min(slot / aspect, 760) + caption + 16 * s) - 16 * s
-        above = 46 * s if beside or not with_curves else 92 * s + highest
+        tall = -(-maps // columns) * (min(slot / aspect, 760) + 66 * s) - 16 * s
+        above = 2 * head + highest if below else head
         least = 480 * s if beside else 320
         page = Page((page.size[0], int(np.clip(above + tall + footer, least, 2600))), theme, 1.3)
     width, height = page.size
-    if not with_curves:
-        return page, _Rooms(None, (margin, 46 * s, room, height - 46 * s - footer), 26 * s)
-    if beside:
-        curves = (margin, 46 * s, 0.5 * width - margin, height - 46 * s)
-        maps_room = (0.5 * width + margin, 46 * s, room, height - 46 * s - footer)
-        return page, _Rooms(curves, maps_room, 26 * s)
-    cut = 46 * s + (highest if size is None else min(highest, 0.4 * (height - 46 * s - footer)))
-    curves = (margin, 46 * s, width - 2 * margin, cut - 46 * s)
-    maps_room = (margin, cut + 46 * s, room, height - footer - cut - 46 * s)
-    return page, _Rooms(curves, maps_room, cut + 24 * s)
+    if below:
+        high = highest if size is None else min(highest, 0.4 * (height - head - footer))
+        cut = head + high
+        maps_room = margin, cut + head, room, height - footer - cut - head
+        return page, _Rooms((margin, head, width - 2 * margin, high), maps_room, cut + 24 * s)
+    curves = (margin, head, 0.5 * width - margin, height - head) if with_curves else None
+    maps_room = (1.0 - part) * width + margin, head, room, height - head - footer
+    return page, _Rooms(curves, maps_room, 26 * s)
 
 
 def _draw_all_curves(
@@ -211,16 +218,18 @@ def _draw_all_curves(
 ) -> None:
     """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
     left, top, width, height = room
-    across = times and width > 2.4 * height
-    part = (0.5 if across else 1.0, 0.5 if times and not across else 1.0)
-    drawn = [(curves, label, "m"), (times, TIME, "s")]
-    for k, (some, said, unit) in enumerate(drawn[: 2 if times else 1]):
-        place = left + k * width / 2 if across else left, top if across else top + k * height / 2
-        box = _curves_box(page, some, (*place, part[0] * width, part[1] * height), unit)
-        draw_curves(page.axes(box), some, page.theme, label=said, unit=unit)
+    across = bool(times) and width > 2.4 * height
+    drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
+    for k, (some, words, unit) in enumerate(drawn):
+        if across:
+            place = left + k * width / 2, top, width / 2, height
+        else:
+            place = left, top + k * height / len(drawn), width, height / len(drawn)
+        axes = page.axes(_curves_box(page, some, place, unit))
+        draw_curves(axes, some, page.theme, label=words, unit=unit)
 
 
-def _curves_box(page: Page, curves: Sequence[Curve], room: Box, unit: str = "m") -> Box:
+def _curves_box(page: Page, curves: Sequence[Curve], room: Box, unit: str) -> Box:
     """Return the box of the axes in the room for curves with all of their labels."""
     s = page.scale
     left, top, width, height = room
@@ -239,19 +248,13 @@ def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> l
         high = (height - (rows - 1) * gap) / rows - above
         best = max(best, (min(wide, max(high, 1.0) * aspect), columns))
     wide, columns = best
-    slot = (width - (columns - 1) * gap) / columns
-    return [
-        (
-            (
-                left + column * (slot + gap) + (0.0 if count > 1 else (slot - wide) / 2),
-                top + row * (wide / aspect + above + gap) + above,
-                wide,
-                wide / aspect,
-            ),
-            slot if count > 1 else (slot + wide) / 2,
-        )
-        for row, column in (divmod(number, columns) for number in range(count))
-    ]
+    slot, high = (width - (columns - 1) * gap) / columns, wide / aspect
+    aside = 0.0 if count > 1 else (slot - wide) / 2
+    boxes = []
+    for row, column in (divmod(number, columns) for number in range(count)):
+        x, y = left + column * (slot + gap) + aside, top + row * (high + above + gap) + above
+        boxes.append(((x, y, wide, high), slot - aside))
+    return boxes
 
 
 def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Box, scale: float) -> None:
@@ -267,12 +270,10 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     part = strength(borders, zoom, width)[:, None]
     place = borders.row, borders.column
     picture[place] = np.rint((1.0 - part) * picture[place] + part * np.array(border_colour(theme)))
-    image = axes.imshow(
-        picture, extent=(low_x, high_x, low_y, high_y), aspect="auto", interpolation="antialiased", zorder=0
-    )
-    region = Polygon(moment.environment.region.vertices, transform=axes.transData)
-    image.set_clip_path(region)
-    draw_map(axes, moment.environment, theme, density=False)
+    extent = low_x, high_x, low_y, high_y
+    image = axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased", zorder=0)
+    image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
+    draw_map(axes, moment.environment, theme, density=False, time=moment.time)
     places = moment.field.result.positions
     draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
 

@@ -115,6 +115,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "too_many": len(every) > plots.MOST_PANELS,
         "choice": choice.words if len(replayed) > 1 else "",
         "sparse": any(not has_path(run.record) for run in replayed),
+        "moving": any(run.record.environment.moves for run in replayed),
         "changing": any(failed is not None for record in changing for _, failed in lives(record)),
         "thumbnails": [
             {

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from clear_pages import overlap
@@ -5,6 +7,7 @@ from drawn_run import CORRIDOR, HALL, ROOMS, SHAFT, run_of
 from PIL import Image
 
 from robocov.cost import CoverageCost
+from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
 from robocov_app.figures.coverage import Moment, plot_coverage
 from robocov_app.figures.curves import DISTANCE, TIME
@@ -149,3 +152,16 @@ def test_a_small_page_has_the_curves_alone(size):
 def test_no_moments_are_refused():
     with pytest.raises(ParameterError, match="moments: none were given"):
         plot_coverage(curves(1), [])
+
+
+def test_moving_obstacles_have_a_path_and_a_legend_entry_of_their_own():
+    cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
+    plain = moment_of(ROOMS)
+    moving = replace(plain, environment=replace(ROOMS, obstacles=(*ROOMS.obstacles, cart)), time=1.0)
+    drawn = {}
+    for name, moment in (("plain", plain), ("moving", moving)):
+        figure = plot_coverage([], [moment], size=(900, 600))
+        drawn[name] = [text.get_text() for text in figure.legends[0].get_texts()], figure.axes[-1].lines
+    assert "obstacle" in drawn["plain"][0]
+    assert drawn["moving"][0] == [*drawn["plain"][0], "moving obstacle and its path"]
+    assert len(drawn["moving"][1]) == len(drawn["plain"][1]) + 1

@@ -11,6 +11,7 @@ import pytest
 from drawn_run import HALL, ROOMS
 from reported_results import HOSTILE, Page, entry, result_of, watched
 
+from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import ParameterError
 from robocov.files.result_folder import is_report
 from robocov_app.figures.styles import MARKS
@@ -239,3 +240,12 @@ def test_marks_are_those_of_the_plots() -> None:
     from robocov_app.figures.styles import curve_styles
 
     assert {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", *"abcde"]).values()} == MARKS.keys()
+
+
+def test_the_replay_explains_obstacles_that_move() -> None:
+    cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
+    words = [
+        "paler obstacles move" in report([watched([entry()], environment)]).html
+        for environment in (ROOMS, replace(ROOMS, obstacles=(cart,)))
+    ]
+    assert words == [False, True]
