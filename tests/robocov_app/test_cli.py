@@ -153,7 +153,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --lattice 1", "--lattice: 1"),
         ("run rooms --size big", "--size: 'big', but WIDTHxHEIGHT"),
         ("run rooms --size 10x10", "--size: 10"),
-        ("run rooms --theme blue", "--theme: 'blue', but one of 'light', 'dark'"),
+        ("run rooms --theme blue", "--theme: 'blue', but one of 'dark', 'light'"),
         ("run rooms --vidoe", "unknown option --vidoe: did you mean --video?"),
         ("run rooms --seed", "--seed: a value was wanted"),
         ("run rooms --seed -1", "--seed: -1"),

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from robocov_app.runs.options import JsonOption
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -38,7 +40,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
 
     Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of
@@ -56,8 +58,6 @@ class Arguments:
     """Part to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
     plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Draw the ratios to a PNG, SVG or PDF."""
 

@@ -8,24 +8,23 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
+from rich.console import Console
 
 from robocov.errors import InputError, MapError, place
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
+from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.tables import console
 from robocov_app.terminal.watch import changes
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
 
 _LISTED = 5  # components whose areas are told
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Validate maps; print area, free area, vertices, components and the narrowest gap of each.
 
     The exit status is 2 when one of them is not a valid map. Each mistake is named with its line and
@@ -42,8 +41,6 @@ class Arguments:
     """Map files, or names of bundled maps."""
     watch: bool = False
     """Check again at each save."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ class Outcome:
 
     @classmethod
     def of(cls, name: str) -> Outcome:
-        """Return that of the map with a name."""
+        """Check the map with a name."""
         try:
             return cls(name, check_map(load_map(name)))
         except InputError as error:
@@ -70,13 +67,8 @@ class Outcome:
         if isinstance(self.error, MapError):
             row |= {"line": self.error.line, "column": self.error.column}
             row["mistakes"] = [
-                {
-                    "path": place(mistake.path),
-                    "text": mistake.text,
-                    "line": mistake.line,
-                    "column": mistake.column,
-                }
-                for mistake in self.error.mistakes
+                {"path": place(each.path), "text": each.text, "line": each.line, "column": each.column}
+                for each in self.error.mistakes
             ]
             row["mistakes_not_listed"] = self.error.unlisted
         return row
@@ -97,76 +89,49 @@ def command(options: Arguments) -> int:
     if not options.files:
         raise InputError("check: at least one map file was wanted")
     if options.watch:
-        return _watch(options)
-    outcomes = []
-    for name in options.files:
-        outcome = Outcome.of(name)
-        outcomes.append(outcome)
-        if options.json:
-            continue
-        if outcome.report is not None:
-            print_report(name, outcome.report)
-            continue
-        for line in outcome.complaints():
-            print(f"robocov: error: {line}", file=sys.stderr)
+        watch(options)
+        return 0
+    outcomes = [Outcome.of(name) for name in options.files]
     if options.json:
         print(json.dumps({"maps": [outcome.to_dict() for outcome in outcomes]}, indent=1))
+    for outcome in () if options.json else outcomes:
+        if outcome.report is not None:
+            print(f"{outcome.name}: valid", *report_lines(outcome.report), sep="\n")
+        else:
+            for line in outcome.complaints():
+                print(f"robocov: error: {line}", file=sys.stderr)
     return 0 if all(outcome.report for outcome in outcomes) else 2
 
 
-def print_report(name: str, report: MapReport) -> None:
-    """Print a report for people."""
-    print(f"{name}: valid")
-    for line in report_lines(report):
-        print(line)
-
-
-def _watch(options: Arguments) -> int:
-    """Check again at each save; Ctrl-C ends it."""
-    from robocov_app.terminal.tables import console
-
+def watch(options: Arguments) -> None:
+    """Check again at each save, and say what has changed since the map was last valid; Ctrl-C ends it."""
     names = {_path(name): name for name in options.files}
     output = console()
     outcomes: dict[str, Outcome] = {}
     valid: dict[str, MapReport] = {}
     for changed in changes(list(names)):
-        blocks = {}
-        for path in changed:
-            name = names[path]
+        if output.is_terminal and not options.json:
+            output.clear()
+        fresh = [names[path] for path in changed]
+        for name in fresh:
             outcome = outcomes[name] = Outcome.of(name)
             if options.json:
                 print(json.dumps(outcome.to_dict()), flush=True)
-            blocks[name] = (outcome, valid.get(name))
+            else:
+                _show(output, f"{time.strftime('%H:%M:%S')}  {name}", outcome, valid.get(name))
             if outcome.report is not None:
                 valid[name] = outcome.report
-        if not options.json:
-            _show(output, blocks, outcomes)
-    return 0
+        if output.is_terminal and not options.json:
+            for name, outcome in outcomes.items():
+                if name not in fresh:
+                    _show(output, name, outcome, outcome.report)
+            output.print("watching; Ctrl-C ends", style="dim")
+        output.file.flush()
 
 
-def _show(
-    output: Console, blocks: dict[str, tuple[Outcome, MapReport | None]], outcomes: dict[str, Outcome]
-) -> None:
-    """Show what has changed; in a terminal, on a clean screen, and what has not below it."""
-    if output.is_terminal:
-        output.clear()
-    for name, (outcome, former) in blocks.items():
-        _print_block(output, f"{time.strftime('%H:%M:%S')}  {name}", outcome, former)
-    if output.is_terminal:
-        for name, outcome in outcomes.items():
-            if name not in blocks:
-                _print_block(output, name, outcome, outcome.report)
-        output.print("watching; Ctrl-C ends", style="dim")
-    output.file.flush()
-
-
-def _print_block(output: Console, title: str, outcome: Outcome, former: MapReport | None) -> None:
-    valid = outcome.report is not None
-    output.print(
-        f"{title}: {'valid' if valid else 'invalid'}",
-        style="bold green" if valid else "bold red",
-        soft_wrap=True,
-    )
+def _show(output: Console, title: str, outcome: Outcome, former: MapReport | None) -> None:
+    told, colour = ("valid", "green") if outcome.report else ("invalid", "red")
+    output.print(f"{title}: {told}", style=f"bold {colour}", soft_wrap=True)
     for line in report_lines(outcome.report, former) if outcome.report else outcome.complaints():
         output.print(line, soft_wrap=True)
 
@@ -181,53 +146,41 @@ def _path(name: str) -> Path:
 
 def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator[str]:
     """Yield the lines of a report, with what was otherwise in one before the map was changed."""
-    rows, was = _rows(report), {} if former is None else _rows(former)
-    told = [(title, _changed(value, was.get(title), former)) for title, value in rows.items()]
-    told += [(title, f"none, was {value}") for title, value in was.items() if title not in rows]
-    before = () if former is None else former.warnings
-    for warning in report.warnings:
-        told.append(("warning", warning + (" (new)" if former and warning not in before else "")))
-    told += [("no longer", warning) for warning in before if warning not in report.warnings]
+    rows, told = _rows(report), []
+    if former is None:
+        told = [*rows.items(), *(("warning", warning) for warning in report.warnings)]
+    else:
+        was = _rows(former)
+        for title, value in rows.items():
+            same = was.get(title) == value
+            told.append((title, value if same else f"{value}, was {was.get(title, 'none')}"))
+        told += [(title, f"none, was {value}") for title, value in was.items() if title not in rows]
+        for warning in report.warnings:
+            told.append(("warning", warning if warning in former.warnings else f"{warning} (new)"))
+        told += [("no longer", warning) for warning in former.warnings if warning not in report.warnings]
     width = max(len(title) for title, _ in told)
     for title, value in told:
         yield f"  {title:<{width}}  {value}"
 
 
-def _changed(value: str, was: str | None, former: MapReport | None) -> str:
-    if former is None or value == was:
-        return value
-    return f"{value}, was {was or 'none'}"
-
-
 def _rows(report: MapReport) -> dict[str, str]:
-    return {
+    areas = [f"{area:.6g} m²" for area in report.components[:_LISTED]]
+    areas += ["..."] * (len(report.components) > _LISTED)
+    gap = "none"
+    if report.narrowest_gap is not None:
+        (a, b), (c, d) = report.narrowest_gap.between
+        gap = f"{report.narrowest_gap.width:.3f} m, between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}]"
+    rows = {
         "name": report.name,
         "area": f"{report.area:.6g} m²",
         "free area": f"{report.free_area:.6g} m² ({report.free_fraction:.1%})",
         "obstacles": f"{report.obstacles}, with {report.vertices} vertices (boundary included)",
-        "components": _components(report),
-        "narrowest gap": _gap(report),
-        **({} if report.density is None else {"density": _density(report)}),
-        **{
-            f"start {start.name}": f"{start.kind}, room for about {start.capacity}" for start in report.starts
-        },
+        "components": f"{len(report.components)} ({', '.join(areas)})",
+        "narrowest gap": gap,
     }
-
-
-def _density(report: MapReport) -> str:
-    assert report.density_range is not None
-    low, high = report.density_range
-    return f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
-
-
-def _components(report: MapReport) -> str:
-    areas = ", ".join(f"{area:.6g} m²" for area in report.components[:_LISTED])
-    more = ", ..." if len(report.components) > _LISTED else ""
-    return f"{len(report.components)} ({areas}{more})"
-
-
-def _gap(report: MapReport) -> str:
-    if report.narrowest_gap is None:
-        return "none"
-    (a, b), (c, d) = report.narrowest_gap.between
-    return f"{report.narrowest_gap.width:.3f} m, between [{a:.4g}, {b:.4g}] and [{c:.4g}, {d:.4g}]"
+    if report.density is not None and report.density_range is not None:
+        low, high = report.density_range
+        rows["density"] = f"{report.density}, {low:.4g} to {high:.4g}, mean {report.mean_density:.4g}"
+    return rows | {
+        f"start {each.name}": f"{each.kind}, room for about {each.capacity}" for each in report.starts
+    }

@@ -8,18 +8,16 @@ from typing import Any
 
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
 from robocov.controllers.gains import Gain, Option, value_text
+from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.tables import console
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """List the controllers: one line each, and their gains with units, defaults and ranges.
 
     Example: robocov controllers --json
     """
-
-    json: bool = False
-    """Print one JSON object and nothing else; the recommended controller has "flagship": true."""
 
 
 def command(options: Arguments) -> None:

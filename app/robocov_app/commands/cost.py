@@ -5,26 +5,24 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
 
 from robocov.arrays import Array
-from robocov.errors import InputError, ParameterError, shown
+from robocov.errors import InputError, ParameterError, checked, is_number, reason, shown
 from robocov.files.atomic import writable, written
 from robocov.mapfile import load_map
-from robocov_app.render.density import density_kind, density_lines
+from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
+from robocov_app.runs.options import PlotOptions
 from robocov_app.terminal.output import finite
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass
-class Arguments:
-    """Evaluate the exact coverage cost (22) of given positions.
+class Arguments(PlotOptions):
+    """Evaluate the exact coverage cost (22) of given positions; --plot draws a map of the distances.
 
     Example: robocov cost rooms --positions robots.json --lattice 128
     """
@@ -40,24 +38,16 @@ class Arguments:
     """Evaluate on N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
     """Save per-site points (m,2), distances (m,) and owner (m,) there, with speeds also times (m,)."""
-    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw a map of the distances to a PNG, SVG or PDF."""
-    theme: Literal["light", "dark"] = "light"
-    """Colours of the picture."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checked("--lattice", self.lattice, 2, 2048, whole=True)
+        if self.sites is not None:
+            writable(self.sites)
 
 
 def command(options: Arguments) -> None:
     """Evaluate and print."""
-    if not 2 <= options.lattice <= 2048:
-        raise ParameterError(f"--lattice: {options.lattice}, but a whole number from 2 to 2048 was wanted")
-    if options.sites is not None:
-        writable(options.sites)
-    if options.plot is not None:
-        from robocov_app.figures.files import check_figure_path
-
-        check_figure_path(options.plot)
     environment = load_map(options.map)
     robots = read_positions(options.positions)
     speeds = speeds_of(options.speeds, len(robots))
@@ -67,43 +57,34 @@ def command(options: Arguments) -> None:
         timed = None if speeds is None else cost(robots, speeds)
     except InputError as error:
         raise InputError(f"{options.positions}: {error}") from error
-    shown = result if timed is None else timed
     if options.sites is not None:
+        chosen = timed or result
+        arrays: dict[str, Any] = {"points": cost.points, "distances": chosen.distances, "owner": chosen.owner}
         with written(options.sites) as part, part.open("wb") as file:
-            arrays: dict[str, Any] = {"points": cost.points}
-            arrays |= {"distances": shown.distances, "owner": shown.owner}
-            if timed is not None:
-                arrays["times"] = timed.times
-            np.savez(file, **arrays)
+            np.savez(file, **arrays | ({} if timed is None else {"times": timed.times}))
     if options.plot is not None:
-        from robocov_app.render.density import mean_label
-
         mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"
-        if timed is not None:
-            mean = f"mean time {timed.mean_time:.3f} s"
+        mean = mean if timed is None else f"mean time {timed.mean_time:.3f} s"
         fine = cost_for_pictures(environment, cost)
-        draw_distances(
-            options.plot, fine, robots, mean, title="Coverage cost", theme=options.theme, speeds=speeds
-        )
-    answer = {
-        "mean_distance_m": result.mean_distance,
-        **({} if timed is None else {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}),
-        "cost_m3": result.value,
-        "uncovered_area_m2": result.uncovered_area,
-        "robots": len(robots),
-        "sites": len(cost.points),
-        "density": density_kind(environment),
-    }
+        title, theme = "Coverage cost", options.theme
+        draw_distances(options.plot, fine, robots, mean, title=title, theme=theme, speeds=speeds)
     if options.json:
+        answer = {
+            "mean_distance_m": result.mean_distance,
+            **({} if timed is None else {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}),
+            "cost_m3": result.value,
+            "uncovered_area_m2": result.uncovered_area,
+            "robots": len(robots),
+            "sites": len(cost.points),
+            "density": density_kind(environment),
+        }
         print(json.dumps(finite(answer)))
         return
     print(f"mean distance   {result.mean_distance:.4f} m")
     if timed is not None:
         print(f"mean time       {timed.mean_time:.4f} s")
     print(f"coverage cost   {result.value:.3f} m³")
-    print(f"uncovered area  {result.uncovered_area:.3f} m²")
-    for line in density_lines(environment):
-        print(line)
+    print(f"uncovered area  {result.uncovered_area:.3f} m²", *density_lines(environment), sep="\n")
     print(f"on {len(cost.points)} sites, {len(robots)} robots")
 
 
@@ -126,19 +107,15 @@ def read_positions(path: Path) -> Array:
     try:
         content = json.loads(path.read_bytes())
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise InputError(f"{path}: cannot be read: {reason(error)}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not JSON: {error}") from error
     if not isinstance(content, list) or not content:
         raise InputError(f"{path}: {shown(content)}, but a list of [x, y] in metres was wanted")
     for k, pair in enumerate(content):
-        if not (isinstance(pair, list) and len(pair) == 2 and all(map(_is_finite, pair))):
+        fits = isinstance(pair, list) and len(pair) == 2
+        if not fits or not all(is_number(value) and abs(value) < 1e300 for value in pair):
             raise InputError(
                 f"{path}: [{k}]: {shown(pair)}, but [x, y], two finite numbers in metres, was wanted"
             )
     return np.array(content, dtype=float)
-
-
-def _is_finite(value: object) -> bool:
-    """Return whether a JSON value is a number that a float can hold."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300

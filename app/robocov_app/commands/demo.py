@@ -5,13 +5,13 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import ParameterError
-from robocov_app.runs.options import ConditionOptions, robots_of
-from robocov_app.terminal.arguments import in_range, parsed_gains, window_size
+from robocov.errors import ParameterError, checked
+from robocov_app.runs.options import ConditionOptions, WindowOptions, robots_of
+from robocov_app.terminal.arguments import parsed_gains, window_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from robocov_app.runs.recording import Frame
     from robocov_app.viewer.opening import Opening
     from robocov_app.viewer.session.session import Session
+    from robocov_app.viewer.window import Window
 
 
 @dataclass
-class Arguments:
+class Arguments(WindowOptions):
     """The interactive window: watch a team cover a map, touch it, compare controllers, go back in time.
 
     Everything has a key: press F1. Settings of the look are remembered.
@@ -54,20 +55,12 @@ class Arguments:
     """Play the lesson that comes with robocov, in eleven short chapters."""
     lesson: Path | None = None
     """Play a lesson of your own, see `robocov lesson`."""
-    theme: Literal["light", "dark"] | None = None
-    """Colours; by default those of the last time."""
-    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size of the window in pixels; by default that of the last time."""
-    scale: float | None = None
-    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
     lattice: int = 128
     """The live coverage cost is evaluated on a lattice of N x N sites."""
     show: tuple[str, ...] = ()
     """Layers to show besides the usual ones: distances, scan, ..."""
     hide: tuple[str, ...] = ()
     """Layers not to show."""
-    folder: Path = Path()
-    """Where screenshots, films, runs and maps are saved."""
     frames: int | None = None
     """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
     out: Path | None = None
@@ -79,14 +72,13 @@ class Arguments:
     """Robots that differ: a TOML or JSON file of groups, as for `robocov run`; it says how many there are."""
 
     def __post_init__(self) -> None:
-        in_range("--robots", self.robots, 1, 1000)
-        in_range("--seed", self.seed, 0, 2**63 - 1)
-        in_range("--lattice", self.lattice, 2, 1024)
-        in_range("--speed", self.speed, 0.01, 1000.0)
-        if self.scale is not None:
-            in_range("--scale", self.scale, 0.5, 4.0)
+        super().__post_init__()
+        checked("--robots", self.robots, 1, 1000)
+        checked("--seed", self.seed, 0, 2**63 - 1)
+        checked("--lattice", self.lattice, 2, 1024)
+        checked("--speed", self.speed, 0.01, 1000.0)
         if self.frames is not None:
-            in_range("--frames", self.frames, 1, 1_000_000)
+            checked("--frames", self.frames, 1, 1_000_000)
         if not 1 <= len(self.controllers) <= 4:
             raise ParameterError(f"--controllers: {len(self.controllers)}, but 1 to 4 were wanted")
         if self.out is not None and self.frames is None:
@@ -97,16 +89,10 @@ class Arguments:
             raise ParameterError("--video: --frames N or --tour was wanted beside it")
         if self.video is not None and self.video.suffix.lower() != ".mp4":
             raise ParameterError(f"--video: {str(self.video)!r}, but a name ending in .mp4 was wanted")
-        window_size(self.size)
-
-    @property
-    def headless(self) -> bool:
-        """Whether no display is wanted."""
-        return self.frames is not None or self.video is not None
 
 
 def command(options: Arguments) -> int:
-    """Open the window, or render it."""
+    """Open the window, or render it without a display."""
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.render.picture import checked_layers
@@ -115,7 +101,8 @@ def command(options: Arguments) -> int:
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
 
-    if not options.headless:
+    headless = options.frames is not None or options.video is not None
+    if not headless:
         on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
     if options.map.endswith(SUFFIX):
@@ -133,21 +120,25 @@ def command(options: Arguments) -> int:
         scale=options.scale,
         also=checked_layers("--show", options.show),
         without=checked_layers("--hide", options.hide),
-        headless=options.headless,
+        headless=headless,
         laws=laws,
         lattice=options.lattice,
         file=file,
         offers_lesson=file is None and options.lesson is None and not options.tour,
     )
-    if options.headless:
+    if headless:
         return rendered(opening, options)
     with opening.window() as window:
-        if options.lesson is not None:
-            window.start_lesson(options.lesson)
-        elif options.tour:
-            window.do("tour")
+        _begin_lesson(window, options)
         window.run()
     return 0
+
+
+def _begin_lesson(window: Window, options: Arguments) -> None:
+    if options.lesson is not None:
+        window.start_lesson(options.lesson)
+    elif options.tour:
+        window.do("tour")
 
 
 def session_of(options: Arguments) -> Session:
@@ -196,10 +187,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
         if options.out is not None:
             out = stack.enter_context(results(options.out, overwrite=False)).new
         window, stop = stack.enter_context(opening.window()), stack.enter_context(Interruption())
-        if options.lesson is not None:
-            window.start_lesson(options.lesson)
-        elif options.tour:
-            window.do("tour")
+        _begin_lesson(window, options)
         count = options.frames
         if count is None:
             assert window.tour is not None

@@ -9,11 +9,12 @@ from typing import Annotated, Literal
 import tyro
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.terminal.arguments import in_range, window_size
+from robocov_app.runs.options import WindowOptions
+from robocov_app.terminal.arguments import window_size
 
 
 @dataclass
-class Arguments:
+class Arguments(WindowOptions):
     """The map editor: draw and change maps, see at once what is wrong with them, try them.
 
     Everything has a key: press F1. Nothing is lost: work that was not saved is offered at the next start.
@@ -26,27 +27,17 @@ class Arguments:
     file of a foreign format, which is imported as you choose. Without it an empty sheet."""
     background: Path | None = None
     """A picture to put under the map, such as a scanned floor plan."""
-    theme: Literal["light", "dark"] | None = None
-    """Colours; by default those of the last time."""
-    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
-    """Size of the window in pixels; by default that of the last time."""
-    scale: float | None = None
-    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
-    folder: Path = Path()
-    """Where maps and screenshots are saved that are not given a path."""
     screenshot: Path | None = None
     """Save a picture of the window, drawn without a display, and end."""
     page: Literal["map", "object", "snap", "problems", "history"] = "map"
     """The panel's page in that picture."""
 
     def __post_init__(self) -> None:
-        if self.scale is not None:
-            in_range("--scale", self.scale, 0.5, 4.0)
+        super().__post_init__()
         if self.screenshot is not None and self.screenshot.suffix.lower() != ".png":
             raise ParameterError(
                 f"--screenshot: {str(self.screenshot)!r}, but a name ending in .png was wanted"
             )
-        window_size(self.size)
 
 
 def command(options: Arguments) -> int:

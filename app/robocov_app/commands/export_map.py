@@ -14,10 +14,11 @@ from robocov.errors import InputError, one_line
 from robocov.files.atomic import writable
 from robocov.mapfile import load_map
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
+from robocov_app.runs.options import JsonOption
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Write a map in a foreign format, and say what that format cannot hold.
 
     The format is that of the suffix. What an option has no meaning for is refused.
@@ -52,8 +53,6 @@ class Arguments:
     """Longitude and latitude of [0, 0] m: GeoJSON in degrees. Needs pyproj: robocov[geo]."""
     overwrite: bool = False
     """Replace existing files."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
 
 def command(options: Arguments) -> None:

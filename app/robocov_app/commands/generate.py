@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import tyro
 
 from robocov.environment import Environment
-from robocov.errors import InputError, MapError, OutputError, ParameterError, counted
+from robocov.errors import InputError, MapError, OutputError, ParameterError, checked, counted, reason
 from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
-from robocov_app.terminal.arguments import in_range
+from robocov_app.runs.options import PlotOptions
 from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
@@ -34,7 +34,7 @@ _SETTLED = ("kind", "seed", "obstacles", "area", "gap", "side", "width", "height
 
 
 @dataclass
-class Arguments:
+class Arguments(PlotOptions):
     """Make random maps, by a seed: the same words give the same map.
 
     The kinds are polygons (scattered obstacles), blocks (a town), rooms (a building), mazes and caves. The
@@ -43,6 +43,7 @@ class Arguments:
 
     With --count the maps of as many seeds, one after the other, go to a folder.
     With --study the maps go there that robocov paper draws by chance, with its starts.
+    --plot draws the maps on one sheet.
 
     Example: robocov generate --kind rooms --seed 3 --obstacles 8 --area 0.2 --gap 0.6 --out map.json
     """
@@ -69,70 +70,61 @@ class Arguments:
     """The maps of robocov paper, or of robocov paper --quick, in place of all the options above."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="MAP.json")] = None
     """The file to write; with --count and --study the folder."""
-    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw the maps on one sheet, a PNG, SVG or PDF."""
-    theme: Literal["light", "dark"] = "light"
-    """Colours of the sheet."""
     overwrite: bool = False
     """Replace earlier maps of the same names."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
+
+    def __post_init__(self) -> None:
+        for field in fields(Arguments) if self.study is not None else ():
+            value = getattr(self, field.name)
+            if field.name in _SETTLED and value != field.default:
+                raise InputError(f"--{field.name}: {value}, but --study says what its maps are like")
+        if self.count is not None:
+            checked("--count", self.count, 1, MOST)
+        if (self.width is None) != (self.height is None):
+            given, missing = ("width", "height") if self.height is None else ("height", "width")
+            raise InputError(f"--{given}: {getattr(self, given):g}, but --{missing} was wanted with it")
+        if self.side != _SIDE and self.width is not None:
+            raise InputError(f"--side: {self.side:g}, but --width and --height say how large the map is")
+        super().__post_init__()
 
 
 def command(options: Arguments) -> None:
     """Generate, save, draw and tell."""
-    _check(options)
+    out, rows, jobs = options.out, [], jobs_of(options)
+    several = bool(options.count or options.study)
+    check_out(out, folder=several, overwrite=options.overwrite)
     made: list[Environment] = []
-    rows: list[dict[str, Any]] = []
-    if options.count is None and options.study is None:
-        made.append(_generated(options, options.seed))
-        if options.out is None:
-            print(dump_map(made[0]), end="")
-        else:
-            save_map(made[0], options.out)
-            rows.append(_row(options.out, made[0]))
-    else:
-        assert options.out is not None
-        jobs = _of_seeds(options) if options.study is None else _of_study(options.study)
-        with progress("generating", len(jobs), quiet=options.json) as update:
-            for number, (name, make) in enumerate(jobs):
-                path = options.out / f"{name}.json"
-                _check_ours(path)
-                made.append(make())
-                save_map(made[-1], path)
-                rows.append(_row(path, made[-1]))
-                update(number + 1)
+    with progress("generating", len(jobs), quiet=options.json or not several) as update:
+        for number, (name, make) in enumerate(jobs, start=1):
+            path = out / f"{name}.json" if out is not None and several else out
+            if path is not None and several:
+                _require_map(path)
+            environment = make()
+            made.append(environment)
+            if path is None:
+                print(dump_map(environment), end="")
+            else:
+                save_map(environment, path)
+                rows.append({"file": str(path), **check_map(environment).to_dict()})
+            update(number)
     if options.plot is not None:
         from robocov_app.figures.files import save_figure
         from robocov_app.figures.map_sheet import plot_maps
 
         save_figure(plot_maps(made, options.theme), options.plot)
-    if options.out is not None:
-        _tell(options, rows)
+    if options.json and out is not None:
+        print(json.dumps({"out": str(out), "maps": rows}, indent=1))
+        return
+    for row in rows:
+        gap = row["narrowest_gap_m"]
+        narrowest = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
+        print(
+            f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free, {narrowest}, "
+            f"{counted(row['obstacles'], 'obstacle')}, {row['vertices']} vertices"
+        )
 
 
-def _check(options: Arguments) -> None:
-    """Complain about options before anything is made."""
-    if options.study is not None:
-        for field in fields(Arguments):
-            value = getattr(options, field.name)
-            if field.name in _SETTLED and value != field.default:
-                raise InputError(f"--{field.name}: {value}, but --study says what its maps are like")
-    if options.count is not None:
-        in_range("--count", options.count, 1, MOST)
-    if (options.width is None) != (options.height is None):
-        given, missing = ("width", "height") if options.height is None else ("height", "width")
-        raise InputError(f"--{given}: {getattr(options, given):g}, but --{missing} was wanted with it")
-    if options.side != _SIDE and options.width is not None:
-        raise InputError(f"--side: {options.side:g}, but --width and --height say how large the map is")
-    if options.plot is not None:
-        from robocov_app.figures.files import check_figure_path
-
-        check_figure_path(options.plot)
-    _check_out(options.out, folder=bool(options.count or options.study), overwrite=options.overwrite)
-
-
-def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
+def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
     """Make the folder for the maps, or make sure that no file is lost."""
     if folder:
         if out is None:
@@ -141,7 +133,7 @@ def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
             out.mkdir(parents=True, exist_ok=True)
             used = any(out.iterdir())
         except OSError as error:
-            raise OutputError(f"{out}: cannot be used for maps: {error.strerror or error}") from error
+            raise OutputError(f"{out}: cannot be used for maps: {reason(error)}") from error
         if used and not overwrite:
             raise InputError(f"{out}: the folder is not empty; another --out, or --overwrite, was wanted")
     elif out is not None:
@@ -152,7 +144,7 @@ def _check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
         require_fresh(out, "another --out", overwrite=overwrite)
 
 
-def _check_ours(path: Path) -> None:
+def _require_map(path: Path) -> None:
     """Make sure that no file but a map is replaced in a folder."""
     if writable(path).exists():
         try:
@@ -161,6 +153,19 @@ def _check_ours(path: Path) -> None:
             raise InputError(
                 f"{path}: is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
             ) from None
+
+
+def jobs_of(options: Arguments) -> list[Job]:
+    """Return what makes the maps of the seeds, or those that a study of the paper draws by chance."""
+    if options.study is None:
+        seeds = range(options.seed, options.seed + (options.count or 1))
+        digits = len(str(seeds[-1]))
+        return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
+    from robocov_app.replication.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
+
+    plan = FULL if options.study == "full" else QUICK
+    maps, bundled = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan)), bundled_maps()
+    return [(each.name, partial(replace, each.environment)) for each in maps if each.name not in bundled]
 
 
 def _generated(options: Arguments, seed: int) -> Environment:
@@ -174,42 +179,3 @@ def _generated(options: Arguments, seed: int) -> Environment:
         # its messages begin with the name of the parameter
         of_seed = "" if options.count is None else f" (seed {seed})"
         raise ParameterError(f"--{error}{of_seed}") from None
-
-
-def _of_seeds(options: Arguments) -> list[Job]:
-    """Return what makes the maps of as many seeds as were asked for."""
-    assert options.count is not None
-    seeds = range(options.seed, options.seed + options.count)
-    digits = len(str(seeds[-1]))
-    return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
-
-
-def _of_study(name: str) -> list[Job]:
-    """Return what makes the maps that a study of the paper draws by chance."""
-    from robocov_app.replication.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
-
-    plan = FULL if name == "full" else QUICK
-    maps = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan))
-    bundled = bundled_maps()
-    return [(each.name, partial(_same, each.environment)) for each in maps if each.name not in bundled]
-
-
-def _same(environment: Environment) -> Environment:
-    return environment
-
-
-def _row(path: Path, environment: Environment) -> dict[str, Any]:
-    return {"file": str(path), **check_map(environment).to_dict()}
-
-
-def _tell(options: Arguments, rows: list[dict[str, Any]]) -> None:
-    if options.json:
-        print(json.dumps({"out": str(options.out), "maps": rows}, indent=1))
-        return
-    for row in rows:
-        gap = row["narrowest_gap_m"]
-        narrowest = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
-        print(
-            f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free, {narrowest}, "
-            f"{counted(row['obstacles'], 'obstacle')}, {row['vertices']} vertices"
-        )

@@ -15,12 +15,13 @@ from robocov.mapfile import save_map
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
+from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Turn a foreign map file into a map JSON, and say what was dropped, repaired and changed.
 
     The format is known from the content, or else the suffix. What an option has no meaning for is refused.
@@ -108,8 +109,6 @@ class Arguments:
 
     overwrite: bool = False
     """Replace existing files."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
 
 def command(options: Arguments) -> None:

@@ -9,9 +9,11 @@ from typing import Literal
 
 import tyro
 
+from robocov_app.runs.options import JsonOption
+
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Check a lesson: a session file with chapters, which `robocov demo --lesson FILE` plays.
 
     Play what a chapter is to show in the window, save the session (Ctrl S), and write "lesson" into the file:
@@ -25,8 +27,6 @@ class Arguments:
     """What to do."""
     file: tyro.conf.Positional[Path]
     """The lesson."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
 
 def command(options: Arguments) -> int:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import InputError, counted
-from robocov_app.terminal.arguments import in_range
+from robocov.errors import InputError, checked, counted
+from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _MOST_WORKERS = 1024
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Run the paper's figures 1 to 8 and test its claims over many maps, starts and seeds.
 
     The folder gets index.html, a page with every figure beside what the paper claims of it and a plain
@@ -53,12 +53,10 @@ class Arguments:
     """Address of a Dask scheduler, as in tcp://host:8786, whose workers do the runs."""
     keep_versions: bool = False
     """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            in_range("--workers", self.workers, 1, _MOST_WORKERS)
+            checked("--workers", self.workers, 1, _MOST_WORKERS)
         chosen = [option for option, wanted in self._parts().items() if wanted]
         if len(chosen) > 1:
             raise InputError(f"{chosen[0]} and {chosen[1]}: one of them was wanted")

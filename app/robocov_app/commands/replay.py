@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, ParameterError, listed
-from robocov_app.runs.options import FilmOptions
+from robocov_app.runs.options import FilmOptions, JsonOption
 from robocov_app.terminal.arguments import window_size
 from robocov_app.terminal.interruption import INTERRUPTED
 
@@ -26,7 +26,7 @@ _NO_DISPLAY = (
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """A saved run or comparison again: in the window, or headlessly as frames and a film.
 
     In the window the run is the past: go back and forth in it, go on from any moment of it with other
@@ -45,8 +45,6 @@ class Arguments:
     overwrite: bool = False
     """Replace an earlier result in that folder."""
     film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
-    json: bool = False
-    """Print one JSON object and nothing else; with --frames or --video."""
 
     def __post_init__(self) -> None:
         if self.headless and self.out is None:

@@ -13,13 +13,14 @@ import tyro
 from robocov.errors import InputError, OutputError, ParameterError, counted
 from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
+from robocov_app.runs.options import JsonOption
 
 if TYPE_CHECKING:
     from robocov_app.report.results import Result
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """One HTML page of runs, comparisons and sweeps, with an interactive replay; it needs no network.
 
     Example: robocov report sweeps/rooms --out rooms.html
@@ -38,8 +39,6 @@ class Arguments:
     optimum: bool = False
     """Search for the centralised reference of each map and team, some seconds each, and tell how far every
     run stays above it; those that were found before are in the page anyway."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
 
 def command(options: Arguments) -> None:

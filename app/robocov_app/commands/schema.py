@@ -8,9 +8,11 @@ from typing import Literal
 
 import tyro
 
+from robocov_app.runs.options import JsonOption
+
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Print the JSON Schema of map files, or of session files, for completion and checks in editors.
 
     Example: robocov schema > robocov-map.schema.json
@@ -18,9 +20,6 @@ class Arguments:
 
     of: tyro.conf.Positional[Literal["map", "session"]] = "map"
     """What kind of files."""
-
-    json: bool = False
-    """Accepted for the sake of uniformity: the answer is JSON anyway."""
 
 
 def command(options: Arguments) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from robocov.errors import ParameterError
-from robocov_app.terminal.arguments import in_range
+from robocov.errors import ParameterError, checked
+from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ FAILED = 1
 
 
 @dataclass
-class Arguments:
+class Arguments(JsonOption):
     """Many runs in parallel: every combination of what a study file lists, each done once.
 
     The folder holds results.csv and results.parquet, one row a run, and a folder of each run.
@@ -49,12 +49,10 @@ class Arguments:
     """Use runs that other versions of robocov, numpy, scipy, shapely or pymunk have done."""
     dry_run: bool = False
     """Count the runs, do one, estimate time and disk space for all, and write nothing."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
 
     def __post_init__(self) -> None:
         if self.workers is not None:
-            in_range("--workers", self.workers, 1, 1024)
+            checked("--workers", self.workers, 1, 1024)
             if self.scheduler is not None:
                 raise ParameterError("--workers: those of a cluster are its own, so one of both was wanted")
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov.errors import ParameterError
-from robocov_app.terminal.arguments import in_range, parsed_size
+from robocov.errors import ParameterError, checked
+from robocov_app.terminal.arguments import parsed_size, window_size
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +22,49 @@ if TYPE_CHECKING:
     from robocov_app.runs.spec import RunSpec
 
 USUAL_ROWS = 4e6  # largest record where its rate is left open: about 320 MB
+
+
+@dataclass(kw_only=True)
+class JsonOption:
+    """Answers for programs."""
+
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+@dataclass(kw_only=True)
+class PlotOptions(JsonOption):
+    """A picture of the answer."""
+
+    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Draw it to a PNG, SVG or PDF."""
+    theme: Literal["light", "dark"] = "light"
+    """Colours of the picture."""
+
+    def __post_init__(self) -> None:
+        if self.plot is not None:
+            from robocov_app.figures.files import check_figure_path
+
+            check_figure_path(self.plot)
+
+
+@dataclass(kw_only=True)
+class WindowOptions:
+    """How a window looks."""
+
+    theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
+    """Colours; by default those of the last time."""
+    size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
+    """Size of the window in pixels; by default that of the last time."""
+    scale: float | None = None
+    """Scale of text and lines, as 2 on a screen of twice the density; by default what suits the screen."""
+    folder: Path = Path()
+    """Where screenshots, films, runs and maps are saved that are not given a path."""
+
+    def __post_init__(self) -> None:
+        window_size(self.size)
+        if self.scale is not None:
+            checked("--scale", self.scale, 0.5, 4.0)
 
 
 @dataclass
@@ -78,7 +121,7 @@ class FilmOptions:
     """Film frames per second."""
     film_speed: float = 4.0
     """Simulated seconds per second of film."""
-    theme: Literal["light", "dark"] | None = None
+    theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
     """Colours; by default light, in a window as the last time."""
     colours: Literal["paper", "robots"] = "paper"
     """Trajectories in the paper's red, or a colour for each robot; in films too."""
@@ -90,8 +133,8 @@ class FilmOptions:
     """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
 
     def __post_init__(self) -> None:
-        in_range("--fps", self.fps, 1, 240)
-        in_range("--film-speed", self.film_speed, 0.01, 1e4)
+        checked("--fps", self.fps, 1, 240)
+        checked("--film-speed", self.film_speed, 0.01, 1e4)
         self.picture_size()
 
     def picture_size(self) -> tuple[int, int] | None:
@@ -117,7 +160,7 @@ class FilmOptions:
 
 
 @dataclass
-class RunOptions:
+class RunOptions(JsonOption):
     """What a run is made of, and what is made of it."""
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
@@ -157,24 +200,22 @@ class RunOptions:
     """Folder for the results."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
     film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
     conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
     def __post_init__(self) -> None:
         if self.team is not None:
             self.robots = robots_of(self.made_team(), self.robots, RunOptions.robots, self.team)
-        in_range("--robots", self.robots, 1, 10_000)
-        in_range("--seed", self.seed, 0, 2**63 - 1)
-        in_range("--duration", self.duration, 0.0, 1e6, "s")
-        in_range("--lattice", self.lattice, 2, 2048)
+        checked("--robots", self.robots, 1, 10_000)
+        checked("--seed", self.seed, 0, 2**63 - 1)
+        checked("--duration", self.duration, 0.0, 1e6, "s")
+        checked("--lattice", self.lattice, 2, 2048)
         from robocov.simulation import check_dt  # asking for help must not load the physics
         from robocov_app.runs.spec import MOST_ROWS
 
         check_dt(self.dt)
         if self.record_hz is not None:
-            in_range("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
+            checked("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
             raise ParameterError(

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import tyro
 
-from robocov.errors import InputError, ParameterError, shown
+from robocov.errors import InputError, ParameterError, checked, shown
 
 T = TypeVar("T")
 
@@ -89,16 +89,9 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
             f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
         )
     width, height = int(match[1]), int(match[2])
-    in_range(option, width, least[0], most[0], "pixels wide")
-    in_range(option, height, least[1], most[1], "pixels high")
+    checked(option, width, least[0], most[0], "pixels wide")
+    checked(option, height, least[1], most[1], "pixels high")
     return width, height
-
-
-def in_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Check the value of an option. Raises ParameterError when it is out of range."""
-    if not low <= value <= high:
-        wanted = f"a number from {low:g} to {high:g} {unit}".rstrip()
-        raise ParameterError(f"{option}: {value!r}, but {wanted} was wanted")
 
 
 def window_size(text: str | None) -> tuple[int, int] | None:
