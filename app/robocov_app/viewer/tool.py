@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from robocov_app.viewer.session.map_edits import passage_words
+
 if TYPE_CHECKING:
     from robocov.environment import Environment, Obstacle
     from robocov_app.viewer.session.session import Session
@@ -81,13 +83,14 @@ def edited(session: Session, environment: Environment, words: str) -> str:
     StartError
         When there is no room for a robot any more.
     """
-    gone = set(session.environment.starts) - set(environment.starts)
+    before, radius = session.environment, session.circumstances(session.lanes[0]).team.radius
+    gone = set(before.starts) - set(environment.starts)
     pushed = session.edit(environment, words)
     if pushed:
         words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
-    return words
+    return "; ".join(filter(None, [words, passage_words(before, environment, float(radius.min()))]))
 
 
 def apart(a: Point, b: Point) -> float:

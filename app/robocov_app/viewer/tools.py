@@ -14,6 +14,7 @@ from robocov_app.viewer.session.map_edits import (
     moved,
     obstacle_at,
     polygon_of,
+    snapped,
     wall_of,
     with_moved,
     with_obstacle,
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
     from robocov.environment import Obstacle
     from robocov_app.viewer.session.session import Session
+
+SNAPS_WITHIN = 0.6
+"""Part of a finger's width within which corners and walls draw what is drawn."""
 
 WALL_WIDTH = 0.1
 """Width of drawn walls in metres."""
@@ -123,17 +127,19 @@ class Polygon(Tool):
     hint: str = "click the corners; Enter, a double click or a click on the first corner closes it"
     _corners: list[Point] = field(default_factory=list)
     _at: Point = (0.0, 0.0)
+    _reach: float = 0.0
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        self._at = point
         if self._ends(point, reach):
             return self.finish(session)
+        self._reach = SNAPS_WITHIN * reach
+        self._at = point = snapped(session.environment, point, self._reach)
         if not self._corners or apart(point, self._corners[-1]) > 1e-6:
             self._corners.append(point)
         return None
 
     def move(self, session: Session, point: Point) -> None:
-        self._at = point
+        self._at = snapped(session.environment, point, self._reach) if self._corners else point
 
     def finish(self, session: Session) -> str | None:
         corners, self._corners = self._corners, []

@@ -9,7 +9,15 @@ import numpy as np
 import shapely
 
 from robocov.density import Raster, sampled
-from robocov.environment import CircleObstacle, Environment, Obstacle, Point, PolygonObstacle, WallObstacle
+from robocov.environment import (
+    CircleObstacle,
+    Environment,
+    Obstacle,
+    Point,
+    PolygonObstacle,
+    WallObstacle,
+    gaps_narrower,
+)
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 
@@ -64,6 +72,41 @@ def obstacle_at(environment: Environment, point: tuple[float, float], reach: flo
     if not len(away) or away.min() > reach:
         return None
     return int(np.flatnonzero(away == away.min())[-1])
+
+
+def snapped(environment: Environment, point: Point, reach: float) -> Point:
+    """Return the corner within `reach` metres of a point, else the nearest place on a wall, else the point.
+
+    What is drawn from wall to wall then leaves no crack.
+    """
+    walls = environment.free.boundary
+    corners = shapely.get_coordinates(walls)
+    away = np.hypot(*(corners - point).T)
+    if len(away) and away.min() <= reach:
+        x, y = corners[away.argmin()].tolist()
+        return x, y
+    line = shapely.shortest_line(walls, shapely.Point(point))
+    if line is None or line.length > reach:
+        return point
+    x, y = shapely.get_coordinates(line)[0].tolist()
+    return x, y
+
+
+def passage_words(before: Environment, after: Environment, radius: float) -> str:
+    """Return what an edit cuts off from robots of a radius, m, and what gap it leaves too narrow for them."""
+    words = []
+    rooms = [shapely.get_parts(each.free.buffer(-radius, quad_segs=4)) for each in (before, after)]
+    inside = shapely.STRtree(rooms[0]).query(shapely.point_on_surface(rooms[1]), predicate="intersects")
+    for room in range(len(rooms[0])):  # of what hung together the largest part counts as what is left of it
+        lost = np.sort(shapely.area(rooms[1][inside[0][inside[1] == room]]))[:-1].sum()
+        if lost > radius * radius:
+            words.append(f"{lost:.1f} m² cut off")
+    width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
+    known = {gap.between for gap in gaps_narrower(before.free, width)}
+    new = [gap for gap in gaps_narrower(after.free, width) if gap.between not in known]
+    if new:
+        words.append(f"a gap of {100 * new[0].width:.0f} cm, too narrow for a robot")
+    return "; ".join(words)
 
 
 def words_for(obstacle: Obstacle) -> str:

@@ -1,0 +1,61 @@
+"""Walls drawn in the window: they leave no crack, and what they close is told."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from driven_window import opened
+from touched_run import HALL, RAPF
+
+from robocov.environment import CircleObstacle, Environment, WallObstacle
+from robocov_app.viewer.session.map_edits import passage_words, snapped, with_obstacle
+
+
+def room(*walls: WallObstacle) -> Environment:
+    return Environment("room", ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)), walls)
+
+
+def test_a_wall_drawn_nearly_from_wall_to_wall_closes_the_room_and_says_what_is_cut_off(
+    tmp_path: Path,
+) -> None:
+    with opened(tmp_path, RAPF, environment=room(), robots=2) as driver:
+        driver.key("w")
+        driver.click_at((5.0, 0.02))  # cracks of two centimetres
+        driver.click_at((5.0, 5.98))
+        driver.key("return")
+        assert len(driver.session.environment.free.geoms) == 2
+        assert driver.session.environment.obstacles[-1].points == ((5.0, 0.0), (5.0, 6.0))
+        assert driver.desk.message.startswith("wall drawn; ") and driver.desk.message.endswith(" m² cut off")
+
+
+def test_what_is_far_from_walls_stays_where_it_is_drawn(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, environment=room(), robots=2) as driver:
+        driver.key("w")
+        for point in ((5.0, 1.0), (5.0, 4.0)):
+            driver.click_at(point)
+        driver.key("return")
+        wall = driver.session.environment.obstacles[-1]
+        assert np.allclose(wall.points, ((5.0, 1.0), (5.0, 4.0)), atol=0.02)
+        assert driver.desk.message == "wall drawn"
+
+
+def test_corners_come_before_walls() -> None:
+    assert snapped(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
+    assert snapped(HALL, (1.3, 0.04), 0.1) == (1.3, 0.0)
+    assert snapped(HALL, (1.3, 0.2), 0.1) == (1.3, 0.2)
+
+
+@pytest.mark.parametrize(("end", "words"), [
+    (5.93, "a gap of 7 cm, too narrow for a robot"),
+    (5.7, ""),
+    (6.0, "m² cut off"),
+])  # fmt: skip
+def test_a_gap_that_no_robot_passes_is_told_with_its_width(end: float, words: str) -> None:
+    before, wall = room(), WallObstacle(((4.0, 0.0), (4.0, end)), 0.1)
+    after = with_obstacle(before, wall)
+    said = passage_words(before, after, 0.1)
+    assert words in said and bool(said) == bool(words)
+    # robots of 20 cm cannot pass where there are 7 cm: what is behind is cut off too
+    assert ("cut off" in said) == (end > 5.9)
+    pillar = CircleObstacle((8.0, 3.0), 0.5)
+    assert passage_words(after, with_obstacle(after, pillar), 0.1) == "", "it was so before"
