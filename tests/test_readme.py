@@ -36,6 +36,7 @@ def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(capsys.readouterr().out.split()) == 3
 
 
+@pytest.mark.slow
 def test_the_examples_of_plots_and_tables_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     study = Study((StudyMap("square", load_map("square")),), ("rapf",), duration=0.5)
@@ -75,6 +76,7 @@ def test_pictures_are_there() -> None:
         assert (Path(__file__).parents[1] / name).is_file()
 
 
+@pytest.mark.slow
 def test_the_maps_that_it_generates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # a few of many will do

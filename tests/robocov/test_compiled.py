@@ -144,6 +144,7 @@ def test_what_is_compiled_is_told(monkeypatch, tmp_path):
         on_compile.remove(told.append)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["--help"], ["maps"]])
 def test_commands_that_measure_nothing_do_not_load_the_compiler(command):
     script = f"""

@@ -111,6 +111,7 @@ def test_a_header_that_is_none_is_refused(header: str) -> None:
         read(buffer.getvalue())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 @pytest.mark.parametrize("hostile", ["zeros", "entries"])
 def test_a_file_that_would_take_gigabytes_is_refused_at_once(tmp_path: Path, hostile: str) -> None:

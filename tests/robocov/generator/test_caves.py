@@ -21,6 +21,7 @@ from robocov.generator.request import Request
 SEEDS = range(10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rock_goes_all_round_and_pillars_stand_apart(seed: int) -> None:
     environment = generated_map(seed, kind="caves")
@@ -39,6 +40,7 @@ def test_rock_goes_all_round_and_pillars_stand_apart(seed: int) -> None:
         assert pillar.polygon.area > 0.1
 
 
+@pytest.mark.slow
 def test_vertices_are_few_and_walls_smooth() -> None:
     for seed in SEEDS:
         (free,) = generated_map(seed, kind="caves").free.geoms
@@ -68,6 +70,7 @@ def test_caves_have_chambers_and_tunnels_and_sometimes_pillars() -> None:
     assert sum(count > 1 for count in narrow) >= 10
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     st.integers(0, 2**32),

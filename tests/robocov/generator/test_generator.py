@@ -139,9 +139,9 @@ def test_starts_have_room_for_a_team(kind):
 
 def test_the_same_seed_gives_the_same_map_and_another_seed_another():
     for kind in GENERATORS:
-        maps = [generated_map(seed, kind=kind) for seed in range(6)]
-        assert [generated_map(seed, kind=kind) for seed in range(6)] == maps
-        assert len({environment.obstacles for environment in maps}) == 6
+        maps = [generated_map(seed, kind=kind) for seed in range(3)]
+        assert [generated_map(seed, kind=kind) for seed in range(3)] == maps
+        assert len({environment.obstacles for environment in maps}) == 3
 
 
 def digest(environment):

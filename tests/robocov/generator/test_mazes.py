@@ -132,6 +132,7 @@ def test_the_grid_has_about_as_many_cells_as_are_wanted(
     assert found == (set(range(1, cells[0])), set(range(1, cells[1])))
 
 
+@pytest.mark.slow
 def test_no_wall_stands_in_the_start() -> None:
     for seed in range(12):
         # corridors are narrower than the disc

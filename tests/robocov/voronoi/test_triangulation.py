@@ -168,6 +168,7 @@ def moved(points: Array, region: Region, step: float, rng: np.random.Generator) 
     )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(seeds, st.sampled_from(FAMILIES[:3]), st.integers(4, 25), st.floats(-4.0, 0.5))
 def test_what_is_mended_is_delaunay(seed: int, family: Family, n: int, exponent: float) -> None:

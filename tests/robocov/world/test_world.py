@@ -78,7 +78,7 @@ def test_acceleration_is_limited_where_nothing_is_touched(empty: Environment) ->
         before = one.velocities
 
 
-@pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 0.05, 0.2, 1.0])
+@pytest.mark.parametrize("dt", [pytest.param(1 / 240, marks=pytest.mark.slow), 1 / 60, 0.05, 0.2, 1.0])
 def test_no_robot_enters_a_wall_however_it_is_driven(cluttered: Environment, dt: float) -> None:
     """Driven against walls at full force and speed, straight and into corners, at any control period."""
     for angle in np.linspace(0, 2 * np.pi, 7):

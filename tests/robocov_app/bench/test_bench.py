@@ -56,6 +56,7 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
     assert gc.isenabled()
 
 
+@pytest.mark.slow
 def test_rounds_go_on_until_the_time_is_over():
     clock = Clock()
     turn = InTurn({"one": clock.work(*[1.0] * 20)}, clock)

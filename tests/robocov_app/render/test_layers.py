@@ -279,6 +279,7 @@ class TestRobots:
         assert width == pytest.approx(3.0 * painter.camera.zoom, abs=4)
         assert height == pytest.approx(width, abs=1)
 
+    @pytest.mark.slow
     def test_slow_robots_glide(self):
         """A shift by a quarter of a pixel changes the picture."""
         _, painter = drawn(explained(ONE), "robots")

@@ -85,6 +85,7 @@ def test_figures_4_and_6_begin_in_the_same_places_and_8_elsewhere():
     assert {len(study) for study in studies.values()} == {2, 4}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [*QUICK.generated, *QUICK.tuning])
 def test_generated_maps_are_as_they_are_described(seed):
     environment = planned.generated_test_map(seed)

@@ -95,6 +95,7 @@ def test_a_sweep_is_its_table(folder) -> None:
     assert "max_speed" not in result.facts["team"] and result.facts["team"]["viscosity"] == 2.0
 
 
+@pytest.mark.slow
 def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
     result = gathered(folder)
     assert result.failed and len(result.fine) + len(result.failed) == 40

@@ -101,6 +101,7 @@ def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> Non
     assert record.parent != tmp_path
 
 
+@pytest.mark.slow
 def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:
     driver.key("space")
     driver.key("f9")
@@ -219,8 +220,9 @@ def test_the_theme_is_switched_for_everything(driver: Driver) -> None:
     assert driver.picture().mean() > 190
 
 
-@pytest.mark.parametrize("size", [(900, 600), (1500, 700), (3840, 2160), (640, 480)])
-@pytest.mark.parametrize("panes", [1, 3])
+@pytest.mark.parametrize(
+    ("size", "panes"), [((900, 600), 1), ((1500, 700), 3), ((3840, 2160), 3), ((640, 480), 1)]
+)
 def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int, tmp_path: Path) -> None:
     with opened(
         tmp_path, *([RAPF] * panes), size=(1280, 720), scale=2.0 if size[0] > 3000 else 1.0

@@ -84,6 +84,7 @@ def test_laws_that_tell_no_terms():
     sums_up(report)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["rapf", "rpf", "lloyd"])
 @pytest.mark.parametrize("name", ["rooms", "l-shape"])
 def test_all_along_a_run(law, name):

@@ -53,6 +53,7 @@ def test_a_run_that_nobody_touched_is_saved_byte_for_byte_as_run_does(tmp_path: 
     assert (tmp_path / "again" / "session.robocov").is_file()
 
 
+@pytest.mark.slow
 def test_a_story_is_saved_with_its_parts_costs_and_film(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
