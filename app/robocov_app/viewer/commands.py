@@ -3,256 +3,66 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS, speed_words
 from robocov_app.viewer.session.file import SUFFIX
+from robocov_app.viewer.tool import Tool
 
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
 """Headings of the help, in their order."""
 
-_LAYER_KEYS = (
-    ("cells", "1"),
-    ("centroids", "2"),
-    ("trajectories", "3"),
-    ("velocities", "4"),
-    ("force_attraction", "5"),
-    ("force_repulsion_robots", "6"),
-    ("force_repulsion_obstacle", "7"),
-    ("force_viscosity", "8"),
-    ("force_resultant", "9"),
-    ("links", "0"),
-    ("distances", "shift+1"),
-    ("geodesic_cells", "shift+2"),
-    ("path", "shift+3"),
-    ("scan", "shift+4"),
-    ("sensed", "shift+5"),
-    ("sensing", "shift+6"),
-    ("communication", "shift+7"),
-    ("obstacle_points", "shift+8"),
-    ("goals", "shift+9"),
-    ("starts", "shift+0"),
-    ("obstacles", "alt+1"),
-    ("boundary", "alt+2"),
-    ("grid", "alt+3"),
-    ("robots", "alt+4"),
-    ("failed", "alt+5"),
-    ("selection", "alt+6"),
-    ("legend", "alt+7"),
-    ("scale_bar", "alt+8"),
-    ("status", "alt+9"),
-    ("colour_bar", "alt+0"),
-    ("density", "alt+d"),
-)
-
-_TOOL_KEYS = {
-    "hand": "v",
-    "polygon": "p",
-    "wall": "w",
-    "circle": "c",
-    "brush": "g",
-    "eraser": "x",
-    "robot": "a",
-    "failure": "d",
-    "ruler": "m",
+_LAYER_KEYS = {
+    **{
+        f"{modifier}{key}": name
+        for modifier, names in {
+            "": "cells centroids trajectories velocities force_attraction force_repulsion_robots "
+            "force_repulsion_obstacle force_viscosity force_resultant links",
+            "shift+": "distances geodesic_cells path scan sensed sensing communication obstacle_points goals "
+            "starts",
+            "alt+": "obstacles boundary grid robots failed selection legend scale_bar status colour_bar",
+        }.items()
+        for key, name in zip("1234567890", names.split(), strict=True)
+    },
+    "alt+d": "density",
 }
+
+_TOOLS = {"v": "hand", "p": "polygon", "w": "wall", "c": "circle", "g": "brush", "x": "eraser"}
+_TOOL_KEYS = {name: key for key, name in {**_TOOLS, "a": "robot", "d": "failure", "m": "ruler"}.items()}
+
+REPEATS = True
+
+
+class Row(NamedTuple):
+    """A command of a group; its keys are separated by commas."""
+
+    name: str
+    title: str
+    run: Callable[..., object]
+    keys: str = ""
+    repeats: bool = False
+    takes: Takes | None = None
+
+
+def grouped(group: str, *rows: Row) -> list[Command]:
+    """Return the commands of a group."""
+    return [
+        Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
+        for name, title, run, keys, repeats, takes in rows
+    ]
 
 
 def desk_commands(desk: Desk, titles: dict[str, str]) -> list[Command]:
     """Return the commands that need no window; `titles` are the layers', by their names."""
-    return [
-        Command("pause", "Play or pause", "Run", desk.pause, ("space",)),
-        Command("step", "Single step", "Run", lambda: desk.session.step(), (".",), repeats=True),
-        Command("restart", "Restart", "Run", desk.restart, ("r",)),
-        Command("settle", "Play until settled, then stop", "Run", desk.settle, ("s",)),
-        Command("slower", "Slower", "Run", lambda: desk.change_speed(-1), ("-",), repeats=True),
-        Command(
-            "faster",
-            "Faster",
-            "Run",
-            lambda: desk.change_speed(1),
-            (
-                "=",
-                "+",
-            ),
-            repeats=True,
-        ),
-        Command(
-            "seed:next",
-            "Other starting positions (next seed)",
-            "Run",
-            lambda: desk.restart(seed=desk.session.scenario.seed + 1),
-            ("n",),
-        ),
-        Command("start:next", "Next start of the map", "Run", desk.next_start, ("shift+n",)),
-        Command(
-            "more",
-            "One robot more, from the start",
-            "Run",
-            lambda: desk.restart(robots=desk.robots + 1),
-            (
-                "shift+=",
-                "shift++",
-            ),
-            repeats=True,
-        ),
-        Command(
-            "fewer",
-            "One robot fewer, from the start",
-            "Run",
-            lambda: desk.restart(robots=desk.robots - 1),
-            ("shift+-",),
-            repeats=True,
-        ),
-        Command("map:next", "Next map", "Run", lambda: desk.next_map(1), ("page down",)),
-        Command("map:previous", "Previous map", "Run", lambda: desk.next_map(-1), ("page up",)),
-        Command("back", "Back by a moment", "Time", lambda: desk.look_by(-1), ("left",), repeats=True),
-        Command("forward", "On by a moment", "Time", lambda: desk.look_by(1), ("right",), repeats=True),
-        Command(
-            "back:second",
-            "Back by a second",
-            "Time",
-            lambda: desk.look_at(desk.session.time - 1.0),
-            ("shift+left",),
-            repeats=True,
-        ),
-        Command(
-            "forward:second",
-            "On by a second",
-            "Time",
-            lambda: desk.look_at(desk.session.time + 1.0),
-            ("shift+right",),
-            repeats=True,
-        ),
-        Command("first", "To the beginning", "Time", lambda: desk.look_at(0.0), ("home",)),
-        Command("live", "To the present", "Time", lambda: desk.session.look_at(desk.session.end), ("end",)),
-        Command("branch:here", "Go on from the moment that is shown", "Time", desk.branch, ("b",)),
-        Command("law", "Next controller in this pane", "Compare", desk.next_law, ("o",)),
-        Command("pane:add", "Compare with one more controller", "Compare", desk.add_pane, ("k",)),
-        Command(
-            "pane:remove",
-            "Remove this pane",
-            "Compare",
-            lambda: desk.session.remove_pane(desk.lane),
-            ("shift+k",),
-        ),
-        Command("pane:next", "Next pane", "Compare", desk.next_pane, ("`",)),
-        Command("undo", "Undo", "Touch", desk.undo, ("ctrl+z",), repeats=True),
-        Command(
-            "redo",
-            "Redo",
-            "Touch",
-            desk.redo,
-            (
-                "ctrl+y",
-                "ctrl+shift+z",
-            ),
-            repeats=True,
-        ),
-        Command(
-            "robot:next", "Ask the next robot", "Touch", lambda: desk.ask_next(1), ("tab",), repeats=True
-        ),
-        Command(
-            "robot:previous",
-            "Ask the previous robot",
-            "Touch",
-            lambda: desk.ask_next(-1),
-            ("shift+tab",),
-            repeats=True,
-        ),
-        Command(
-            "robot:fail",
-            "Let the robot that is asked fail, or revive it",
-            "Touch",
-            desk.fail_or_revive,
-            ("shift+d",),
-        ),
-        Command("robot:remove", "Take the robot that is asked out", "Touch", desk.remove_robot, ("delete",)),
-        Command(
-            "finish",
-            "Finish what is being drawn",
-            "Touch",
-            lambda: desk.say(desk.tool.finish(desk.session) or ""),
-            (
-                "return",
-                "enter",
-            ),
-        ),
-        Command("cancel", "Give up; close", "Touch", desk.cancel, ("escape",)),
-        Command(
-            "wider", "Wider walls; a larger brush", "Touch", lambda: desk.widen(1.25), ("]",), repeats=True
-        ),
-        Command(
-            "narrower",
-            "Narrower walls; a smaller brush",
-            "Touch",
-            lambda: desk.widen(0.8),
-            ("[",),
-            repeats=True,
-        ),
-        Command("theme", "Light or dark", "View", desk.switch_theme, ("t",)),
-        Command("fade", "Trajectories fade", "View", desk.switch_fade, ("shift+t",)),
-        Command(
-            "suggestions",
-            "Suggestions once the team has settled",
-            "View",
-            desk.switch_suggestions,
-            ("shift+h",),
-        ),
-        Command("panel", "Hide or show the panel", "View", desk.switch_panel, ("h",)),
-        Command("save:session", "Save the session", "Keep", desk.save_session, ("ctrl+s",)),
-        Command("recover", "Recover a session", "Keep", desk.recover, ("ctrl+shift+o",)),
-        Command("branch:previous", "Branch before", "Time", lambda: desk.enter_branch(-1), ("alt+left",)),
-        Command("branch:next", "Next branch", "Time", lambda: desk.enter_branch(1), ("alt+right",)),
-        Command("save:map", "Save the map", "Keep", desk.save_map, ("ctrl+shift+s",)),
-        *_typed_commands(desk),
-        *tool_commands(desk),
-        *layer_commands(desk, titles),
-    ]
-
-
-def tool_commands(desk: Desk) -> list[Command]:
-    """Return a command for each tool."""
-    return [
-        Command(
-            f"tool:{name}",
-            f"{tool.title}: {tool.hint}",
-            "Tools",
-            partial(desk.take_tool, name),
-            (_TOOL_KEYS[name],),
-        )
-        for name, tool in desk.tools.items()
-    ]
-
-
-def layer_commands(desk: Desk, titles: dict[str, str]) -> list[Command]:
-    """Return a command for each layer."""
-    keys = dict(_LAYER_KEYS)
-    names = [name for name in keys if name in titles]
-    names += [name for name in titles if name not in keys]
-    return [
-        Command(
-            f"layer:{name}",
-            titles[name],
-            "Show",
-            partial(desk.switch_layer, name),
-            (keys[name],) if name in keys else (),
-        )
-        for name in names
-    ]
-
-
-def _typed_commands(desk: Desk) -> list[Command]:
-    """Return the commands that take something: ``robots 12``, ``map office``."""
 
     def robot_numbers() -> list[str]:
-        circumstances = desk.session.circumstances(desk.lane)
-        return [str(number) for number in sorted([*circumstances.numbers, *circumstances.failed])]
+        return [str(number) for number in desk.numbers]
 
     def speeds() -> list[str]:
         return [speed_words(speed).rstrip("×") for speed in SPEEDS]
@@ -266,46 +76,110 @@ def _typed_commands(desk: Desk) -> list[Command]:
     def save(name: object) -> None:
         desk.save_session(Path(str(name)) if name else None)
 
+    def open_session(name: str) -> None:
+        desk.open_session(Path(name))
+
+    def next_seed() -> None:
+        desk.restart(seed=desk.session.scenario.seed + 1)
+
+    def begin_at(start: str) -> None:
+        desk.restart(start=start)
+
+    def look_on(seconds: float) -> None:
+        desk.look_at(desk.session.time + seconds)
+
+    def finish() -> str | None:
+        return desk.tool.finish(desk.session)
+
+    more, fewer = partial(desk.change_robots, 1), partial(desk.change_robots, -1)
+    fail, start = desk.fail_or_revive, Takes("start", options=desk.starts)
+
+    def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
+        return Row(name, title, run, takes=takes)
+
+    def tool_row(tool: Tool) -> Row:
+        run = partial(desk.take_tool, tool.name)
+        return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
+
+    def layer_row(name: str) -> Row:
+        return Row(f"layer:{name}", titles[name], partial(desk.switch_layer, name), keys.get(name, ""))
+
+    keys = {name: key for key, name in _LAYER_KEYS.items()}
+    layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
     return [
-        Command(
-            "robots", "Number of robots", "Run", lambda n: desk.restart(robots=n), takes=_whole("robots")
-        ),
-        Command("seed", "Seed", "Run", lambda n: desk.restart(seed=n), takes=_whole("seed")),
-        Command(
-            "start",
-            "Start of the map",
+        *grouped(
             "Run",
-            lambda s: desk.restart(start=s),
-            takes=Takes("start", options=desk.starts),
+            Row("pause", "Play or pause", desk.pause, "space"),
+            Row("step", "Single step", lambda: desk.session.step(), ".", REPEATS),
+            Row("restart", "Restart", desk.restart, "r"),
+            Row("settle", "Play until settled, then stop", desk.settle, "s"),
+            Row("slower", "Slower", lambda: desk.change_speed(-1), "-", REPEATS),
+            Row("faster", "Faster", lambda: desk.change_speed(1), "=, +", REPEATS),
+            Row("seed:next", "Other starting positions (next seed)", next_seed, "n"),
+            Row("start:next", "Next start of the map", desk.next_start, "shift+n"),
+            Row("more", "One robot more, from the start", more, "shift+=, shift++", REPEATS),
+            Row("fewer", "One robot fewer, from the start", fewer, "shift+-", REPEATS),
+            Row("map:next", "Next map", lambda: desk.next_map(1), "page down"),
+            Row("map:previous", "Previous map", lambda: desk.next_map(-1), "page up"),
+            taking("robots", "Number of robots", lambda n: desk.restart(robots=n), _whole("robots")),
+            taking("seed", "Seed", lambda n: desk.restart(seed=n), _whole("seed")),
+            taking("start", "Start of the map", begin_at, start),
+            taking("map", "Open a map", desk.open_map, Takes("map or file", options=desk.maps)),
+            taking("speed", "Speed", desk.set_speed, Takes("factor", _speed, speeds)),
         ),
-        Command("map", "Open a map", "Run", desk.open_map, takes=Takes("map or file", options=desk.maps)),
-        Command("speed", "Speed", "Run", desk.set_speed, takes=Takes("factor", _speed, speeds)),
-        Command(
-            "controller",
-            "Controller",
-            "Compare",
-            desk.use_law,
-            takes=Takes("controller", options=lambda: desk.laws),
-        ),
-        Command(
-            "time", "Go to a time", "Time", desk.look_at, takes=Takes("seconds", partial(_positive, "time"))
-        ),
-        Command("robot", "Ask a robot", "Touch", desk.ask, takes=_whole("robot", robot_numbers)),
-        Command(
-            "open",
-            "Open a session",
-            "Keep",
-            lambda f: desk.open_session(Path(f)),
-            takes=Takes("file", options=files),
-        ),
-        Command("save", "Save the session as", "Keep", save, takes=Takes("file")),
-        Command(
-            "branch",
-            "Enter a branch",
+        *grouped(
             "Time",
-            desk.enter_named_branch,
-            takes=Takes("branch", options=branches),
+            Row("back", "Back by a moment", lambda: desk.look_by(-1), "left", REPEATS),
+            Row("forward", "On by a moment", lambda: desk.look_by(1), "right", REPEATS),
+            Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
+            Row("forward:second", "On by a second", lambda: look_on(1.0), "shift+right", REPEATS),
+            Row("first", "To the beginning", lambda: desk.look_at(0.0), "home"),
+            Row("live", "To the present", lambda: desk.session.look_at(desk.session.end), "end"),
+            Row("branch:here", "Go on from the moment that is shown", desk.branch, "b"),
+            Row("branch:previous", "Branch before", lambda: desk.enter_branch(-1), "alt+left"),
+            Row("branch:next", "Next branch", lambda: desk.enter_branch(1), "alt+right"),
+            taking("time", "Go to a time", desk.look_at, Takes("seconds", partial(_positive, "time"))),
+            taking("branch", "Enter a branch", desk.enter_named_branch, Takes("branch", options=branches)),
         ),
+        *grouped(
+            "Compare",
+            Row("law", "Next controller in this pane", desk.next_law, "o"),
+            Row("pane:add", "Compare with one more controller", desk.add_pane, "k"),
+            Row("pane:remove", "Remove this pane", lambda: desk.session.remove_pane(desk.lane), "shift+k"),
+            Row("pane:next", "Next pane", desk.next_pane, "`"),
+            taking("controller", "Controller", desk.use_law, Takes("controller", options=lambda: desk.laws)),
+        ),
+        *grouped(
+            "Touch",
+            Row("undo", "Undo", desk.undo, "ctrl+z", REPEATS),
+            Row("redo", "Redo", desk.redo, "ctrl+y, ctrl+shift+z", REPEATS),
+            Row("robot:next", "Ask the next robot", lambda: desk.ask_next(1), "tab", REPEATS),
+            Row("robot:previous", "Ask the previous robot", lambda: desk.ask_next(-1), "shift+tab", REPEATS),
+            Row("robot:fail", "Let the robot that is asked fail, or revive it", fail, "shift+d"),
+            Row("robot:remove", "Take the robot that is asked out", desk.remove_robot, "delete"),
+            Row("finish", "Finish what is being drawn", finish, "return, enter"),
+            Row("cancel", "Give up; close", desk.cancel, "escape"),
+            Row("wider", "Wider walls; a larger brush", lambda: desk.widen(1.25), "]", REPEATS),
+            Row("narrower", "Narrower walls; a smaller brush", lambda: desk.widen(0.8), "[", REPEATS),
+            taking("robot", "Ask a robot", desk.ask, _whole("robot", robot_numbers)),
+        ),
+        *grouped(
+            "View",
+            Row("theme", "Light or dark", desk.switch_theme, "t"),
+            Row("fade", "Trajectories fade", desk.switch_fade, "shift+t"),
+            Row("suggestions", "Suggestions once the team has settled", desk.switch_suggestions, "shift+h"),
+            Row("panel", "Hide or show the panel", desk.switch_panel, "h"),
+        ),
+        *grouped(
+            "Keep",
+            Row("save:session", "Save the session", desk.save_session, "ctrl+s"),
+            Row("recover", "Recover a session", desk.recover, "ctrl+shift+o"),
+            Row("save:map", "Save the map", desk.save_map, "ctrl+shift+s"),
+            taking("open", "Open a session", open_session, Takes("file", options=files)),
+            taking("save", "Save the session as", save, Takes("file")),
+        ),
+        *grouped("Tools", *map(tool_row, desk.tools.values())),
+        *grouped("Show", *map(layer_row, layers)),
     ]
 
 

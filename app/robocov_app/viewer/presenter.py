@@ -2,70 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from robocov.controllers import CONTROLLERS
+from robocov.controllers.gains import Value
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
 from robocov_app.viewer.brush import Brush
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.file import SUFFIX
+from robocov_app.viewer.session.pane import Lane
 from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
+from robocov_app.viewer.tool import Point, Tool
 from robocov_app.viewer.tools import Hand, Wall, toolbox
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-    from typing import Any
-
-    from robocov.controllers.gains import Value
-    from robocov_app.viewer.costs import Costs
-    from robocov_app.viewer.session.pane import Lane
-    from robocov_app.viewer.session.session import Session
-    from robocov_app.viewer.tool import Point, Tool
-
-SAID_FOR = 5.0
-"""Seconds for which a message stays."""
+SAID_FOR = 5.0  # seconds for which a message stays
 
 _RECENT = 9  # sessions that are offered again
 
-FADE = 12.0
-"""Seconds of path that trajectories show where they fade."""
+FADE = 12.0  # seconds of path that trajectories show where they fade
 
 
 class Desk:
     """What the user does, in terms of the session, and what of it is shown.
 
-    Parameters
-    ----------
-    session : Session
-    costs : Costs
-    shown : set of names of layers
-    folder : Path
-        Where things are saved.
-    map_name : str
-        What the user calls the map: a bundled name or a path.
-    laws : names of controllers
-        To choose from beside the built-in ones: installed ones, and those of the user's files.
-    kept_in : Path or None
-        Folder in which work that is not saved is kept aside.
-    file : Path or None
-        Of the session.
-
-    Attributes
-    ----------
-    tool : Tool
-    active : int
-        Which pane gains and controllers are chosen for.
-    version : int
-        Grows whenever panel and arena have to look again at what there is.
-    message : str
-        What was said last, empty when it is old.
-    now : float, s
-        How long the desk has been used.
+    `shown`: names of layers. `folder`: where things are saved. `map_name`: a bundled name or a path. `laws`:
+    names of controllers to choose from beside the built-in ones. `kept_in`: the folder for unsaved work.
+    `file`: of the session. `active`: the pane that gains and controllers are chosen for. `version` grows
+    whenever panel and canvas have to look again at what there is. `now`: seconds since the start.
     """
 
     def __init__(
@@ -80,26 +52,18 @@ class Desk:
         file: Path | None = None,
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
-        self.map_name = map_name
+        self.map_name, self._kept_in = map_name, kept_in
         self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
         self.tools = toolbox()
         self.tool: Tool = self.tools["hand"]
-        self.active = 0
-        self.version = 0
+        self.active = self.version = 0
         self.theme = "light"
-        self.fade = False
-        self.suggests = True
+        self.panel, self.fade, self.suggests, self.filming = True, False, True, False
         self.recent: list[str] = []
-        self.panel = True
-        self.message = ""
-        self.trouble = False
-        self.filming = False
-        self._said = 0.0
-        self.now = 0.0
+        self.message, self.trouble, self._said, self.now = "", False, 0.0, 0.0
         self.cursor: Point | None = None
         self.cursor_pane = 0
         self._mapped: object = None
-        self._kept_in = kept_in
         self.workspace = Workspace(session, kept_in, file)
         self.look_at_map()
 
@@ -113,12 +77,15 @@ class Desk:
         return tool
 
     @property
+    def numbers(self) -> list[int]:
+        """The numbers of the robots in the chosen pane, those that failed with them."""
+        circumstances = self.session.circumstances(self.lane)
+        return sorted([*circumstances.numbers, *circumstances.failed])
+
+    @property
     def selected(self) -> int | None:
         """The number of the robot that is asked about, if it is there."""
-        number = self.hand.selected
-        circumstances = self.session.circumstances(self.lane)
-        there = number in circumstances.numbers or number in circumstances.failed
-        return number if there else None
+        return self.hand.selected if self.hand.selected in self.numbers else None
 
     @property
     def lane(self) -> Lane:
@@ -129,8 +96,7 @@ class Desk:
     @property
     def robots(self) -> int:
         """How many robots there are in the chosen pane, those that failed with them."""
-        circumstances = self.session.circumstances(self.lane)
-        return len(circumstances.numbers) + len(circumstances.failed)
+        return len(self.numbers)
 
     def parameters(self) -> list[Parameter | Pick]:
         """Return all sliders and words: the chosen controller's gains, then the team's limits."""
@@ -204,6 +170,10 @@ class Desk:
         """Begin anew, with changes of the scenario if there are any."""
         self.session.restart(**changes)
 
+    def change_robots(self, by: int) -> None:
+        """Begin anew with more robots or fewer."""
+        self.restart(robots=self.robots + by)
+
     def change_speed(self, by: int) -> None:
         """Play faster or slower."""
         k = speed_index(self.session.clock.speed) + by
@@ -230,26 +200,18 @@ class Desk:
         """Open the next map that has room for the team."""
         maps = self.maps()
         now = maps.index(self.map_name) if self.map_name in maps else 0
-        passed = []
+        passed: list[str] = []
         for k in range(1, len(maps) + 1):
             name = maps[(now + by * k) % len(maps)]
-            try:
+            with suppress(InputError):
                 self.open_map(name)
-            except InputError:
-                passed.append(name)
-                continue
-            if passed:
-                self.say(f"no room for {self.session.scenario.robots} robots: {', '.join(passed)}")
-            return
+                if passed:
+                    self.say(f"no room for {self.session.scenario.robots} robots: {', '.join(passed)}")
+                return
+            passed.append(name)
 
     def open_map(self, name: str) -> None:
-        """Begin anew on another map.
-
-        Raises
-        ------
-        MapError, StartError
-            When it cannot be loaded, or has no room for the team.
-        """
+        """Begin anew on another map; MapError or StartError where that cannot be."""
         self.session.restart(environment=load_map(name))
         self.map_name = name
 
@@ -301,12 +263,9 @@ class Desk:
 
     def ask_next(self, by: int) -> None:
         """Ask the next robot."""
-        circumstances = self.session.circumstances(self.lane)
-        numbers = sorted([*circumstances.numbers, *circumstances.failed])
-        if self.selected is None:
-            self.hand.selected = numbers[0 if by > 0 else -1]
-        else:
-            self.hand.selected = numbers[(numbers.index(self.selected) + by) % len(numbers)]
+        numbers, now = self.numbers, self.selected
+        k = (-1 if by > 0 else 0) if now is None else numbers.index(now)
+        self.hand.selected = numbers[(k + by) % len(numbers)]
 
     def fail_or_revive(self) -> None:
         """Let the robot that is asked fail, or work again."""
@@ -431,7 +390,7 @@ class Desk:
     def enter(self, node: int) -> None:
         """Go to the end of the branch that ends with a node of the document."""
         branches = self.session.branches
-        k = next(k for k, each in enumerate(branches) if each.node.number == node)
+        k = [each.node.number for each in branches].index(node)
         self.session.enter(branches[k].node)
         self.say(f"branch {k + 1} of {len(branches)}: {branches[k].words}")
 
@@ -459,8 +418,7 @@ class Desk:
 
     def ask(self, number: int) -> None:
         """Ask a robot by its number."""
-        circumstances = self.session.circumstances(self.lane)
-        if number not in {*circumstances.numbers, *circumstances.failed}:
+        if number not in self.numbers:
             raise ParameterError(f"there is no robot {number}")
         self.hand.selected = number
 

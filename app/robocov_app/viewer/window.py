@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import PAUSE, BaseWindow
 from robocov_app.viewer.arena import Arena
 from robocov_app.viewer.chart import Chart
-from robocov_app.viewer.commands import GROUPS, desk_commands, parameter_commands
+from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, grouped, parameter_commands
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
 from robocov_app.viewer.inspector import report_on
@@ -286,73 +287,41 @@ class Window(BaseWindow):
             self.panel.show_tab("robot")
 
     def _own_commands(self) -> list[Command]:
-        desk = self.desk
+        def panned(x: int, y: int) -> Callable[[], None]:
+            return lambda: self.arena.pan(_PAN * x, _PAN * y)
+
+        def zoomed(factor: float) -> Callable[[], None]:
+            return lambda: self.arena.zoom(factor, self._middle())
+
         return [
-            Command("fit", "Show the whole map", "View", self.arena.fit, ("f",)),
-            Command(
-                "zoom:in",
-                "Zoom in",
+            *grouped(
                 "View",
-                lambda: self.arena.zoom(1.25, self._middle()),
-                (
-                    "ctrl+=",
-                    "ctrl++",
-                ),
-                repeats=True,
+                Row("fit", "Show the whole map", self.arena.fit, "f"),
+                Row("zoom:in", "Zoom in", zoomed(1.25), "ctrl+=, ctrl++", REPEATS),
+                Row("zoom:out", "Zoom out", zoomed(0.8), "ctrl+-", REPEATS),
+                Row("pan:left", "Pan left", panned(1, 0), "ctrl+left", REPEATS),
+                Row("pan:right", "Pan right", panned(-1, 0), "ctrl+right", REPEATS),
+                Row("pan:up", "Pan up", panned(0, 1), "ctrl+up", REPEATS),
+                Row("pan:down", "Pan down", panned(0, -1), "ctrl+down", REPEATS),
+                Row("plot", "Plot mean distance or mean time", self.chart.switch, "y"),
+                Row("tab", "Next page of the panel", self._next_tab, "ctrl+tab"),
+                Row("fullscreen", "Full screen", self.toggle_fullscreen, "f11"),
             ),
-            Command(
-                "zoom:out",
-                "Zoom out",
-                "View",
-                lambda: self.arena.zoom(0.8, self._middle()),
-                ("ctrl+-",),
-                repeats=True,
+            *grouped(
+                "Keep",
+                Row("screenshot", "Screenshot", lambda: self.save_screenshot(self.desk.folder), "f12"),
+                Row("film", "Record a film, or end it", self.toggle_film, "f9"),
+                Row("save:run", "Save the run", self._save_run, "ctrl+e"),
+                Row("open:file", "Open a session or a map", self._open_file, "ctrl+o"),
             ),
-            Command(
-                "pan:left", "Pan left", "View", lambda: self.arena.pan(_PAN, 0), ("ctrl+left",), repeats=True
-            ),
-            Command(
-                "pan:right",
-                "Pan right",
-                "View",
-                lambda: self.arena.pan(-_PAN, 0),
-                ("ctrl+right",),
-                repeats=True,
-            ),
-            Command("pan:up", "Pan up", "View", lambda: self.arena.pan(0, _PAN), ("ctrl+up",), repeats=True),
-            Command(
-                "pan:down", "Pan down", "View", lambda: self.arena.pan(0, -_PAN), ("ctrl+down",), repeats=True
-            ),
-            Command("plot", "Plot mean distance or mean time", "View", self.chart.switch, ("y",)),
-            Command("tab", "Next page of the panel", "View", self._next_tab, ("ctrl+tab",)),
-            Command("fullscreen", "Full screen", "View", self.toggle_fullscreen, ("f11",)),
-            Command("screenshot", "Screenshot", "Keep", lambda: self.save_screenshot(desk.folder), ("f12",)),
-            Command("film", "Record a film, or end it", "Keep", self.toggle_film, ("f9",)),
-            Command("save:run", "Save the run", "Keep", self._save_run, ("ctrl+e",)),
-            Command(
-                "help",
-                "Keys",
+            *grouped(
                 "Help",
-                self._toggle_help,
-                (
-                    "f1",
-                    "shift+/",
-                ),
+                Row("help", "Keys", self._toggle_help, "f1, shift+/"),
+                Row("palette", "Commands by name", self._open_palette, "ctrl+k, /"),
+                Row("tour", "The lesson, or just play", self._start_tour, "f2"),
+                Row("quit", "Quit", self._quit, "ctrl+q"),
             ),
-            Command(
-                "palette",
-                "Commands by name",
-                "Help",
-                self._open_palette,
-                (
-                    "ctrl+k",
-                    "/",
-                ),
-            ),
-            Command("tour", "The lesson, or just play", "Help", self._start_tour, ("f2",)),
-            Command("open:file", "Open a session or a map", "Keep", self._open_file, ("ctrl+o",)),
-            Command("branches", "List of branches", "Time", self._list_branches, ("ctrl+b",)),
-            Command("quit", "Quit", "Help", self._quit, ("ctrl+q",)),
+            *grouped("Time", Row("branches", "List of branches", self._list_branches, "ctrl+b")),
         ]
 
     def _end_tour(self) -> bool:
