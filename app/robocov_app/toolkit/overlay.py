@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import pygame
 
 from robocov_app.render.camera import Camera
-from robocov_app.render.fonts import label, text_width
+from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import kept
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix
 
 FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
 """For strokes and words that are placed in pixels alone."""
+
+
+def flat_canvas(surface: pygame.Surface, theme: Theme, scale: float) -> Canvas:
+    """Return a canvas for strokes and words that are placed in pixels alone."""
+    return Canvas(surface, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+
 
 _FINE = 4
 
@@ -81,6 +91,27 @@ def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Them
     rounded(screen, box, theme.background, mix(theme.background, theme.ink, 0.3), round(4 * scale))
     picture = label(words, size, theme.ink)
     screen.blit(picture, picture.get_rect(center=box.center))
+
+
+def draw_status(
+    screen: pygame.Surface,
+    box: tuple[int, int, int, int],
+    theme: Theme,
+    scale: float,
+    facts: Sequence[str],
+    hint: str,
+) -> None:
+    """Draw the status line; what there is no room for is left out, from the end."""
+    left, top, width, height = box
+    screen.fill(mix(theme.panel, theme.ink, 0.06), pygame.Rect(box))
+    canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2
+    room = width - 44 * scale - canvas.text_width(hint, size)
+    kept = list(facts)
+    while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
+        kept.pop()
+    words = shortened("    ".join(kept), canvas.text_size(size), room)
+    canvas.text(words, (left + 12 * scale, y), size=size)
+    canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
 
 
 def draw_message(

@@ -2,52 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
+from robocov.arrays import Array
 from robocov_app.render import sprites
-from robocov_app.render.camera import Camera, round_length
+from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
-from robocov_app.render.theme import mix
-from robocov_app.toolkit.layout import inside
-from robocov_app.toolkit.overlay import tag
-from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, curve_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.arrays import Array
-    from robocov_app.render.theme import Colour, Theme
-    from robocov_app.toolkit.layout import Box, Layout
-    from robocov_app.viewer.presenter import Desk
-    from robocov_app.viewer.session.curves import Event, Plotted
-    from robocov_app.viewer.session.pane import Lane
+from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.toolkit.layout import Box, Layout, inside
+from robocov_app.toolkit.overlay import flat_canvas, tag
+from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared, curve_of
+from robocov_app.viewer.session.pane import Lane
 
 LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20
 """Pixels at scale 1 round the plot."""
 
-SHORTEST = 10.0
-"""Seconds that the axis shows at least."""
+SHORTEST = 10.0  # seconds that the axis shows at least
+REFRESHED = 0.1  # seconds after which growing curves are drawn anew
 
-REFRESHED = 0.1
-"""Seconds after which growing curves are drawn anew."""
+_GRASP = 6.0  # pixels at scale 1 from a ghost curve within which a click enters its branch
 
-_GLYPHS = {
-    "obstacle": "■",
-    "robot": "+",
-    "failure": "×",
-    "law": "◆",
-    "limits": "◆",
-    "hand": "●",
-    "density": "▲",
-}
-
-
-_FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+_GLYPHS = dict(
+    zip(["obstacle", "robot", "failure", "law", "limits", "hand", "density"], "■+×◆◆●▲", strict=True)
+)
 
 
 def time_axis(end: float) -> float:
@@ -77,10 +60,6 @@ def value_axis(low: float, high: float) -> tuple[float, float, float]:
     step = round_length(max((high - begin) / 2.5, 1e-6))
     begin = float(np.floor(begin / step) * step)
     return begin, float(f"{high + 0.05 * (high - begin):.6g}"), step
-
-
-_GRASP = 6.0
-"""Pixels at scale 1 from a ghost curve within which a click enters its branch."""
 
 
 class Chart:
@@ -157,41 +136,48 @@ class Chart:
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw both."""
-        session = self.desk.session
+        session, layout = self.desk.session, self.layout
         curves = [curve_of(lane, self.plotted) for lane in session.lanes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
+        panes = tuple(lane.number for lane in session.lanes)
         rest = (
-            *(tuple(lane.number for lane in session.lanes), len(session.events), len(session.ghosts)),
-            *(
-                self._span,
-                self.plotted,
-                self.desk.costs.state,
-                None if session.live else session.time,
-                session.serial,
-            ),
+            *(panes, len(session.events), len(session.ghosts), self._span, self.plotted),
+            *(self.desk.costs.state, None if session.live else session.time, session.serial),
         )
         # curves grow sixty times a second, which nobody sees
         old = self.desk.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):
-            _, _, width, height = self.layout.chart
-            self._page = pygame.Surface((width, height + self.layout.track[3]), 0, 32)
+            _, _, width, height = layout.chart
+            self._page = pygame.Surface((width, height + layout.track[3]), 0, 32)
             self._key, self._samples, self._drawn_at = rest, samples, self.desk.now
-            canvas = Canvas(self._page, _FLAT, self.theme, self.layout.scale, np.zeros(1, dtype=np.intp))
+            canvas = flat_canvas(self._page, self.theme, layout.scale)
             self._plot(canvas)
             self._track(canvas)
-        screen.blit(self._page, self.layout.chart[:2])
+        screen.blit(self._page, layout.chart[:2])
         self._values(screen)
         self._cursor(screen)
         self._hovered(screen)
 
+    def _note(
+        self,
+        canvas: Canvas,
+        words: str,
+        at: tuple[float, float],
+        anchor: str = "left",
+        colour: Colour | None = None,
+        *,
+        bold: bool = False,
+    ) -> None:
+        colour = colour or self.theme.faint
+        canvas.text(words, at, anchor=anchor, colour=colour, bold=bold, size=self.theme.small_text)
+
     def _plot(self, canvas: Canvas) -> None:
-        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        theme, scale, session, what = self.theme, self.layout.scale, self.desk.session, self.plotted
         canvas.surface.fill(theme.panel)
         left, right, end = self._span
         height = self.layout.chart[3]
         top, bottom = TOP * scale, height - BOTTOM * scale
         weighed = ", weighed by φ" if density_label(session.environment) else ""
-        what = self.plotted
         title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
         self._offer(canvas, 12 * scale + canvas.text_width(title, bold=True))
@@ -204,125 +190,91 @@ class Chart:
 
         def place(time: Array, value: Array) -> Array:
             x = left + (right - left) * time / end
-            y = bottom - (bottom - top) * (value - low) / (high - low)
-            return np.column_stack([x, y])
+            return np.column_stack([x, bottom - (bottom - top) * (value - low) / (high - low)])
 
-        line = mix(theme.panel, theme.ink, 0.12)
+        self._place = place
         for mark in np.arange(low, high, step):
             y = bottom - (bottom - top) * (mark - low) / (high - low)
-            canvas.surface.fill(line, pygame.Rect(round(left), round(y), round(right - left), 1))
-            canvas.text(
-                f"{mark:.6g}",
-                (left - 7 * scale, y),
-                anchor="right",
-                colour=theme.faint,
-                size=theme.small_text,
-            )
+            line = pygame.Rect(round(left), round(y), round(right - left), 1)
+            canvas.surface.fill(mix(theme.panel, theme.ink, 0.12), line)
+            self._note(canvas, f"{mark:.6g}", (left - 7 * scale, y), "right")
         for mark in np.arange(0.0, end + 1e-9, max(round_length(end / 6.0), 1.0)):
             x = left + (right - left) * mark / end
-            canvas.text(
-                f"{mark:g} s",
-                (x, height - 0.5 * BOTTOM * scale),
-                anchor="middle",
-                colour=theme.faint,
-                size=theme.small_text,
-            )
+            self._note(canvas, f"{mark:g} s", (x, height - 0.5 * BOTTOM * scale), "middle")
         for event in session.events:
             x = round(left + (right - left) * event.time / end)
-            canvas.surface.fill(
-                mix(theme.panel, theme.ink, 0.3), pygame.Rect(x, round(top), 1, round(bottom - top))
-            )
+            line = pygame.Rect(x, round(top), 1, round(bottom - top))
+            canvas.surface.fill(mix(theme.panel, theme.ink, 0.3), line)
         self._event_words(canvas, list(session.events), left, right, end, top)
-        self._ghosts = []
-        for ghost in ghosts:
-            points = place(ghost.time, ghost.value)
-            self._ghosts.append((ghost.node, points))
+        self._ghosts = [(ghost.node, place(ghost.time, ghost.value)) for ghost in ghosts]
+        for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
             colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
             for k in range(len(points) - 1):
                 if k % 4 < 3 or len(points) < 12:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), colour)
             if len(points):
-                wide = canvas.text_width(ghost.words, theme.small_text)
-                canvas.text(
-                    ghost.words,
-                    (max(points[-1][0] - 4 * scale, left + wide), points[-1][1] - 9 * scale),
-                    anchor="right",
-                    colour=colour,
-                    size=theme.small_text,
-                )
+                x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
+                self._note(canvas, ghost.words, (x, points[-1][1] - 9 * scale), "right", colour)
         for lane in session.lanes:
             curve = curve_of(lane, what)
-            points = place(curve.time, curve.value)
+            points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
-                self._curve(canvas, _thinned(points), self._colour(lane))
-        self._place = place
+                ends = np.hstack([points[:-1], points[1:]])
+                canvas.segments(ends, curve_colour(self.desk, theme, lane), canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
         self._other = None
         if chosen(self.desk.session, TIME) is DISTANCE:
             return
-        scale, words = self.layout.scale, (DISTANCE if self.plotted is TIME else TIME).short
-        left, small = left + 16 * scale, self.theme.small_text
-        canvas.text(f"{words} ›", (left, 0.5 * TOP * scale), colour=self.theme.faint, size=small)
+        scale, words = self.layout.scale, f"{(DISTANCE if self.plotted is TIME else TIME).short} ›"
+        left += 16 * scale
+        self._note(canvas, words, (left, 0.5 * TOP * scale))
         x, y, _, _ = self.layout.chart
-        wide = canvas.text_width(f"{words} ›", small)
+        wide = canvas.text_width(words, self.theme.small_text)
         self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
-
-    def _curve(self, canvas: Canvas, points: Array, colour: Colour) -> None:
-        width = canvas.width(1.8)
-        canvas.segments(np.hstack([points[:-1], points[1:]]), colour, width)
 
     def _event_words(
         self, canvas: Canvas, events: list[Event], left: float, right: float, end: float, top: float
     ) -> None:
         """Write what happened beside its line, where there is room."""
-        free = left
+        scale, free = self.layout.scale, left
         for event in events:
             x = left + (right - left) * event.time / end
             words = f"{_GLYPHS.get(event.kind, '•')} {event.text}"
             wide = canvas.text_width(words, self.theme.small_text)
             if x < free or x + wide > right:
-                words = _GLYPHS.get(event.kind, "•")
-                wide = round(8 * self.layout.scale)
+                words, wide = _GLYPHS.get(event.kind, "•"), round(8 * scale)
                 if x < free:
                     continue
-            canvas.text(
-                words,
-                (x + 3 * self.layout.scale, top + 6 * self.layout.scale),
-                colour=self.theme.faint,
-                size=self.theme.small_text,
-            )
-            free = x + wide + 8 * self.layout.scale
+            self._note(canvas, words, (x + 3 * scale, top + 6 * scale))
+            free = x + wide + 8 * scale
 
     def _values(self, screen: pygame.Surface) -> None:
         """Write each pane's value at the right, with the gap to the best; none over another.
 
         They are those of the captions, which are newer than a page that is drawn ten times a second.
         """
-        session, theme, scale = self.desk.session, self.theme, self.layout.scale
+        session, scale = self.desk.session, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
-        canvas = Canvas(chart, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+        canvas = flat_canvas(chart, self.theme, scale)
         _, right, _ = self._span
         time, known = compared(session, self.plotted)
         if not known:
             return
         best = min(known.values())
-        lanes = sorted(
-            (each for each in session.lanes if each.number in known), key=lambda each: -known[each.number]
-        )
-        now = np.full(len(lanes), time)
-        wanted = self._place(now, np.array([known[lane.number] for lane in lanes]))[:, 1]
+        lanes = [lane for lane in session.lanes if lane.number in known]
+        lanes.sort(key=lambda lane: -known[lane.number])
+        values = np.array([known[lane.number] for lane in lanes])
+        wanted = self._place(np.full(len(lanes), time), values)[:, 1]
         rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
-        for y, lane in zip(rows, lanes, strict=True):
-            value = known[lane.number]
+        for y, lane, value in zip(rows, lanes, values.tolist(), strict=True):
             words = f"{value:.3f}"
             if len(known) > 1:
                 gap = f"  +{100 * (value / best - 1):.1f} %" if value > best else "  best"
-                words = f"{lane.law.label}  {value:.3f}{gap}"
-            canvas.text(
-                words, (right + 9 * scale, y), colour=self._colour(lane), bold=True, size=theme.small_text
-            )
+                words = f"{lane.law.label}  {words}{gap}"
+            colour = curve_colour(self.desk, self.theme, lane)
+            self._note(canvas, words, (right + 9 * scale, y), colour=colour, bold=True)
 
     def _track(self, canvas: Canvas) -> None:
         """Draw the time line."""
@@ -334,53 +286,51 @@ class Chart:
         thick = max(4, round(5 * scale))
         box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
-        canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
+        self._note(canvas, "time", (12 * scale, middle))
+        thinned = session.live and session.history.thinned
         words = "live" if session.live else "past"
-        if session.live and session.history.thinned:
+        if thinned:
             words = "live · past thinned"
             if right + 9 * scale + canvas.text_width(words, size=theme.small_text) > self.layout.track[2]:
                 words = "thinned"
         colour = theme.start if session.live else theme.final
-        canvas.text(
-            words,
-            (right + 9 * scale, middle),
-            colour=colour,
-            bold=not session.history.thinned or not session.live,
-            size=theme.small_text,
-        )
+        self._note(canvas, words, (right + 9 * scale, middle), colour=colour, bold=not thinned)
+
+    def _rule(self, screen: pygame.Surface, x: float, colour: Colour) -> None:
+        """Draw an upright line through the plot."""
+        _, top, _, height = self.layout.chart
+        scale = self.layout.scale
+        line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
+        screen.fill(colour, line)
 
     def _cursor(self, screen: pygame.Surface) -> None:
         """Draw how far the run has come, the handle on the time line, and the line through the plot."""
         theme, scale, session = self.theme, self.layout.scale, self.desk.session
-        canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-        _, top, _, height = self.layout.chart
+        canvas = flat_canvas(screen, theme, scale)
         middle = self.layout.track[1] + 0.5 * self.layout.track[3]
         thick = max(4, round(5 * scale))
         x, begin = self.column(session.time), round(self.column(0.0))
         bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
         if not session.live:
             bars.append((x, theme.final))
-            line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
-            screen.fill(theme.final, line)
+            self._rule(screen, x, theme.final)
         for end, colour in bars:
             bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
             pygame.draw.rect(screen, colour, bar, border_radius=thick)
         dot = partial(sprites.dot, max(2.0, round(5 * scale) / 2), theme.ink)
         for event in session.events:
             canvas.stamp(dot, (self.column(event.time), middle))
-        fill = theme.ink if session.live else theme.final
-        radius = round(2 * 6.5 * scale) / 2
+        fill, radius = theme.ink if session.live else theme.final, round(2 * 6.5 * scale) / 2
         handle = partial(sprites.disc, radius, fill, theme.background, 2.0 * scale, theme.faint, "")
         canvas.stamp(handle, (x, middle))
 
     def _hovered(self, screen: pygame.Surface) -> None:
         """Tell what was at the time under the cursor: an event near it, or the values."""
-        over = self.hover
-        if over is None or not (inside(self.layout.chart, over) or inside(self.layout.track, over)):
-            return
-        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.desk.session
         left, right, _ = self._span
-        if not left <= over[0] <= right:
+        if over is None or not left <= over[0] <= right:
+            return
+        if not (inside(self.layout.chart, over) or inside(self.layout.track, over)):
             return
         time = self.time_at(over[0])
         near = [event for event in session.events if abs(self.column(event.time) - over[0]) < 5 * scale]
@@ -391,22 +341,11 @@ class Chart:
             values = [(lane.law.label, curve_of(lane, what).at(time)) for lane in session.lanes]
             known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
-        _, top, _, height = self.layout.chart
         x = round(self.column(time))
-        line = pygame.Rect(x, round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
-        screen.fill(mix(theme.panel, theme.ink, 0.35), line)
-        canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-        room = right - canvas.text_width(words)
-        tag(
-            canvas.surface,
-            words,
-            (min(x + 12 * scale, room), top + (TOP + 16) * scale),
-            canvas.theme,
-            canvas.scale,
-        )
-
-    def _colour(self, lane: Lane) -> Colour:
-        return curve_colour(self.desk, self.theme, lane)
+        self._rule(screen, x, mix(theme.panel, theme.ink, 0.35))
+        room = right - flat_canvas(screen, theme, scale).text_width(words)
+        at = min(x + 12 * scale, room), self.layout.chart[1] + (TOP + 16) * scale
+        tag(screen, words, at, theme, scale)
 
 
 def curve_colour(desk: Desk, theme: Theme, lane: Lane) -> Colour:

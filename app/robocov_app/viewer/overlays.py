@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pygame
 
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened
 from robocov_app.render.theme import mix
-from robocov_app.toolkit.overlay import FLAT, card, wrapped
+from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
 
 if TYPE_CHECKING:
     from robocov_app.render.theme import Theme
@@ -54,7 +52,7 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
     scale = layout.scale
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))
-    canvas = Canvas(screen, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
+    canvas = flat_canvas(screen, theme, scale)
     x, y, wide = left + 20 * scale, top + 18 * scale, width - 40 * scale
     screen.blit(label("LESSON", round(11 * scale), theme.faint, True), (round(x), round(y)))
     y += 30 * scale

@@ -10,12 +10,11 @@ import pygame
 
 from robocov.controllers import controller_kind, short_name
 from robocov.errors import ParameterError
-from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.overlay import FLAT
+from robocov_app.toolkit.overlay import flat_canvas
 from robocov_app.toolkit.ui import SMALL, Ui
 from robocov_app.viewer.inspector import NOTHING, Line, Report
 from robocov_app.viewer.parameters import Parameter, Pick
@@ -344,7 +343,7 @@ def _arrow(ui: Ui, line: Line, largest: float) -> None:
     length = 13 * ui.scale * (0.35 + 0.65 * size / max(largest, NOTHING))
     half = np.array(line.vector) / size * (length, -length)
     middle = np.array(ui.rest.topleft) + np.array([14, 8]) * ui.scale
-    canvas = Canvas(ui.surface, FLAT, ui.theme, ui.scale, np.zeros(1, dtype=np.intp))
+    canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
     colour = ui.theme.forces.get(line.kind, ui.theme.ink)
     canvas.arrow((middle - half).tolist(), (middle + half).tolist(), colour, 2 * ui.scale)
 

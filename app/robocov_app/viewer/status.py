@@ -1,39 +1,29 @@
-"""The status line: time, cost, speed, and what the place under the cursor adds to the cost."""
+"""The status line: time, cost, speed, the place under the cursor; and what can be tried next."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-import pygame
-
-from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas
-from robocov_app.render.fonts import shortened
-from robocov_app.render.theme import mix
+from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import speed_words
-
-if TYPE_CHECKING:
-    from robocov_app.render.theme import Theme
-    from robocov_app.toolkit.layout import Layout
-    from robocov_app.viewer.presenter import Desk
 
 HINT = "Space pause · F1 keys"
 _SLOW = 30.0  # frames per second
-_FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+
+_OFFERED = (
+    ("obstacle", "draw a wall in a doorway (W)"),
+    ("hand", "drag a robot"),
+    ("failure", "let one fail (D)"),
+    ("pane", "compare controllers (K)"),
+    ("law", "change the controller (O)"),
+    ("density", "paint where it matters (G)"),
+    ("robot", "let one more join (A)"),
+)
+"""Kinds of touches of the document, and the words for each."""
+
+_AT_ONCE = 3
 
 
 def facts(desk: Desk, frames: float, steps: float, filmed: float | None) -> list[str]:
-    """Return what the line says, the most important first.
-
-    Parameters
-    ----------
-    desk : Desk
-    frames, steps : float
-        Per second.
-    filmed : float or None, s
-        Length of the film that is being recorded.
-    """
+    """Return what the line says, the most important first; `frames` and `steps` a second, `filmed` s."""
     session = desk.session
     known = desk.costs.known.get(desk.lane.number)
     said = [f"{'' if session.playing else 'paused · '}t = {session.time:.2f} s"]
@@ -76,20 +66,12 @@ def cursor_words(desk: Desk) -> str:
     return f"{words}: {distance:.2f} m to robot {numbers[owner]}, {share:.1f} × the mean"
 
 
-def draw_status(
-    screen: pygame.Surface, layout: Layout, theme: Theme, said: list[str], hint: str = HINT
-) -> None:
-    """Draw the line; what there is no room for is left out, from the end."""
-    scale = layout.scale
-    left, top, width, height = layout.status
-    screen.fill(mix(theme.panel, theme.ink, 0.06), pygame.Rect(layout.status))
-    canvas = Canvas(screen, _FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-    size = theme.small_text
-    room = width - 44 * scale - canvas.text_width(hint, size)
-    kept = list(said)
-    while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
-        kept.pop()
-    y = top + height / 2
-    words = shortened("    ".join(kept), canvas.text_size(size), room)
-    canvas.text(words, (left + 12 * scale, y), size=size)
-    canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
+def suggestion(desk: Desk) -> str:
+    """Return what this session has not tried yet, if the present is shown and has settled; else nothing."""
+    session = desk.session
+    if not (desk.suggests and session.settled and session.live) or session.hand is not None:
+        return ""
+    tried = {node.kind for node in session.document.nodes}
+    tried |= {"pane"} if len(session.lanes) > 1 else set()
+    new = [words for kind, words in _OFFERED if kind not in tried][:_AT_ONCE]
+    return f"The team has settled. Try:\n{' · '.join(new)}" if new else ""

@@ -18,7 +18,7 @@ from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.layout import laid_out
-from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import PAUSE, BaseWindow
 from robocov_app.viewer.arena import Arena
@@ -35,8 +35,7 @@ from robocov_app.viewer.presenter import plain
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.status import HINT, draw_status, facts
-from robocov_app.viewer.suggestions import suggestion
+from robocov_app.viewer.status import HINT, facts, suggestion
 
 if TYPE_CHECKING:
     from robocov_app.viewer.presenter import Desk
@@ -233,7 +232,7 @@ class Window(BaseWindow):
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(desk, self.rate, self._steps_rate, filmed)
-        draw_status(self.screen, layout, theme, line, self.hint)
+        draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
         if layout.panel[2] and self.tour is not None and self._lesson_shown:
             draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:

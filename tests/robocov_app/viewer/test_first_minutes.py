@@ -19,8 +19,7 @@ from robocov_app.viewer import opening
 from robocov_app.viewer.opening import Opening
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.settings import Settings
-from robocov_app.viewer.status import cursor_words, facts
-from robocov_app.viewer.suggestions import suggestion
+from robocov_app.viewer.status import cursor_words, facts, suggestion
 
 FOUR = (RAPF, Law("rpf"), Law("lloyd"), Law("geodesic-lloyd"))
 

@@ -24,10 +24,9 @@ from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.menu import Menu
-from robocov_app.toolkit.overlay import draw_message
+from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import BaseWindow
-from robocov_app.viewer.status import draw_status
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -153,7 +152,8 @@ class EditorWindow(BaseWindow):
             return
         layout, theme, desk = self.layout, self.theme, self.desk
         self.arena.draw(self.screen)
-        draw_status(self.screen, layout, theme, facts(desk, self.rate, self.arena.team), HINT)
+        told = facts(desk, self.rate, self.arena.team)
+        draw_status(self.screen, layout.status, theme, layout.scale, told, HINT)
         if layout.panel[2]:
             self.panel.draw(self.screen)
         draw_message(self.screen, desk.message, layout.arena, theme, layout.scale, desk.trouble)
