@@ -14,22 +14,16 @@ import signal
 import sys
 import threading
 import traceback
+from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
-TRACEBACK = "ROBOCOV_TRACEBACK"
-"""Environment variable; where it is not empty, errors are shown with all that led to them."""
-
+TRACEBACK = "ROBOCOV_TRACEBACK"  # environment variable; where it is set, errors come with their traceback
+# commands that call kernels, see `robocov.compiled`
 _COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "bench", "replay", "cost", "optimum"}
-"""Commands that call kernels, see `robocov.compiled`."""
-
 _LONGEST = 1000  # characters of an error that are told
 
 COMMANDS = {
@@ -76,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
 
         print(f"robocov {__version__}")
         return OK
-    name, rest = given[0], given[1:]
+    name, *rest = given
     if name not in COMMANDS:
         near = get_close_matches(name, COMMANDS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(COMMANDS)}"
@@ -89,8 +83,7 @@ def _guarded(name: str, rest: list[str]) -> int:
     from robocov.errors import RobocovError
 
     try:
-        # pygame greets on stdout, which belongs to answers
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout belongs to answers
         with _stopping_at_once():
             module = importlib.import_module(f"robocov_app.commands.{COMMANDS[name][0]}")
             from robocov_app.terminal.arguments import parsed
@@ -102,6 +95,7 @@ def _guarded(name: str, rest: list[str]) -> int:
             tell_of_compiling()
         status = module.command(options)
         sys.stdout.flush()
+        return int(status or OK)
     except RobocovError as error:
         return _complain(str(error))
     except KeyboardInterrupt:
@@ -112,10 +106,9 @@ def _guarded(name: str, rest: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except OSError as error:
-        reason = error.strerror or error
-        if error.filename is None:
-            return _complain(f"the answer cannot be written: {reason}")
-        return _complain(f"{os.fsdecode(error.filename)}: cannot be used: {reason}")
+        where = "the answer cannot be written" if error.filename is None else os.fsdecode(error.filename)
+        cannot = "" if error.filename is None else ": cannot be used"
+        return _complain(f"{where}{cannot}: {error.strerror or error}")
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
     except Exception as error:
@@ -126,7 +119,6 @@ def _guarded(name: str, rest: list[str]) -> int:
         traceback.print_exc()
         print("robocov: this is a fault of robocov, not of your input; please report it", file=sys.stderr)
         return FAILED
-    return int(status or OK)
 
 
 @contextmanager

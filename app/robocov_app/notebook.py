@@ -8,29 +8,35 @@ from __future__ import annotations
 
 from dataclasses import replace
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
-from robocov.errors import ParameterError, counted, shown
+from robocov.cost import CoverageResult
+from robocov.environment import Environment
+from robocov.errors import ParameterError, RobocovError, counted, shown
+from robocov.metrics import CostHistory, cost_history
+from robocov.record import Record
+from robocov.robots import Team
+from robocov_app.figures import runs as figures
+from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
+from robocov_app.figures.files import figure_png
+from robocov_app.render.camera import length_label, round_length
+from robocov_app.render.density import mean_label
+from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.theme import LIGHT, Theme
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike
-
-    from robocov.cost import CoverageResult
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
+from robocov_app.report.pictures import Frame, map_picture
+from robocov_app.report.replay import ReplayRun, asset, replay_html
+from robocov_app.report.theme_css import theme_rules
+from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
 
 COST_LATTICE = 64  # lattice of the cost that is shown with a run in a notebook
 COST_SAMPLES = 120  # at so many moments of the run it is evaluated, at the most
-
-COST_VERTICES = 2500
-"""Vertices of the free space up to which the cost is shown: beyond, notebooks would wait for seconds."""
+COST_VERTICES = 2500  # of the free space, up to which it is shown: beyond, notebooks would wait for seconds
 
 _MAP_SIZE = 640.0, 420.0  # largest width and height of a map in a notebook, in pixels
 _REPLAY_SIZE = 760.0, 520.0  # the same of the map of a replay; the whole is not narrower than its controls
@@ -58,9 +64,7 @@ def plot_environment(
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
-    from robocov_app.figures.runs import plot_environment as plot
-
-    return _map_axes(plot(environment, _checked(axes), theme, size), axes)
+    return _map_axes(figures.plot_environment(environment, _checked(axes), theme, size), axes)
 
 
 def plot_record(
@@ -74,10 +78,8 @@ def plot_record(
     mean_time: float | None = None,
 ) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
-    from robocov_app.figures.runs import plot_trajectories
-
-    figure = plot_trajectories(record, _checked(axes), theme, colours, size, mean_distance, mean_time)
-    return _map_axes(figure, axes)
+    look = (theme, colours, size, mean_distance, mean_time)
+    return _map_axes(figures.plot_trajectories(record, _checked(axes), *look), axes)
 
 
 def plot_history(
@@ -91,10 +93,8 @@ def plot_history(
     title: str = "Coverage cost over time",
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
-    from robocov_app.figures.runs import plot_cost
-
     curve = (label, controller, history.time, history.mean_distance)
-    return _map_axes(plot_cost([curve], _checked(axes), theme, size, title), axes)
+    return _map_axes(figures.plot_cost([curve], _checked(axes), theme, size, title), axes)
 
 
 def plot_result(
@@ -110,12 +110,6 @@ def plot_result(
     A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one. Raises
     ParameterError when the result does not know its map.
     """
-    from robocov.robots import Team
-    from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
-    from robocov_app.render.density import mean_label
-    from robocov_app.render.distance_field import Field, FieldLattice
-    from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
-
     _checked(axes)
     environment, sites, n = result.environment, result.sites, len(result.positions)
     if environment is None or sites is None:
@@ -136,11 +130,6 @@ def plot_result(
 
 def environment_html(environment: Environment) -> str:
     """Return a map with its facts and a scale bar, in light or dark as the notebook is."""
-    from robocov_app.render.camera import length_label, round_length
-    from robocov_app.report.pictures import Frame, map_picture
-    from robocov_app.report.replay import asset
-    from robocov_app.report.theme_css import theme_rules
-
     low_x, low_y, high_x, high_y = environment.region.bounds
     width, height = high_x - low_x, high_y - low_y
     frame, bar = Frame(environment, *_MAP_SIZE), round_length(width / 5)
@@ -164,17 +153,11 @@ def environment_html(environment: Environment) -> str:
 
 def environment_png(environment: Environment) -> bytes:
     """Return a map's page."""
-    from robocov_app.figures.files import figure_png
-    from robocov_app.figures.runs import plot_environment as plot
-
-    return figure_png(plot(environment))
+    return figure_png(figures.plot_environment(environment))
 
 
 def record_html(record: Record) -> str:
     """Return a replay of a run, with its cost where that does not take long."""
-    from robocov_app.report.pictures import Frame
-    from robocov_app.report.replay import ReplayRun, replay_html
-
     run = ReplayRun(record, _history_to_show(record), f"{record.label} on {record.environment.name}")
     width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
     replay = replay_html([run], standalone=False)
@@ -184,10 +167,6 @@ def record_html(record: Record) -> str:
 
 def _history_to_show(record: Record) -> CostHistory | None:
     """Return the cost along a run, None where nobody would wait for it or it cannot be had."""
-    from robocov.errors import RobocovError
-    from robocov.metrics import cost_history
-    from robocov_app.runs.cost import built_cost
-
     if shapely.get_num_coordinates(record.environment.free) > COST_VERTICES:
         return None
     span = float(record.time[-1] - record.time[0])
@@ -200,10 +179,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
-    from robocov_app.figures.files import figure_png
-    from robocov_app.figures.runs import plot_trajectories
-
-    return figure_png(plot_trajectories(record))
+    return figure_png(figures.plot_trajectories(record))
 
 
 def _checked(axes: Any) -> Any:
@@ -211,8 +187,6 @@ def _checked(axes: Any) -> Any:
 
     Raises ParameterError when they are none, or several, or have other than two straight axes.
     """
-    from matplotlib.axes import Axes
-
     flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
     if axes is not None and not flat:
         raise ParameterError(f"axes: {shown(axes)}, but one matplotlib Axes with straight x and y was wanted")

@@ -103,7 +103,6 @@ def drawn_episode(
         duration=task.duration,
         dt=task.dt,
         conditions=conditions,
-        lattice=task.lattice,
     )
     if "positions" in options:
         try:

@@ -238,21 +238,12 @@ class RunOptions(JsonOption):
 
     def made_team(self) -> Team:
         """Return the team that the options describe, or raise InputError."""
-        from robocov.robots import Team
+        from robocov.robots import LIMITS, Team, read_team
 
-        said = {
-            "radius": self.radius,
-            "max_speed": self.max_speed,
-            "max_acceleration": self.max_acceleration,
-            "viscosity": self.viscosity,
-            "sensing_range": self.sensing_range,
-            "communication_range": math.inf if self.communication_range is None else self.communication_range,
-        }
-        if self.team is None:
-            return Team.homogeneous(self.robots, **said)
-        from robocov.robots import read_team
-
-        return read_team(self.team, said)
+        said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
+        if self.communication_range is None:
+            said["communication_range"] = math.inf
+        return Team.homogeneous(self.robots, **said) if self.team is None else read_team(self.team, said)
 
     def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:
         """Return what is to be run; raises InputError when it cannot be."""
@@ -268,8 +259,6 @@ class RunOptions(JsonOption):
             duration=self.duration,
             dt=self.dt,
             conditions=self.conditions.conditions(self.seed, self.robots),
-            lattice=self.lattice,
-            record_hz=self.record_hz,
         )
         spec.check()
         return spec

@@ -24,26 +24,10 @@ COST_RATE = 10.0  # samples of the coverage cost per simulated second
 class RunSpec:
     """One run: all that its result depends on; the only place that makes simulations and recorders of it.
 
-    Attributes
-    ----------
-    controller : str
-        By name, or ``mine.py:MyController``.
-    gains : dict of name to value
-        Those that differ from their defaults.
-    source : Source or None
-        The file of a controller of one's own, where it may not be there.
-    start, seed : str, int, or None
-        Named start of the map, its first by default, and seed of the positions; or where these came from.
-    positions, velocities : (n, 2) m and m/s, or None
-        Given; by default drawn from the start, and at rest.
-    duration, dt : float, s
-        Of the run, and of a control period.
-    conditions : Conditions or None
-        What goes wrong, and when robots fail and join.
-    lattice : int
-        Sites along a side, of the coverage cost.
-    cost_hz, record_hz : float, Hz
-        Samples of the cost, 0 for the first and the last; moments of the record, None for all.
+    `controller`: by name, or ``mine.py:MyController``; `source`: its file, where that may be gone. `gains`:
+    those that differ from their defaults. `start`, `seed`: of the positions, where none are given; the map's
+    first start by default. `positions`, `velocities`, (n, 2) m and m/s: given; else drawn, and at rest.
+    `duration`, `dt`, s: of the run and of a control period.
     """
 
     environment: Environment
@@ -58,14 +42,6 @@ class RunSpec:
     duration: float = 60.0
     dt: float = DEFAULT_DT
     conditions: Conditions | None = None
-    lattice: int = 64
-    cost_hz: float = COST_RATE
-    record_hz: float | None = None
-
-    @property
-    def start_name(self) -> str | None:
-        """The name of the start; None for positions that came from nowhere."""
-        return self.start if self.positions is not None else self.environment.start(self.start).name
 
     @cached_property
     def starts(self) -> Array:
@@ -113,7 +89,7 @@ class RunSpec:
             controller,
             self.dt,
             name=name,
-            start=self.start_name,
+            start=self.start if self.positions is not None else self.environment.start(self.start).name,
             seed=self.seed,
             conditions=self.conditions,
         )

@@ -118,9 +118,6 @@ def spec_of(task: Task, environment: Environment) -> RunSpec:
         duration=task.duration,
         dt=task.dt,
         conditions=conditions_of(task.team, task.seed, task.robots),
-        lattice=task.lattice,
-        cost_hz=task.cost_hz,
-        record_hz=task.record_hz,
     )
 
 
