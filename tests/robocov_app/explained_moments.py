@@ -10,7 +10,7 @@ from robocov import Simulation, Team
 from robocov.metrics import SETTLED_WINDOW
 from robocov.observation import Decision, Observations, Snapshot
 from robocov.observation.neighbours import Neighbours
-from robocov_app.viewer.inspector import Line, Report, explain
+from robocov_app.viewer.explain import Line, Report, explain
 
 
 def moment(

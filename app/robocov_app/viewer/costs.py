@@ -27,9 +27,8 @@ _INDICES = ("owner", "corner", "last_corner")
 class Known:
     """The newest that is known of a pane's cost.
 
-    `time`, s: for which moment. `path`, (w, 2) m or None: from the cursor to its nearest robot: way-points,
-    both ends included; empty where none can come. `lattice`: returns the sites as a field wants them.
-    `travel_time`, s: mean time until the first robot is at a place; None where it was not asked for.
+    `path`: way-points from the cursor to its nearest robot, empty where none can come. `lattice` returns the
+    sites as a field wants them. `travel_time`, s: mean time until the first robot is at a place.
     """
 
     time: float
@@ -45,10 +44,9 @@ class Known:
 
 
 class Costs:
-    """Costs for a window, computed in another process, or in this one where pictures must not depend on it.
+    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it.
 
-    `direct`: whether in this process. `known`: by pane; of the map as it is. `state`: what is to be said
-    about a map that is not ready yet, or why there is no cost; else empty.
+    `known`: by pane, of the map as it is. `state`: how far a new map is, or why there is no cost.
     """
 
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:

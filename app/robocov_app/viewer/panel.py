@@ -16,7 +16,7 @@ from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import flat_canvas
 from robocov_app.toolkit.ui import SMALL, Ui
-from robocov_app.viewer.inspector import NOTHING, Line, Report
+from robocov_app.viewer.explain import NOTHING, Line, Report
 from robocov_app.viewer.parameters import Parameter, Pick
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -45,8 +45,7 @@ _KEPT = (
     (("Lesson", "tour"), ("Full screen", "fullscreen")),
 )
 
-_ASKED_AGAIN = 0.25
-"""Seconds after which the panel looks again at what there is while the simulation goes on."""
+_ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
 
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
@@ -54,23 +53,8 @@ _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does n
 class Panel:
     """Shows the desk, and lets it be edited.
 
-    Parameters
-    ----------
-    desk : Desk
-    titles : dict of name to title
-        Of the layers.
-    commands : Commands
-    do : callable
-        Does a command by its name.
-
-    Attributes
-    ----------
-    tab : str
-        The page that is open.
-    covered : bool
-        Something else is drawn in its place: it takes no events.
-    report : Report or None
-        What the inspector says of the robot that is asked about.
+    `titles`: of layers, by their names. `do`: does a command by its name. `tab`: the page that is open.
+    `covered`: something else is drawn in its place. `report`: on the robot that is asked about.
     """
 
     def __init__(
@@ -361,12 +345,7 @@ def short_names(files: list[str]) -> dict[str, str]:
 def law_labels(names: Iterable[str], shown: Mapping[str, str]) -> dict[str, str]:
     """Return what controllers are called in the menu, by their names; no two are called the same.
 
-    Parameters
-    ----------
-    names : names of controllers
-        To choose from. A user's are loaded for it.
-    shown : dict of name to label
-        Those at work, which may be of a saved run: they are not loaded.
+    A user's are loaded for it, but not those in `shown`, which are at work and may be of a saved run.
 
     >>> law_labels(["rapf", "lloyd"], {"theirs.py:Mine": "Mine"})
     {'rapf': 'RAPF', 'lloyd': 'Lloyd', 'theirs.py:Mine': 'Mine'}

@@ -4,63 +4,36 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, shown
 from robocov.robots import UNITS
-from robocov_app.viewer.session.scenario import Limits
-
-if TYPE_CHECKING:
-    from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.scenario import Law, Limits
 
 SPAN = 30.0
 """A slider reaches from so many times less than the default to so many times more."""
 
-_END = 0.985
-"""From here on a slider says "no limit" where there may be none."""
+_END = 0.985  # from here on a slider says "no limit" where there may be none
 
-_WORDS = {
-    "max_speed": "largest speed",
-    "max_acceleration": "acceleration",
-    "viscosity": "viscosity ν",
-    "sensing_range": "sensing",
-    "communication_range": "communication",
-    "radius": "radius",
+_KINEMATIC = "kinematic limit, the same for every controller"
+_SENSES = "how far the range sensor sees obstacles, from the robot's centre"
+_LIMITS = {
+    "max_speed": ("largest speed", _KINEMATIC, (0.1, 10.0)),
+    "max_acceleration": ("acceleration", _KINEMATIC, (0.1, 20.0)),
+    "viscosity": ("viscosity ν", "ν of (28): what slows robots down", (0.1, 20.0)),
+    "sensing_range": ("sensing", _SENSES, (0.2, 30.0)),
+    "communication_range": ("communication", "how far robots hear each other", (0.5, 50.0)),
+    "radius": ("radius", "radius of a robot", (0.02, 1.0)),
 }
-_LIMIT_SPANS = {
-    "max_speed": (0.1, 10.0),
-    "max_acceleration": (0.1, 20.0),
-    "viscosity": (0.1, 20.0),
-    "sensing_range": (0.2, 30.0),
-    "communication_range": (0.5, 50.0),
-    "radius": (0.02, 1.0),
-}
-_MEANINGS = {
-    "max_speed": "kinematic limit, the same for every controller",
-    "max_acceleration": "kinematic limit, the same for every controller",
-    "viscosity": "ν of (28): what slows robots down",
-    "sensing_range": "how far the range sensor sees obstacles, from the robot's centre",
-    "communication_range": "how far robots hear each other",
-    "radius": "radius of a robot",
-}
+"""Label, meaning and ends of the slider of each limit."""
 
 
 @dataclass(frozen=True)
 class Parameter:
     """One slider.
 
-    Attributes
-    ----------
-    name : str
-        A gain, or ``team.`` and a limit.
-    label, unit, meaning : str
-    value, default : float or None
-        None for no limit.
-    low, high : float
-        Where the slider ends; typed values may go further.
-    optional : bool
-        Whether there may be no limit.
+    `name`: a gain, or ``team.`` and a limit. `value`, `default`: None for no limit. `low`, `high`: where the
+    slider ends; typed values may go further. `optional`: whether there may be no limit.
     """
 
     name: str
@@ -77,12 +50,10 @@ class Parameter:
         """Return where the slider stands, 0 to 1: logarithmic, so that halves and doubles are as far."""
         if self.value is None or math.isinf(self.value):
             return 1.0
-        if self.high <= self.low:
+        if self.high <= self.low or self.value <= 0.0 < self.low:
             part = 0.0
         elif self.low <= 0.0:
             part = (self.value - self.low) / (self.high - self.low)
-        elif self.value <= 0.0:
-            part = 0.0
         else:
             part = math.log(self.value / self.low) / math.log(self.high / self.low)
         return min(max(part, 0.0), _END if self.optional else 1.0)
@@ -91,10 +62,8 @@ class Parameter:
         """Return the value of a place of the slider, to three digits, never beyond its ends."""
         if self.optional and place > _END:
             return None
-        if self.low <= 0.0:
-            value = self.low + place * (self.high - self.low)
-        else:
-            value = self.low * (self.high / self.low) ** place
+        linear, low = self.low <= 0.0, self.low
+        value = low + place * (self.high - low) if linear else low * (self.high / low) ** place
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def words(self) -> str:
@@ -102,35 +71,20 @@ class Parameter:
         return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
 
     def read(self, text: str) -> float | None:
-        """Return the value that was typed.
-
-        Raises
-        ------
-        ParameterError
-            When it is no number.
-        """
+        """Return the value that was typed; ParameterError where it is no number."""
         plain = text.strip().lower().replace(",", ".")
         if self.optional and plain in ("none", "null", "no limit", "inf", "∞", ""):
             return None
         try:
-            value = float(plain)
+            return float(plain)
         except ValueError:
             also = ", or none," if self.optional else ""
             raise ParameterError(f"{self.label}: {shown(text)}, but a number{also} was wanted") from None
-        return value
 
 
 @dataclass(frozen=True)
 class Pick:
-    """One of several words, which stand side by side.
-
-    Attributes
-    ----------
-    name, label, meaning : str
-    value, default : str
-    offered : tuple of str
-        The words.
-    """
+    """One of several words, which stand side by side."""
 
     name: str
     label: str
@@ -144,13 +98,7 @@ class Pick:
         return self.value
 
     def read(self, text: str) -> str:
-        """Return the word that was typed, or begun.
-
-        Raises
-        ------
-        ParameterError
-            When it is none of them.
-        """
+        """Return the word that was typed, or begun; ParameterError where it is none of them."""
         plain = text.strip().lower()
         begun = [word for word in self.offered if plain and word.lower().startswith(plain)]
         exact = [word for word in begun if word.lower() == plain]
@@ -184,21 +132,17 @@ def gain_parameters(law: Law) -> list[Parameter | Pick]:
 
 def limit_parameters(limits: Limits) -> list[Parameter]:
     """Return a slider for each limit of the team; what it sets, it sets for all robots."""
-    usual = Limits()
+    usual, found = Limits(), []
     mixed = {name for name, _ in limits.different}
-    return [
-        Parameter(
-            f"team.{name}",
-            f"{label} ≠" if name in mixed else label,
-            UNITS[name],
-            _MEANINGS[name] + ("; robots differ in it until it is set here" if name in mixed else ""),
-            _finite(getattr(limits, name)),
-            _finite(getattr(usual, name)),
-            *_LIMIT_SPANS[name],
-            name.endswith("_range"),
+    for name, (label, meaning, (low, high)) in _LIMITS.items():
+        if name in mixed:
+            label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
+        value, default = (_finite(getattr(each, name)) for each in (limits, usual))
+        ranged = name.endswith("_range")
+        found.append(
+            Parameter(f"team.{name}", label, UNITS[name], meaning, value, default, low, high, optional=ranged)
         )
-        for name, label in _WORDS.items()
-    ]
+    return found
 
 
 def with_limit(limits: Limits, name: str, value: float | None) -> Limits:

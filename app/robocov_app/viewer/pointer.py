@@ -14,7 +14,7 @@ from robocov_app.viewer.brush import Brush
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.viewer.arena import Arena
+    from robocov_app.viewer.canvas import ViewerCanvas
     from robocov_app.viewer.chart import Chart
     from robocov_app.viewer.panel import Panel
     from robocov_app.viewer.presenter import Desk
@@ -34,7 +34,7 @@ class Pointer:
     """
 
     def __init__(
-        self, desk: Desk, arena: Arena, chart: Chart, panel: Panel, interrupt: Callable[[], object]
+        self, desk: Desk, arena: ViewerCanvas, chart: Chart, panel: Panel, interrupt: Callable[[], object]
     ) -> None:
         self._desk, self._arena, self._chart, self._panel = desk, arena, chart, panel
         self._interrupt = interrupt

@@ -21,12 +21,12 @@ from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import PAUSE, BaseWindow
-from robocov_app.viewer.arena import Arena
+from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, grouped, parameter_commands
+from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
-from robocov_app.viewer.inspector import report_on
 from robocov_app.viewer.lessons import LessonPlayer, load_lesson
 from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
@@ -94,7 +94,7 @@ class Window(BaseWindow):
         self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
-        self.arena = Arena(desk, theme_named(desk.theme))
+        self.arena = ViewerCanvas(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
         self.dialogs = Dialogs()
         listed = [*desk_commands(desk, self.titles), *self._own_commands()]

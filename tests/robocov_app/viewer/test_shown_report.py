@@ -6,7 +6,7 @@ import pytest
 
 from robocov_app.render.theme import THEMES
 from robocov_app.toolkit.ui import Ui
-from robocov_app.viewer.inspector import Line, Report
+from robocov_app.viewer.explain import Line, Report
 from robocov_app.viewer.panel import show_report
 
 SIZE = (320, 300)

@@ -1,14 +1,16 @@
-"""The arena: one painted pane for each controller, one camera for all, and what tools show on top."""
+"""The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.observation import Snapshot
 from robocov_app.render import sprites
 from robocov_app.render.annotations import legend_rows, legend_strip
 from robocov_app.render.camera import Camera
@@ -19,38 +21,21 @@ from robocov_app.render.layout import united
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.picture import Painter, pane_layers, standard_layers
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import mix, robot_hues
+from robocov_app.render.theme import Theme, mix, robot_hues
+from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
-from robocov_app.viewer.presenter import FADE
+from robocov_app.viewer.presenter import FADE, Desk
 from robocov_app.viewer.session.curves import TIME, compared
+from robocov_app.viewer.session.pane import Lane
+from robocov_app.viewer.tool import Point, Preview
 
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov.environment import Environment
-    from robocov.observation import Snapshot
-    from robocov_app.render.theme import Theme
-    from robocov_app.toolkit.layout import Layout
-    from robocov_app.viewer.presenter import Desk
-    from robocov_app.viewer.session.pane import Lane
-    from robocov_app.viewer.tool import Point, Preview
-
-MOST_RAYS = 720
-"""Rays of all scans of a pane together."""
-
-RAYS = 120
-"""Rays of one scan."""
-
-FAR_SCAN = 12.0
-"""Metres that scans reach where the sensor has no limit."""
-
-_OLD = 0.25
-"""Seconds from which on a cost that lags behind is shown with its time."""
-
-_REACH = 12.0
-"""Pixels at scale 1 that a finger is wide."""
+RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
+FAR_SCAN = 12.0  # metres that scans reach where the sensor has no limit
+_OLD = 0.25  # seconds from which on a cost that lags behind is shown with its time
+_REACH = 12.0  # pixels at scale 1 that a finger is wide
 
 
-class Arena:
+class ViewerCanvas:
     """Draws the panes of a desk, and finds what is under the cursor."""
 
     def __init__(self, desk: Desk, theme: Theme) -> None:
@@ -119,10 +104,7 @@ class Arena:
 
     def pane_at(self, pixel: tuple[float, float]) -> int | None:
         """Return the pane under a pixel of the window."""
-        for pane, (left, top, width, height) in enumerate(self.layout.panes):
-            if left <= pixel[0] < left + width and top <= pixel[1] < top + height:
-                return pane
-        return None
+        return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
         """Return the place under a pixel of the window, m."""
@@ -146,20 +128,18 @@ class Arena:
         if pane >= len(self._scenes):
             return None
         scene = self._scenes[pane]
-        canvas = self._canvas(None, pane, scene)
+        canvas = self._canvas(pygame.Surface((1, 1)), pane, scene)
         point = np.array(self.to_world(pixel, pane))
-        best: tuple[float, int] | None = None
+        near: list[tuple[float, int]] = []
         if scene.snapshot is not None:
             far = np.hypot(*(scene.snapshot.positions - point).T) * canvas.camera.zoom
             radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
-            for row in np.flatnonzero(far <= radii).tolist():
-                if best is None or far[row] < best[0]:
-                    best = float(far[row]), scene.number(row)
+            near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
         for number, place in scene.failed.items():
-            away = float(np.hypot(place[0] - point[0], place[1] - point[1])) * canvas.camera.zoom
-            if away <= 9.0 * self.layout.scale and (best is None or away < best[0]):
-                best = away, number
-        return best[1] if best else None
+            away = float(np.hypot(*(np.array(place) - point))) * canvas.camera.zoom
+            if away <= 9.0 * self.layout.scale:
+                near.append((away, number))
+        return min(near, key=lambda each: each[0])[1] if near else None
 
     # drawing
 
@@ -167,8 +147,7 @@ class Arena:
         """Draw all panes."""
         session = self.desk.session
         if session.environment is not self._environment:
-            before = self._environment
-            self._environment = session.environment
+            before, self._environment = self._environment, session.environment
             for painter in self._painters:
                 painter.environment = session.environment
             if before is not None and before.region.bounds != session.environment.region.bounds:
@@ -187,36 +166,30 @@ class Arena:
 
     def _scene(self, lane: Lane, painter: Painter) -> Scene:
         desk, session = self.desk, self.desk.session
-        circumstances = session.circumstances(lane)
-        snapshot = session.snapshot(lane)
+        circumstances, snapshot = session.circumstances(lane), session.snapshot(lane)
         trail, times = session.trail(lane)
-        team = lane.simulation.team
-        if not session.live:
-            team = circumstances.team
-        known = desk.costs.known.get(lane.number)
-        field = None
+        team = lane.simulation.team if session.live else circumstances.team
+        numbers, failed = circumstances.numbers, circumstances.failed
+        known, field = desk.costs.known.get(lane.number), None
         if known is not None and painter.needs_field:
             field = known.field
             self._scale_colours(known.field.largest)
-        number = desk.selected
-        selected = circumstances.numbers.index(number) if number in circumstances.numbers else None
-        cost = self._caption_cost(lane)
-        starts = lane.starts if len(lane.starts) == len(circumstances.numbers) else None
+        selected = numbers.index(desk.selected) if desk.selected in numbers else None
         return Scene.of(
             circumstances.environment,
             team,
             snapshot,
-            starts=starts,
+            starts=lane.starts if len(lane.starts) == len(numbers) else None,
             trail=trail if len(trail) else None,
             trail_time=times,
             trail_fade=FADE if desk.fade else None,
             label=circumstances.law.label,
-            cost=cost,
+            cost=self._caption_cost(lane),
             field=field,
             field_limit=self._limit,
-            numbers=circumstances.numbers,
-            failed=circumstances.failed,
-            failed_radii={number: circumstances.limits.radius_of(number) for number in circumstances.failed},
+            numbers=numbers,
+            failed=failed,
+            failed_radii={number: circumstances.limits.radius_of(number) for number in failed},
             selected=selected,
             scans=self._scans(lane, snapshot, team.sensing_range, selected) if "scan" in desk.shown else (),
             sensed=lane.sensed,
@@ -254,110 +227,86 @@ class Arena:
             scans.append((place, lane.simulation.sensor.scan(place, rays, reach)[1]))
         return scans
 
-    def _canvas(self, surface: pygame.Surface | None, pane: int, scene: Scene) -> Canvas:
-        painter = self._painters[pane]
-        return Canvas(
-            surface if surface is not None else pygame.Surface((1, 1)),
-            painter.camera,
-            self.theme,
-            self.layout.scale,
-            robot_hues(len(scene.team)),
-        )
+    def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
+        camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
+        return Canvas(surface, camera, self.theme, self.layout.scale, hues)
 
     def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
-        """Draw what the tool is about to do, and the hand's spring."""
-        canvas = self._canvas(surface, pane, scene)
-        clip = pygame.Rect([round(x) for x in canvas.camera.view])
-        surface.set_clip(clip)
-        hand = self.desk.session.hand
-        if hand is not None and scene.snapshot is not None and scene.numbers is not None:
-            number, target = hand
-            if number in scene.numbers:
-                row = list(scene.numbers).index(number)
-                ends = canvas.camera.to_pixels(np.array([scene.snapshot.positions[row], target]))
-                canvas.dashes(ends[0].tolist(), ends[1].tolist(), self.theme.ink, canvas.width(1.5), dash=3.0)
+        """Draw what the tool is about to do, the hand's spring, and rings around robots."""
+        canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
+        surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
+        numbers = list(scene.numbers or ()) if scene.snapshot is not None else []
+        if self.desk.session.hand is not None and self.desk.session.hand[0] in numbers:
+            number, target = self.desk.session.hand
+            assert scene.snapshot is not None
+            place = scene.snapshot.positions[numbers.index(number)]
+            begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
+            canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
         asked = self.desk.selected
         if asked is not None and asked in scene.failed:
-            center = canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist()
             radius = max(scene.failed_radius(asked) * canvas.camera.zoom, 9.0 * canvas.scale)
-            ring = partial(
-                sprites.ring, round(radius) + 4.0 * canvas.scale, self.theme.ink, 2.2 * canvas.scale
-            )
-            canvas.stamp(ring, center)
-        if pane == self.hovered[0] and scene.snapshot is not None and scene.numbers is not None:
-            self._draw_hovered(canvas, scene, self.hovered[1])
+            ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, ink, 2.2 * canvas.scale)
+            canvas.stamp(ring, canvas.camera.to_pixels(np.array(scene.failed[asked])).tolist())
+        if pane == self.hovered[0] and self.hovered[1] in numbers:  # it can be taken hold of
+            row = numbers.index(self.hovered[1])
+            if row != scene.selected:
+                assert scene.snapshot is not None
+                radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
+                center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
+                canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
         preview = self.desk.tool.preview(self.desk.session)
         if preview is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
 
-    def _draw_hovered(self, canvas: Canvas, scene: Scene, number: int) -> None:
-        """Draw a fine ring around the robot under the cursor: it can be taken hold of."""
-        if scene.snapshot is None or scene.numbers is None or number not in scene.numbers:
-            return
-        row = list(scene.numbers).index(number)
-        if row == scene.selected:
-            return
-        radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
-        center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
-        canvas.stamp(partial(sprites.ring, radius, self.theme.ink, 1.2 * canvas.scale), center)
-
     def _draw_preview(self, canvas: Canvas, preview: Preview) -> None:
-        accent = self.theme.final
+        accent, surface = self.theme.final, canvas.surface
         if preview.obstacle is not None:
             shape = preview.obstacle.polygon
             for part in getattr(shape, "geoms", [shape]):
                 corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
-                page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+                page = pygame.Surface(surface.get_size(), pygame.SRCALPHA, 32)
                 red, green, blue = (round(c * 0.35) for c in self.theme.obstacle)
-                pygame.draw.polygon(
-                    page, (red, green, blue, 89), np.rint(np.clip(corners, -1e4, 1e4)).tolist()
-                )
-                canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+                rim = np.rint(np.clip(corners, -1e4, 1e4)).tolist()
+                pygame.draw.polygon(page, (red, green, blue, 89), rim)
+                surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
                 canvas.outline(corners, accent, canvas.width(1.5))
-        if len(preview.line) > 1:
-            points = canvas.camera.to_pixels(np.array(preview.line))
+        if not preview.line:
+            return
+        points = canvas.camera.to_pixels(np.array(preview.line))
+        if len(points) > 1:
             canvas.outline(points, accent, canvas.width(1.5), closed=False)
             if preview.closed:
                 canvas.dashes(points[-1].tolist(), points[0].tolist(), accent, canvas.width(1.0))
-        for x, y in canvas.camera.to_pixels(np.array(preview.line)).tolist() if preview.marks else ():
+        for x, y in points.tolist() if preview.marks else ():
             size = 3 * canvas.scale
             box = pygame.Rect(round(x - size), round(y - size), round(2 * size), round(2 * size))
-            pygame.draw.rect(canvas.surface, self.theme.background, box)
-            pygame.draw.rect(canvas.surface, accent, box, canvas.width(1.5))
-        if preview.words and preview.line:
-            x, y = canvas.camera.to_pixels(np.array(preview.line[-1])).tolist()
-            tag(
-                canvas.surface,
-                preview.words,
-                (x + 12 * canvas.scale, y - 14 * canvas.scale),
-                canvas.theme,
-                canvas.scale,
-            )
+            pygame.draw.rect(surface, self.theme.background, box)
+            pygame.draw.rect(surface, accent, box, canvas.width(1.5))
+        if preview.words:
+            x, y = points[-1].tolist()
+            at = x + 12 * canvas.scale, y - 14 * canvas.scale
+            tag(surface, preview.words, at, self.theme, canvas.scale)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
         """Draw what parts the panes, which of them is chosen, and the legend that they share."""
         if len(self._scenes) < 2:
             return
-        scale = self.layout.scale
-        line = mix(self.theme.background, self.theme.ink, 0.18)
+        scale, theme = self.layout.scale, self.theme
         for pane, box in enumerate(self.layout.panes):
-            rect = pygame.Rect(box).inflate(2, 2)
-            pygame.draw.rect(screen, line, rect, 2)
+            rect = pygame.Rect(box)
+            pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
             if pane == self.desk.active:
-                x, y, wide, _ = box
-                bar = pygame.Rect(x, y, wide, max(2, round(3 * scale)))
-                lane = self.desk.session.lanes[pane]
-                screen.fill(self.theme.controller(lane.law.name), bar)
+                bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
+                screen.fill(theme.controller(self.desk.session.lanes[pane].law.name), bar)
         x, y, wide, high = self.layout.legend
         entries = self._legend_entries()
-        key = (tuple(entry.key() for entry in entries), wide, self.theme.name, scale)
+        key = (tuple(entry.key() for entry in entries), wide, theme.name, scale)
         if self._strip is None or self._strip_key != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
-            page.fill(self.theme.background)
-            canvas = Canvas(
-                page, self._painters[0].camera, self.theme, scale, robot_hues(1), frozenset(self.desk.shown)
-            )
+            page.fill(theme.background)
+            camera, shown = self._painters[0].camera, frozenset(self.desk.shown)
+            canvas = Canvas(page, camera, theme, scale, robot_hues(1), shown)
             page.blit(legend_strip(entries, canvas), (0, 0))
             self._strip, self._strip_key = page, key
         screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))

@@ -10,7 +10,7 @@ from explained_moments import line, run, says_no_nonsense, sums_up, texts
 
 from robocov import Individually, Lloyd, Rapf, Rpf, Simulation, Team, load_map
 from robocov.controllers import make_controller
-from robocov_app.viewer.inspector import REST, explain
+from robocov_app.viewer.explain import REST, explain
 
 # runs
 

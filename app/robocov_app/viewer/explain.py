@@ -7,35 +7,24 @@ it is *clear of* is told from its rim. Plane vectors are complex here, x + i y.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
-from robocov.environment import WallObstacle
+from robocov.arrays import Array
+from robocov.environment import Environment, WallObstacle
 from robocov.metrics import SETTLED_DISTANCE, TOUCHING
+from robocov.observation import Decision, Snapshot
+from robocov.robots import Team
+from robocov_app.viewer.presenter import Desk
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from robocov.arrays import Array
-    from robocov.environment import Environment
-    from robocov.observation import Decision, Snapshot
-    from robocov.robots import Team
-    from robocov_app.viewer.presenter import Desk
-
-SLOW = 0.05
-"""Speed in m/s below which a robot seems to be at rest."""
-
-FAR = 0.3
-"""Distance in metres from its goal beyond which a robot at rest has not arrived."""
-
+SLOW = 0.05  # m/s; who is slower seems to be at rest
+FAR = 0.3  # m; who rests farther from its goal has not arrived
+NOTHING = 5e-4  # N; what is less is written as 0 N, and has no arrow
 REST = "law"
 """Kind of the line for what the terms of a controller leave of its force."""
-
-NOTHING = 5e-4
-"""Force in newtons below which there is none: it is written as 0 N, and has no arrow."""
 
 _SWAY = 0.02  # m; who goes to and fro by less seems to stand
 _HUGE = 1e100  # what is not below is no number to reckon with
@@ -44,15 +33,9 @@ _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "sou
 
 @dataclass(frozen=True)
 class Line:
-    """One thing that is said about a robot.
+    """One thing that is said about a robot; with a `vector`, N, of a force for a small arrow.
 
-    Attributes
-    ----------
-    text : str
-    vector : (x, y) N or None
-        For a small arrow.
-    kind : str
-        Name of the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force.
+    `kind`: the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force.
     """
 
     text: str
@@ -80,14 +63,9 @@ def report_on(desk: Desk, number: int) -> Report:
         x, y = circumstances.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    return explain(
-        session.snapshot(lane),
-        circumstances.team,
-        circumstances.solid,
-        circumstances.numbers.index(number),
-        names=circumstances.numbers,
-        recent=session.recent(lane, number),
-    )
+    snapshot, team, names = session.snapshot(lane), circumstances.team, circumstances.numbers
+    recent, solid = session.recent(lane, number), circumstances.solid
+    return explain(snapshot, team, solid, names.index(number), names=names, recent=recent)
 
 
 def explain(
@@ -103,8 +81,6 @@ def explain(
 
     Parameters
     ----------
-    snapshot : Snapshot
-    team : Team
     environment : Environment
         The robot does not know it, but who asks does.
     robot : int

@@ -12,18 +12,18 @@ from hypothesis import strategies as st
 from robocov import Rapf, Simulation, Team
 from robocov.observation import Decision
 from robocov.voronoi import partition
-from robocov_app.viewer import inspector
-from robocov_app.viewer.inspector import REST, explain
+from robocov_app.viewer import explain as explaining
+from robocov_app.viewer.explain import REST, explain
 
 # sizes and directions
 
 
 def test_eight_directions():
-    ways = [inspector._compass(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
+    ways = [explaining._compass(complex(np.cos(angle), np.sin(angle))) for angle in np.arange(8) * np.pi / 4]
     assert ways == "east north-east north north-west west south-west south south-east".split()
-    assert inspector._compass(0j) == ""
-    assert inspector._compass(-1 - 1e-9j) == "west"
-    assert inspector._compass(complex(2.0, 5e-324)) == "east"
+    assert explaining._compass(0j) == ""
+    assert explaining._compass(-1 - 1e-9j) == "west"
+    assert explaining._compass(complex(2.0, 5e-324)) == "east"
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_eight_directions():
     ],
 )
 def test_lengths(metres, words):
-    assert inspector._length(metres) == words
+    assert explaining._length(metres) == words
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_lengths(metres, words):
     [(0, "0 N"), (4e-4, "0 N"), (0.0042, "4 mN"), (0.314, "0.31 N"), (2, "2.0 N"), (12.3, "12 N")],
 )
 def test_forces(newtons, words):
-    assert inspector._force(newtons) == words
+    assert explaining._force(newtons) == words
 
 
 # moments made by hand
@@ -120,8 +120,8 @@ def test_an_obstacle_point_is_told_by_what_it_belongs_to(point, name):
 )
 def test_what_hides_a_goal(environment, here, goal, hidden):
     pull = np.array(goal, dtype=float) - here
-    away = inspector._length(float(np.hypot(*pull))) + " away" + hidden
-    size = inspector._force(float(np.hypot(*pull)))
+    away = explaining._length(float(np.hypot(*pull))) + " away" + hidden
+    size = explaining._force(float(np.hypot(*pull)))
     report = moment([here], goals=[goal], environment=environment, attraction=[pull])
     assert line(report, "attraction").text == f"pulled {size} to its goal, {away}"
     held = moment([here], goals=[goal], environment=environment, attraction=[pull], lift=[-pull])
