@@ -10,12 +10,12 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from robocov_app.runs.options import JsonOption
+from robocov.errors import ParameterError
+from robocov_app.runs.options import PlotOptions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,11 +36,12 @@ PARTS = {
     "start": ("Until a command begins", "processes", "start_cases"),
 }  # fmt: skip
 
+PartName = Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass
-class Arguments(JsonOption):
+class Arguments(PlotOptions):
     """Measure speed, as ratios to yardsticks that are taken in turn with it, on one thread.
 
     Times on a shared machine mean little; ratios of medians taken in one run hold. The yardstick of
@@ -49,64 +50,48 @@ class Arguments(JsonOption):
     Example: robocov bench step
     """
 
-    part: Annotated[
-        tyro.conf.Positional[
-            Literal["step", "maps", "cost", "learning", "sweep", "render", "window", "start", "all"]
-        ],
-        tyro.conf.arg(metavar="PART"),
-    ] = "all"
+    part: Annotated[tyro.conf.Positional[PartName], tyro.conf.arg(metavar="PART")] = "all"
     """Part to measure; learning needs 'robocov[rl]', cost 'robocov[bench]'."""
     quick: bool = False
     """Fewer cases and rounds: some ten seconds."""
-    plot: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Draw the ratios to a PNG, SVG or PDF."""
 
 
-def command(options: Arguments) -> int | None:
+def command(options: Arguments) -> None:
     """Measure, then print and draw; what was measured until Ctrl-C as well."""
-    from robocov.errors import ParameterError
     from robocov_app.terminal.progress import progress
 
     for name in THREADS:
         os.environ.setdefault(name, "1")
-    if options.plot is not None:
-        from robocov_app.figures.files import check_figure_path
-
-        check_figure_path(options.plot)
-    parts = tuple(PARTS) if options.part == "all" else (options.part,)
+    parts = list(PARTS) if options.part == "all" else [options.part]
     if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
-        parts = tuple(part for part in parts if part != "learning")
-    modules = [importlib.import_module(f"robocov_app.bench.{PARTS[part][1]}") for part in parts]
-    if "cost" in parts and not modules[parts.index("cost")].has_yardstick():
+        parts.remove("learning")
+    modules = {part: importlib.import_module(f"robocov_app.bench.{PARTS[part][1]}") for part in parts}
+    if "cost" in parts and not modules["cost"].has_yardstick():
         missing = "scikit-fmm, the yardstick of the cost, is not installed: pip install 'robocov[bench]'"
         if options.part == "cost":
             raise ParameterError(missing)
         print(f"robocov: {missing}", file=sys.stderr)
-    cases = [
-        case
-        for part, module in zip(parts, modules, strict=True)
-        for case in getattr(module, PARTS[part][2])(quick=options.quick)
-    ]
+    cases = [case for part in parts for case in getattr(modules[part], PARTS[part][2])(quick=options.quick)]
     rows: list[Row] = []
-    stopped = False
+    stopped = None
     try:
         with progress("measuring", len(cases), quiet=options.json) as update:
             for done, case in enumerate(cases, start=1):
                 rows += case()
                 update(done)
-    except KeyboardInterrupt:
-        stopped = True
+    except KeyboardInterrupt as error:
+        stopped = error
     if options.plot is not None and rows:
         from robocov_app.bench.plot import save_ratios
+        from robocov_app.render.theme import theme_named
 
-        save_ratios(rows, options.plot)
+        save_ratios(rows, options.plot, theme_named(options.theme))
     if options.json:
         print(json.dumps({"machine": machine(), "rows": [row.to_dict() for row in rows]}, indent=1))
     else:
         print_tables(rows)
-    if stopped:
-        raise KeyboardInterrupt
-    return None
+    if stopped is not None:
+        raise stopped
 
 
 def machine() -> dict[str, Any]:
@@ -123,51 +108,39 @@ def machine() -> dict[str, Any]:
 
 def print_tables(rows: Sequence[Row]) -> None:
     """Print the rows for people, one table a part."""
-    from rich.table import Table
+    from robocov_app.terminal.tables import RIGHT, console, print_table
 
-    from robocov_app.terminal.tables import console
-
-    out = console()
+    numbers = [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
+    columns = [("", {}), ("", {}), *numbers, ("", {"no_wrap": True}), ("", {})]
     for part, group in groupby(rows, key=lambda row: row.part):
-        table = Table(
-            box=None, pad_edge=False, header_style="bold", title_justify="left", title=PARTS[part][0]
-        )
-        table.add_column("")
-        table.add_column("")
-        for title in ("time", "yardstick", "ratio", "before", "goal"):
-            table.add_column(title, justify="right", no_wrap=True)
-        table.add_column("", no_wrap=True)
-        table.add_column("")
-        former = ""
+        cells, former = [], ""
         for row in group:
             words = row.case or row.name
-            table.add_row(
-                "" if words == former else words,
-                row.name if row.case else "",
-                duration(row.seconds),
-                "" if row.yardstick_seconds is None else duration(row.yardstick_seconds),
-                "" if row.ratio is None else f"{row.ratio:.2f}",
-                "" if row.before is None else f"{row.before:.2f}",
-                goals(row),
-                "" if row.yardstick is None else f"/ {row.yardstick}",
-                row.note,
+            cells.append(
+                (
+                    "" if words == former else words,
+                    row.name if row.case else "",
+                    duration(row.seconds),
+                    "" if row.yardstick_seconds is None else duration(row.yardstick_seconds),
+                    "" if row.ratio is None else f"{row.ratio:.2f}",
+                    "" if row.before is None else f"{row.before:.2f}",
+                    goals(row),
+                    "" if row.yardstick is None else f"/ {row.yardstick}",
+                    row.note,
+                )
             )
             former = words
-        out.print(table)
-        out.print()
+        print_table(columns, cells, title=PARTS[part][0])
+        print()
     facts = machine()
     packages = ", ".join(f"{name} {number}" for name, number in facts["packages"].items())
+    out = console()
     out.print("before: about the ratio when nothing was compiled (commit 8838167)")
     out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
 
 
 def goals(row: Row) -> str:
-    """Return what is wanted, and whether it is missed.
-
-    >>> from robocov_app.bench.measure import Row
-    >>> goals(Row("step", "one step", {}, 3.0, "yardstick", 1.0, goal=2.5))
-    '2.5 missed'
-    """
+    """Return what is wanted, and whether it is missed."""
     wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
     if row.goal_seconds is not None:
         wanted.append(duration(row.goal_seconds))

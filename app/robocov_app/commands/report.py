@@ -46,58 +46,62 @@ def command(options: Arguments) -> None:
     if not options.folders:
         raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
     from robocov_app.report.document import report
-    from robocov_app.report.results import gathered
+    from robocov_app.report.results import gathered, with_references
+    from robocov_app.terminal.progress import progress
 
-    target = options.folders[0] / REPORT if options.out is None else options.out
+    target = options.out or options.folders[0] / REPORT
     if options.out is not None:
         check_target(target, overwrite=options.overwrite)
     results = [gathered(folder) for folder in options.folders]
     check_target(target, overwrite=options.overwrite)
-    results = [_readable(result, quiet=options.json) for result in results]
+    for k, result in enumerate(results):  # reading all takes 10 ms a run
+        quiet = options.json or result.kind != "sweep"
+        with progress("runs read", len(result.fine), quiet=quiet) as tell:
+            results[k] = result.readable(tell)
     damaged = [(result.folder, each) for result in results for each in result.damaged]
     if not any(result.entries for result in results):
         folder, lost = damaged[0]
         raise InputError(f"{folder}: {lost.folder}: {lost.reason}; no run is left to report")
     for folder, lost in () if options.json else damaged:
         print(f"robocov: warning: {folder}: {lost.folder} is left out: {lost.reason}", file=sys.stderr)
-    results = [_with_references(result, options) for result in results]
+    for k, result in enumerate(results):
+        quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
+        with progress("searching", total, quiet=quiet) as tell:
+            results[k] = with_references(result, search=options.optimum, tell=tell)
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
     if options.out is None and results[0].kind != "sweep":
-        with extended(options.folders[0]) as result, written(result.new / REPORT) as part:
-            result.claim(REPORT)
+        with extended(options.folders[0]) as more, written(more.new / REPORT) as part:
+            more.claim(REPORT)
             part.write_bytes(data)
     else:
         with written(target) as part:
             part.write_bytes(data)
     if options.json:
+        shown = zip(options.folders, results, page.shown, strict=True)
         counts = [
-            _counts(folder, result, shown)
-            for folder, result, shown in zip(options.folders, results, page.shown, strict=True)
+            {"folder": str(folder), **counts_of(result), "shown": count} for folder, result, count in shown
         ]
         print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
         return
-    for each in results:
-        print(_told(each))
+    for result in results:
+        words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
+        words += [f"{len(result.failed)} failed"] * bool(result.failed)
+        words += [f"{len(result.damaged)} cannot be read"] * bool(result.damaged)
+        words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
+        print(", ".join(words))
     print(f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
-def _readable(result: Result, *, quiet: bool) -> Result:
-    """Return the result with its damaged runs apart; reading all takes 10 ms a run."""
-    from robocov_app.terminal.progress import progress
-
-    with progress("runs read", len(result.fine), quiet=quiet or result.kind != "sweep") as tell:
-        return result.readable(tell)
-
-
-def _with_references(result: Result, options: Arguments) -> Result:
-    """Return the result with the references that are known, or searched for."""
-    from robocov_app.report.results import with_references
-    from robocov_app.terminal.progress import progress
-
-    quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
-    with progress("searching", total, quiet=quiet) as tell:
-        return with_references(result, search=options.optimum, tell=tell)
+def counts_of(result: Result) -> dict[str, object]:
+    """Return what programs are told of a result."""
+    return {
+        "kind": result.kind,
+        "runs": len(result.fine),
+        "failed": len(result.failed),
+        "damaged": [each._asdict() for each in result.damaged],
+        "missing": result.missing,
+    }
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
@@ -109,26 +113,3 @@ def check_target(target: Path, *, overwrite: bool) -> None:
         raise InputError(
             f"{target}: the file is no report of robocov; another --out, or --overwrite, was wanted"
         )
-
-
-def _counts(folder: Path, result: Result, shown: int) -> dict[str, object]:
-    return {
-        "folder": str(folder),
-        "kind": result.kind,
-        "runs": len(result.fine),
-        "failed": len(result.failed),
-        "damaged": [each._asdict() for each in result.damaged],
-        "missing": result.missing,
-        "shown": shown,
-    }
-
-
-def _told(result: Result) -> str:
-    words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
-    if result.failed:
-        words.append(f"{len(result.failed)} failed")
-    if result.damaged:
-        words.append(f"{len(result.damaged)} cannot be read")
-    if result.missing:
-        words.append(f"{result.missing} of {result.wanted} missing")
-    return ", ".join(words)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from robocov.errors import ParameterError, checked
+from robocov.errors import ParameterError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.sweep.study import Study
     from robocov_app.sweep.sweeping import Rehearsal, Totals
 
 FAILED = 1
@@ -59,36 +58,36 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> int:
     """Do the runs, or say what they would take."""
+    from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
+    from robocov_app.sweep.sweeping import rehearsed, sweep
 
-    study = read_study(options.study)
-    out = options.out or Path(options.study.stem)
-    return _rehearse(options, study, out) if options.dry_run else _sweep(options, study, out)
-
-
-def _sweep(options: Arguments, study: Study, out: Path) -> int:
-    from robocov_app.sweep.sweeping import sweep
-
-    totals = sweep(
-        study,
-        out,
-        workers=options.workers,
-        scheduler=options.scheduler,
-        retry_failed=options.retry_failed,
-        keep_versions=options.keep_versions,
-        quiet=options.json,
-    )
+    study, out = read_study(options.study), options.out or Path(options.study.stem)
+    again: dict[str, Any] = {"retry_failed": options.retry_failed, "keep_versions": options.keep_versions}
+    if options.dry_run:
+        workers = options.workers or processors()
+        if options.scheduler is not None:
+            with Cluster(options.scheduler) as cluster:
+                workers = max(1, cluster.threads)
+        rehearsal = rehearsed(study, out, workers=workers, **again)
+        if options.json:
+            print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))
+        else:
+            print_rehearsal(rehearsal, workers)
+        return 0
+    where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
+    totals = sweep(study, out, **where, **again, quiet=options.json)
     if options.json:
         print(json.dumps({"out": str(out), "runs": len(study), **asdict(totals)}))
     else:
-        _print_totals(totals, len(study), out)
+        print_totals(totals, len(study), out)
     return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0
 
 
-def _print_totals(totals: Totals, runs: int, out: Path) -> None:
-    words = [f"{totals.done} runs done"]
-    words += [f"{totals.reused} were there already"] * (totals.reused > 0)
-    print(", ".join(words))
+def print_totals(totals: Totals, runs: int, out: Path) -> None:
+    """Print what a sweep has done."""
+    there = f", {totals.reused} were there already" if totals.reused else ""
+    print(f"{totals.done} runs done{there}")
     if totals.failed:
         print(f"{totals.failed} of {runs} runs failed:")
         for run, error in totals.errors.items():
@@ -107,41 +106,18 @@ def _print_totals(totals: Totals, runs: int, out: Path) -> None:
         print(f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}")
 
 
-def _rehearse(options: Arguments, study: Study, out: Path) -> int:
-    from robocov_app.sweep.executors import processors
-    from robocov_app.sweep.sweeping import rehearsed
-
-    workers = options.workers or processors()
-    if options.scheduler is not None:
-        from robocov_app.sweep.executors import Cluster
-
-        with Cluster(options.scheduler) as cluster:
-            workers = max(1, cluster.threads)
-    rehearsal = rehearsed(
-        study, out, workers=workers, retry_failed=options.retry_failed, keep_versions=options.keep_versions
-    )
-    if options.json:
-        print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))
-    else:
-        print_rehearsal(rehearsal, workers)
-    return 0
-
-
 def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
     """Print what a sweep would take."""
     from robocov_app.sweep.sweeping import duration
 
     for name, count in rehearsal.axes.items():
         print(f"{name:<20} {count:>7}")
-    print(f"{'runs':<20} {rehearsal.runs:>7}", end="")
     done = rehearsal.runs - rehearsal.left
-    print(f"   ({done} of them done already)" if done else "")
+    print(f"{'runs':<20} {rehearsal.runs:>7}" + (f"   ({done} of them done already)" if done else ""))
     for note in rehearsal.notes:
         print(note)
     if rehearsal.error is not None:
         print(f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}")
     print(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")
-    many = f"on {workers} worker{'s' if workers > 1 else ''}"
-    print(
-        f"all that is left: about {duration(rehearsal.seconds)} {many}; {rehearsal.bytes / 1e6:.0f} MB in all"
-    )
+    time, megabytes = duration(rehearsal.seconds), rehearsal.bytes / 1e6
+    print(f"all that is left: about {time} on {counted(workers, 'worker')}; {megabytes:.0f} MB in all")

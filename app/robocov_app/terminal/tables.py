@@ -23,13 +23,15 @@ BOLD: Mapping[str, Any] = {"style": "bold", "no_wrap": True}
 RIGHT: Mapping[str, Any] = {"justify": "right", "no_wrap": True}
 
 
-def print_table(columns: Iterable[tuple[str, Mapping[str, Any]]], rows: Iterable[Iterable[str]]) -> None:
+def print_table(
+    columns: Iterable[tuple[str, Mapping[str, Any]]], rows: Iterable[Iterable[str]], title: str | None = None
+) -> None:
     """Print rows under the titles of columns, each with what `rich.table.Table.add_column` takes."""
     from rich.table import Table
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for title, look in columns:
-        table.add_column(title, **look)
+    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    for name, look in columns:
+        table.add_column(name, **look)
     for row in rows:
         table.add_row(*row)
     console().print(table)
