@@ -27,7 +27,7 @@ from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Desk
 from robocov_app.viewer.session.curves import TIME, compared
 from robocov_app.viewer.session.pane import Lane
-from robocov_app.viewer.tool import Point, Preview
+from robocov_app.viewer.tools import Point, Preview
 
 RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
 FAR_SCAN = 12.0  # metres that scans reach where the sensor has no limit

@@ -13,7 +13,7 @@ from robocov_app.toolkit.command import Command, Takes
 from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.clock import SPEEDS, speed_words
 from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.tool import Tool
+from robocov_app.viewer.tools import Tool
 
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
 """Headings of the help, in their order."""

@@ -9,7 +9,7 @@ import pygame
 
 from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import inside
-from robocov_app.viewer.brush import Brush
+from robocov_app.viewer.tools import Brush
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,7 +12,6 @@ from robocov.controllers.gains import Value
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
-from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -21,8 +20,7 @@ from robocov_app.viewer.session.pane import Lane
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
-from robocov_app.viewer.tool import Point, Tool
-from robocov_app.viewer.tools import Hand, Wall, toolbox
+from robocov_app.viewer.tools import Brush, Hand, Point, Tool, Wall, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
 

@@ -1,18 +1,22 @@
-"""Tools: what the mouse does in the arena. Coordinates are metres."""
+"""Tools: what the mouse does on the canvas. Coordinates are metres."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from time import perf_counter
+from typing import TypeAlias
 
 import numpy as np
 
+from robocov.environment import Environment, Obstacle, Ring
 from robocov.errors import RobocovError
-from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.session.map_edits import (
     circle_of,
     moved,
     obstacle_at,
+    passage_words,
     polygon_of,
     snapped,
     wall_of,
@@ -21,19 +25,82 @@ from robocov_app.viewer.session.map_edits import (
     without_obstacle,
     words_for,
 )
-from robocov_app.viewer.tool import Point, Preview, Tool, apart, edited
+from robocov_app.viewer.session.session import Session
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
+WALL_WIDTH = 0.1  # of drawn walls, m
 
-    from robocov.environment import Obstacle
-    from robocov_app.viewer.session.session import Session
+_SPACING = 0.25  # radii from one dab of the brush to the next
+_PAUSE = 0.08  # seconds between two times that the robots get to know of what is being painted
+_RING = 48  # corners of the circle that shows the brush's size
 
-SNAPS_WITHIN = 0.6
-"""Part of a finger's width within which corners and walls draw what is drawn."""
+Point: TypeAlias = tuple[float, float]
 
-WALL_WIDTH = 0.1
-"""Width of drawn walls in metres."""
+
+@dataclass(frozen=True)
+class Preview:
+    """What a tool shows of what it is about to do.
+
+    A `line`, with a mark at each point, the obstacle as it would be, and words beside the last point.
+    """
+
+    line: tuple[Point, ...] = ()
+    closed: bool = False
+    obstacle: Obstacle | None = None
+    words: str = ""
+    marks: bool = True
+
+
+@dataclass
+class Tool:
+    """What the mouse does; this one does nothing."""
+
+    name: str = ""
+    title: str = ""
+    hint: str = ""
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        """Take a press of the left button; return what to tell.
+
+        `reach` is so many metres as a finger is wide; `number` the robot under the cursor.
+        """
+        return None
+
+    def move(self, session: Session, point: Point) -> None:
+        """Take a move of the mouse, pressed or not."""
+
+    def release(self, session: Session, point: Point) -> str | None:
+        """Take the button's release; return what to tell."""
+        return None
+
+    def finish(self, session: Session) -> str | None:
+        """Take Enter, a double or a right click; return what to tell."""
+        return None
+
+    def cancel(self, session: Session) -> bool:
+        """Take Escape; say whether there was something to give up."""
+        return False
+
+    def preview(self, session: Session) -> Preview | None:
+        """Return what to show."""
+        return None
+
+
+def edited(session: Session, environment: Environment, words: str) -> str:
+    """Put a new map in place; return what to tell. StartError when there is no room for a robot any more."""
+    before, radius = session.environment, session.circumstances(session.lanes[0]).team.radius
+    gone = set(before.starts) - set(environment.starts)
+    pushed = session.edit(environment, words)
+    if pushed:
+        words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
+    if gone:
+        words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
+    return "; ".join(filter(None, [words, passage_words(before, environment, float(radius.min()))]))
+
+
+def apart(a: Point, b: Point) -> float:
+    """Return the distance of two points, m."""
+    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
 
 
 @dataclass
@@ -90,14 +157,13 @@ class Hand(Tool):
         return edited(session, with_moved(session.environment, obstacle, *self._by()), words)
 
     def cancel(self, session: Session) -> bool:
+        something = self.holds or self.selected is not None
         if self.holds:
             self.robot = self.obstacle = None
             session.release()
-            return True
-        if self.selected is not None:
+        else:
             self.selected = None
-            return True
-        return False
+        return something
 
     def preview(self, session: Session) -> Preview | None:
         obstacle = self._dragged(session)
@@ -179,7 +245,10 @@ class Wall(Polygon):
             return None
         points = (*self._corners, self._at)
         words = f"{apart(points[-1], points[-2]):.2f} m, {self.width:g} m wide"
-        return Preview(points, False, _tried(self._made, list(points)), words)
+        wall = None
+        with suppress(RobocovError):
+            wall = self._made(list(points))
+        return Preview(points, False, wall, words)
 
     def widen(self, factor: float) -> None:
         """Draw wider walls, or narrower ones."""
@@ -248,69 +317,151 @@ class Circle(Ruler):
         if self._from is None:
             return None
         words = f"radius {apart(self._from, self._at):.2f} m"
-        return Preview((self._from, self._at), False, _tried(circle_of, self._from, self._at), words)
+        circle = None
+        with suppress(RobocovError):
+            circle = circle_of(self._from, self._at)
+        return Preview((self._from, self._at), False, circle, words)
 
 
-def _tried(make: Callable[..., Obstacle], *args: object) -> Obstacle | None:
-    """Return an obstacle, None where it cannot be."""
-    try:
-        return make(*args)
-    except RobocovError:
+@dataclass
+class Brush(Tool):
+    """Paints the density: the left button raises it, the right one lowers it.
+
+    `radius` is None until it is first needed: then a tenth of the map. `lowers`: what a press does.
+    """
+
+    name: str = "brush"
+    title: str = "Brush"
+    hint: str = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
+    radius: float | None = None
+    lowers: bool = False
+    clock: Callable[[], float] = field(default=perf_counter, repr=False)
+    _dabs: list[Point] = field(default_factory=list, repr=False)
+    _stroke: int = 0
+    _painting: bool = False
+    _boundary: Ring = ()
+    _at: Point | None = None
+    _shown: float = -1e9
+
+    @property
+    def painting(self) -> bool:
+        """Whether a stroke has begun and not yet ended."""
+        return self._painting
+
+    def size(self, session: Session) -> float:
+        """Return the radius, m."""
+        if self.radius is None:
+            self.radius = float(f"{0.1 * session.environment.region.diameter:.2g}")
+        return self.radius
+
+    def widen(self, session: Session, factor: float) -> str:
+        """Take a larger brush, or a smaller one; return what to tell."""
+        whole = session.environment.region.diameter
+        self.radius = float(f"{np.clip(self.size(session) * factor, whole / 200, whole / 2):.3g}")
+        return f"the brush has a radius of {self.radius:g} m"
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        self._painting, self._at, self._shown = True, point, -1e9
+        self._boundary = session.environment.boundary
+        self._stroke += 1
+        self._dabs = [point]
+        self._show(session)
         return None
 
+    def move(self, session: Session, point: Point) -> None:
+        if not self._painting or self._at is None:
+            self._at = point
+            return
+        if session.environment.boundary != self._boundary:
+            self._painting = False  # meanwhile there is another map
+            return
+        spacing = _SPACING * self.size(session)
+        count, begin = int(apart(self._at, point) / spacing), self._at
+        for k in range(1, count + 1):
+            part = k * spacing / apart(begin, point)
+            x, y = (round(a + part * (b - a), 4) for a, b in zip(begin, point, strict=True))
+            self._dabs.append((x, y))
+            self._at = x, y
+        if self._dabs and self.clock() - self._shown >= _PAUSE:
+            self._show(session)
 
-@dataclass
-class Eraser(Tool):
-    """Deletes obstacles and takes robots out."""
-
-    name: str = "eraser"
-    title: str = "Delete"
-    hint: str = "click an obstacle or a robot to delete it"
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        if number is not None:
-            session.remove_robot(number)
-            return f"robot {number} taken out"
-        index = obstacle_at(session.environment, point, 0.5 * reach)
-        if index is None:
+    def release(self, session: Session, point: Point) -> str | None:
+        if self._painting:
+            self.move(session, point)
+        painting, self._painting = self._painting, False
+        if not painting:
             return None
-        words = f"{words_for(session.environment.obstacles[index])} deleted"
-        return edited(session, without_obstacle(session.environment, index), words)
+        if self._dabs:
+            self._show(session)
+        return "density lowered" if self.lowers else "density raised"
 
+    def cancel(self, session: Session) -> bool:
+        painting, self._painting, self._at = self._painting, False, None
+        if painting:
+            session.undo()
+        return painting
 
-@dataclass
-class Adder(Tool):
-    """Lets robots join."""
-
-    name: str = "robot"
-    title: str = "Robot"
-    hint: str = "click where a robot is to join"
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        return f"robot {session.add_robot(point)} joined"
-
-
-@dataclass
-class Failer(Tool):
-    """Lets robots fail, and work again."""
-
-    name: str = "failure"
-    title: str = "Failure"
-    hint: str = "click a robot to let it fail; click it again to revive it"
-
-    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        if number is None:
+    def preview(self, session: Session) -> Preview | None:
+        if self._at is None:
             return None
-        if number in session.circumstances(session.lanes[0]).failed:
-            session.revive_robot(number)
-            return f"robot {number} works again"
-        session.fail_robot(number)
-        return f"robot {number} failed"
+        turn = np.linspace(0.0, 2.0 * np.pi, _RING + 1)
+        radius = self.size(session)
+        x, y = self._at[0] + radius * np.cos(turn), self._at[1] + radius * np.sin(turn)
+        outline = tuple(zip(x.tolist(), y.tolist(), strict=True))
+        density = session.environment.density
+        value = 1.0 if density is None else float(density.value(np.array([self._at]))[0])
+        return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
+
+    def _show(self, session: Session) -> None:
+        """Let the robots know of it."""
+        dabs, self._dabs = tuple(self._dabs), []
+        session.paint(dabs, self.size(session), lowers=self.lowers, stroke=self._stroke)
+        self._shown = self.clock()
+
+
+@dataclass
+class Click(Tool):
+    """Does something at a place, or to the robot there; returns what to tell."""
+
+    does: Callable[[Session, Point, float, int | None], str | None] = lambda *_: None
+
+    def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
+        return self.does(session, point, reach, number)
+
+
+def _erase(session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    if number is not None:
+        session.remove_robot(number)
+        return f"robot {number} taken out"
+    index = obstacle_at(session.environment, point, 0.5 * reach)
+    if index is None:
+        return None
+    words = f"{words_for(session.environment.obstacles[index])} deleted"
+    return edited(session, without_obstacle(session.environment, index), words)
+
+
+def _add(session: Session, point: Point, reach: float, number: int | None) -> str:
+    return f"robot {session.add_robot(point)} joined"
+
+
+def _fail(session: Session, point: Point, reach: float, number: int | None) -> str | None:
+    if number is None:
+        return None
+    if number in session.circumstances(session.lanes[0]).failed:
+        session.revive_robot(number)
+        return f"robot {number} works again"
+    session.fail_robot(number)
+    return f"robot {number} failed"
 
 
 def toolbox() -> dict[str, Tool]:
     """Return one of each tool by name, in the order in which they are shown."""
+    fails = "click a robot to let it fail; click it again to revive it"
     tools: list[Tool] = [
-        *(Hand(), Polygon(), Wall(), Circle(), Brush(), Eraser(), Adder(), Failer(), Ruler())
+        *(Hand(), Polygon(), Wall(), Circle(), Brush()),
+        Click("eraser", "Delete", "click an obstacle or a robot to delete it", _erase),
+        Click("robot", "Robot", "click where a robot is to join", _add),
+        Click("failure", "Failure", fails, _fail),
+        Ruler(),
     ]
     return {tool.name: tool for tool in tools}

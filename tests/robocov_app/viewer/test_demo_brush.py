@@ -14,9 +14,9 @@ from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import CircleObstacle
 from robocov.mapfile import load_map
 from robocov_app.render.density import density_range
-from robocov_app.viewer.brush import Brush
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.session.map_edits import CELLS, LEAST, MOST, painted_raster
+from robocov_app.viewer.tools import Brush
 
 REACH = 0.1
 

@@ -9,16 +9,13 @@ from touched_run import HALL, LLOYD, RAPF, all_told, begun, robots_of, stepped, 
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.tool import Tool
 from robocov_app.viewer.tools import (
     WALL_WIDTH,
-    Adder,
     Circle,
-    Eraser,
-    Failer,
     Hand,
     Polygon,
     Ruler,
+    Tool,
     Wall,
     toolbox,
 )
@@ -305,34 +302,34 @@ class TestCircle:
 class TestEraser:
     def test_it_deletes_obstacles(self):
         session = begun()
-        assert clicked(Eraser(), session, (2.53, 3.0)) == "wall deleted"
-        assert clicked(Eraser(), session, (4.2, 1.73)) == "circle “pillar” deleted"
+        assert clicked(toolbox()["eraser"], session, (2.53, 3.0)) == "wall deleted"
+        assert clicked(toolbox()["eraser"], session, (4.2, 1.73)) == "circle “pillar” deleted"
         assert session.environment.obstacles == ()
-        assert clicked(Eraser(), session, (4.2, 1.2)) is None
+        assert clicked(toolbox()["eraser"], session, (4.2, 1.2)) is None
 
     def test_a_robot_before_an_obstacle(self):
         session = begun()
-        assert clicked(Eraser(), session, (4.2, 1.2), number=2) == "robot 2 taken out"
+        assert clicked(toolbox()["eraser"], session, (4.2, 1.2), number=2) == "robot 2 taken out"
         assert robots_of(session) == ((1, 3), ())
         assert session.environment is HALL
 
     def test_the_last_robot_stays(self):
         session = begun(robots=1)
         with pytest.raises(ParameterError, match="the last robot"):
-            clicked(Eraser(), session, (1.0, 1.0), number=1)
+            clicked(toolbox()["eraser"], session, (1.0, 1.0), number=1)
 
 
 def test_robots_join_where_it_is_clicked():
     session = begun()
-    assert clicked(Adder(), session, (3.5, 3.2)) == "robot 4 joined"
+    assert clicked(toolbox()["robot"], session, (3.5, 3.2)) == "robot 4 joined"
     assert place_of(session, 4) == [3.5, 3.2]
     # in an obstacle it is as near as there is room
-    assert clicked(Adder(), session, (4.2, 1.2)) == "robot 5 joined"
+    assert clicked(toolbox()["robot"], session, (4.2, 1.2)) == "robot 5 joined"
     assert too_deep(session) <= 0.0
 
 
 def test_robots_fail_and_work_again():
-    tool, session = Failer(), stepped(begun(RAPF, LLOYD), 5)
+    tool, session = toolbox()["failure"], stepped(begun(RAPF, LLOYD), 5)
     assert clicked(tool, session, (1.0, 1.0)) is None
     assert clicked(tool, session, (1.0, 1.0), number=2) == "robot 2 failed"
     assert robots_of(session) == ((1, 3), (2,))
