@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
@@ -15,19 +17,22 @@ from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 from robocov_app.runs.options import JsonOption
 
+SESSION = ".robocov"
+
 if TYPE_CHECKING:
     from robocov_app.report.results import Result
 
 
 @dataclass
 class Arguments(JsonOption):
-    """One HTML page of runs, comparisons and sweeps, with an interactive replay; it needs no network.
+    """One HTML page of runs, comparisons, sweeps and sessions, with interactive replay; it needs no network.
 
     Example: robocov report sweeps/rooms --out rooms.html
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="DIR [DIR ...]")]
-    """Folders of runs, comparisons or sweeps; several make a section each."""
+    """Folders of runs, comparisons, sweeps or stories, or sessions of the window, story.robocov, whose
+    branches are all made again; several make a section each."""
     out: Path | None = None
     """The page; by default report.html in the (first) folder."""
     overwrite: bool = False
@@ -45,14 +50,37 @@ def command(options: Arguments) -> None:
     """Read, draw and write."""
     if not options.folders:
         raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
+    first = options.folders[0]
+    target = options.out or (first.with_suffix(".html") if first.suffix == SESSION else first / REPORT)
+    if options.out is not None or first.suffix == SESSION:
+        check_target(target, overwrite=options.overwrite)
+    with TemporaryDirectory(prefix="robocov-") as temporary:
+        parts = [part for path in options.folders for part in parts_of(path, Path(temporary))]
+        write_report(options, parts, target)
+
+
+def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
+    """Return folders of results with words on each: of a story its parts, of a session all of them."""
+    from robocov_app.viewer.story import story_folders
+
+    if path.suffix != SESSION:
+        return story_folders(path)
+    from robocov_app.commands import run
+    from robocov_app.terminal.interruption import Interruption
+
+    words = run.Arguments(map=str(path), out=temporary / path.stem, all_branches=True, json=True)
+    with Interruption() as stop:
+        stories = [Path(answer["out"]) for answer in run.saved_stories(words, stop)]
+    return [part for story in stories for part in story_folders(story)]
+
+
+def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: Path) -> None:
+    """Gather the results of folders, and write the page; words tell which part of a story one is."""
     from robocov_app.report.document import report
     from robocov_app.report.results import gathered, with_references
     from robocov_app.terminal.progress import progress
 
-    target = options.out or options.folders[0] / REPORT
-    if options.out is not None:
-        check_target(target, overwrite=options.overwrite)
-    results = [gathered(folder) for folder in options.folders]
+    results = [replace(gathered(folder), part=words) for folder, words in parts]
     check_target(target, overwrite=options.overwrite)
     for k, result in enumerate(results):  # reading all takes 10 ms a run
         quiet = options.json or result.kind != "sweep"
@@ -70,7 +98,7 @@ def command(options: Arguments) -> None:
             results[k] = with_references(result, search=options.optimum, tell=tell)
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
-    if options.out is None and results[0].kind != "sweep":
+    if target == options.folders[0] / REPORT and results[0].kind != "sweep":
         with extended(options.folders[0]) as more, written(more.new / REPORT) as part:
             more.claim(REPORT)
             part.write_bytes(data)
@@ -78,9 +106,10 @@ def command(options: Arguments) -> None:
         with written(target) as part:
             part.write_bytes(data)
     if options.json:
-        shown = zip(options.folders, results, page.shown, strict=True)
+        shown = zip(parts, results, page.shown, strict=True)
         counts = [
-            {"folder": str(folder), **counts_of(result), "shown": count} for folder, result, count in shown
+            {"folder": str(folder), **counts_of(result), "shown": count}
+            for (folder, _), result, count in shown
         ]
         print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
         return

@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from robocov_app.runs.run import Run
+    from robocov_app.terminal.interruption import Interruption
 
 
 @dataclass
@@ -61,10 +64,28 @@ def command(options: Arguments) -> int:
 
 def remade(options: Arguments) -> int:
     """Make stories of a session again, and save them."""
-    from robocov.compiled import compile_kernels
-    from robocov.files.result_folder import results
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite, listed
+
+    answers = []
+    with Interruption() as stop:
+        for answer in saved_stories(options, stop):
+            answers.append(answer)
+            for row in () if options.json else answer["runs"]:
+                told = answer["parts"][row["part"] - 1]
+                span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
+                print(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
+            if not options.json:
+                print(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+    if options.json:
+        print(json.dumps(finite(answers[0] if len(answers) == 1 else {"stories": answers})))
+    return INTERRUPTED if stop.requested else 0
+
+
+def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, Any]]:
+    """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
+    from robocov.compiled import compile_kernels
+    from robocov.files.result_folder import results
     from robocov_app.viewer.session.file import load_session, save_session
     from robocov_app.viewer.story import save_story
 
@@ -77,25 +98,15 @@ def remade(options: Arguments) -> int:
     elif options.all_branches:
         stories = [(each.node, each.end, f"-{k}") for k, each in enumerate(document.branches(), 1)]
     compile_kernels()
-    answers = []
-    with Interruption() as stop:
-        for node, step, suffix in stories:
-            out = Path(f"{options.out or path.stem}{suffix}")
-            with results(out, "story", overwrite=options.overwrite) as result:
-                save_session(result.new / f"session{path.suffix}", document, node, step, saved.view)
-                answers.append({"out": str(out), **save_story(document, node, step, result, options, stop)})
-                result.keep()
-            if not options.json:
-                for row in answers[-1]["runs"]:
-                    told = answers[-1]["parts"][row["part"] - 1]
-                    span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
-                    print(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
-                print(f"saved in {out}/: {listed(out)}")
-            if stop.requested:
-                break
-    if options.json:
-        print(json.dumps(finite(answers[0] if len(answers) == 1 else {"stories": answers})))
-    return INTERRUPTED if stop.requested else 0
+    for node, step, suffix in stories:
+        out = Path(f"{options.out or path.stem}{suffix}")
+        with results(out, "story", overwrite=options.overwrite) as result:
+            save_session(result.new / f"session{path.suffix}", document, node, step, saved.view)
+            answer = {"out": str(out), **save_story(document, node, step, result, options, stop)}
+            result.keep()
+        yield answer
+        if stop.requested:
+            return
 
 
 def print_summary(run: Run) -> None:

@@ -20,7 +20,8 @@ def title_of(result: Result) -> str:
     if result.kind == "sweep":
         return f"Sweep {printable(result.folder.resolve().name)}"
     labels = list(dict.fromkeys(entry.label for entry in result.entries))
-    return f"{_listed(labels)} on {_listed(list(result.maps))}"
+    title = f"{_listed(labels)} on {_listed(list(result.maps))}"
+    return f"{title} · {result.part}" if result.part else title
 
 
 def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:

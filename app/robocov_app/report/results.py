@@ -145,7 +145,8 @@ class Result:
 
     `facts` are what all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
     ``versions``. `loaded` are runs that were read already, `damaged` those that cannot be read and are no
-    entries, `references` the centralised references of settings (`robocov_app.report.results`).
+    entries, `references` the centralised references of settings (`robocov_app.report.results`). `part` tells
+    which part of a story it is.
     """
 
     kind: Kind
@@ -159,6 +160,7 @@ class Result:
     loaded: Mapping[Path, Saved]
     damaged: tuple[Damaged, ...] = ()
     references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)
+    part: str = ""
 
     @cached_property
     def fine(self) -> tuple[Entry, ...]:

@@ -20,7 +20,7 @@ from robocov_app.render.distance_field import Fields, round_limit
 from robocov_app.render.layers import Layer
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
-from robocov_app.render.scene import record_scene
+from robocov_app.render.scene import Scene, record_scene
 from robocov_app.render.theme import Colour
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.runs.options import FilmOptions
@@ -127,10 +127,13 @@ def pane_layout(
     film: FilmOptions,
     size: tuple[int, int] | None = None,
     fields: Fields | None = None,
+    legend_of: Sequence[Scene] | None = None,
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
     `size`, (width, height) or None: of the whole film; None for what suits the map, within `USUAL_SIZE`.
+    `legend_of`: scenes that the legend explains, by default the beginnings of the records, and where robots
+    fail their ends.
     """
     bounds = [record.environment.region.bounds for record in records]
     aspect = max((high_x - low_x) / (high_y - low_y) for low_x, low_y, high_x, high_y in bounds)
@@ -148,29 +151,23 @@ def pane_layout(
         needed = max(round((pane_height - around) * aspect + beside), round(_NARROWEST * scale))
         pane_width = min(pane_width, needed)
         width = columns * pane_width + (columns - 1) * GAP
-    header = _legend(records, film, width, scale, fields)
+    painter = _painter(records[0], film, (64, 64), pane_layers(film.colours), scale)
+    if legend_of is None:
+        shown = fields if painter.needs_field else None
+        moments = [(record, row) for record in records for row in (0, len(record) - 1)]
+        legend_of = [
+            record_scene(record, row, fields=shown) for record, row in moments if not row or record.conditions
+        ]
+    # the longest first: its order is kept, and mostly nothing is missing
+    found = sorted((painter.legend_entries(scene) for scene in legend_of), key=len)[::-1]
+    entries = united(found, LegendEntry.key)
+    header = legend_picture(entries, width, film.colour_theme, scale, film.layers()[0])
     if size is None:
         height = len(header) + rows * pane_height + (rows - 1) * GAP
         width, height = width + width % 2, height + height % 2
     else:
         pane_height = (height - len(header) - (rows - 1) * GAP) // rows
     return PaneLayout(columns, (pane_width, max(pane_height, 40)), scale, header, (width, height))
-
-
-def _legend(
-    records: Sequence[Record], film: FilmOptions, width: int, scale: float, fields: Fields | None
-) -> Frame:
-    """Draw one legend for all: of what any of them shows."""
-    found: list[list[LegendEntry]] = []
-    for record in records:
-        painter = _painter(record, film, (64, 64), pane_layers(film.colours), scale)
-        field = fields if painter.needs_field else None
-        # robots that fail are explained too
-        rows = (0, len(record) - 1) if record.conditions is not None else (0,)
-        found += [painter.legend_entries(record_scene(record, row, fields=field)) for row in rows]
-    # the longest first: its order is kept, and mostly nothing is missing
-    entries = united(sorted(found, key=len)[::-1], LegendEntry.key)
-    return legend_picture(entries, width, film.colour_theme, scale, film.layers()[0])
 
 
 def comparison_frames(

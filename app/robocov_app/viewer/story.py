@@ -7,23 +7,30 @@ which ``robocov run`` or ``robocov compare`` would write.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pygame
 
 from robocov.controllers import remembers
 from robocov.environment import CircleObstacle, Environment
+from robocov.errors import InputError, one_line
 from robocov.metrics import CostHistory, summarise
 from robocov.record import Record, Recorder
 from robocov_app.render.density import cost_label, mean_label
-from robocov_app.render.picture import Painter, pane_layers, standard_layers
+from robocov_app.render.fonts import label, shortened
+from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import Scene
+from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
-from robocov_app.runs.film import FILM_HOLD, FILMS, tiled, write_moving
+from robocov_app.runs.film import FILM_HOLD, FILMS, GAP, pane_layout, tiled, write_moving
 from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
@@ -39,6 +46,12 @@ if TYPE_CHECKING:
     from robocov_app.runs.recording import Frame
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.viewer.session.pane import Lane
+
+
+STORY = "story.json"
+
+STRIP = 30
+"""Height of a film's strip with what was done, px at scale 1."""
 
 
 def retold(document: Document, node: Node, end: int) -> Iterator[tuple[Lockstep, Node]]:
@@ -81,6 +94,8 @@ class Part:
     recorders : dict of pane to Recorder
     touched : list of [begin, end, robot]
         Steps between which a robot was moved by hand.
+    scenes : list of Scene
+        Of its beginning, and at the end of the story of that, one for each pane: what a legend explains.
     """
 
     node: Node
@@ -88,6 +103,7 @@ class Part:
     setups: dict[int, Circumstances]
     recorders: dict[int, Recorder]
     touched: list[list[int]] = field(default_factory=list)
+    scenes: list[Scene] = field(default_factory=list)
     ends: int = 0
 
     @property
@@ -109,6 +125,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
             parts.append(
                 Part(here, run.step, setups, {pane.number: _recorder(pane, dt) for pane in run.panes})
             )
+            parts[-1].scenes += [_scene(pane, [], "") for pane in run.panes]
         part = parts[-1]
         part.ends = run.step
         for pane in run.panes:
@@ -121,6 +138,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
                 part.touched.append([run.step, run.step + 1, robot])
             else:
                 last[1] = run.step + 1
+    parts[-1].scenes += [_scene(pane, [], "") for pane in run.panes]
     return parts
 
 
@@ -175,6 +193,25 @@ def _session_of(part: Part, setup: Circumstances, record: Record, dt: float) -> 
     return {**said, "repeatable": repeatable} if said or not repeatable else {}
 
 
+def story_folders(folder: Path) -> list[tuple[Path, str]]:
+    """Return the folders of a story's parts with words on each, in their order; else the folder itself."""
+    try:
+        content = json.loads((folder / STORY).read_bytes())
+        if content["format"] != "robocov-story":
+            return [(folder, "")]
+        return [
+            (
+                folder / one_line(part["folder"]),
+                f"{part['from_s']:.1f} to {part['to_s']:.1f} s, {part['words']}",
+            )
+            for part in content["parts"]
+        ]
+    except FileNotFoundError:
+        return [(folder, "")]
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InputError(f"{folder / STORY}: cannot be read: {one_line(error)}") from None
+
+
 def save_story(
     document: Document,
     node: Node,
@@ -222,7 +259,7 @@ def save_story(
         result.keep()
     if several:
         content = {"format": "robocov-story", "version": 1, "parts": told}
-        write_json(result.new / "story.json", content)
+        write_json(result.new / STORY, content)
         header = "controller," + cost_columns(histories[0][2])
         lines = (
             (name, begin + row[0], *row[1:])
@@ -234,7 +271,7 @@ def save_story(
     if look.video or look.frames:
         film = result.new / FILMS[len(parts[-1].setups) > 1]
         total = round((end * dt / look.film_speed + FILM_HOLD) * look.fps) + 1
-        frames = story_frames(document, node, end, histories, look)
+        frames = story_frames(document, node, end, parts, histories, look)
         write_moving(frames, total, film, look, stop, quiet=options.json)
     return {"parts": told, "runs": rows}
 
@@ -243,45 +280,64 @@ def story_frames(
     document: Document,
     node: Node,
     end: int,
+    parts: list[Part],
     histories: list[tuple[float, str, CostHistory]],
     film: FilmOptions,
 ) -> Iterator[Frame]:
-    """Draw a branch from its beginning: trajectories go on through all touches."""
-    theme = film.colour_theme
-    stride = film.film_speed / film.fps
-    painters: dict[int, Painter] = {}
-    frames: list[Frame] = []
-    due, frame = 0.0, None
+    """Draw a branch from its beginning: trajectories go on through all touches, each named below at its time.
+
+    All panes have the same layout and one legend, of whatever the story shows, also where some are left out.
+    """
+    theme, painters = film.colour_theme, dict[int, Painter]()
+    widest = max(parts, key=lambda part: len(part.setups))
+    root = document.path(node)[0]
+    count, dt = len(widest.setups), root.scenario.dt if root.scenario is not None else 0.0
+    layers = partial(standard_layers if count == 1 else pane_layers, film.colours)
     width, height = film.film_size()
+    strip = round(STRIP * scale_for((width, height)))
+    layout = None
+    if count > 1:
+        scenes = [scene for part in parts for scene in part.scenes]
+        layout = pane_layout(records_of_part(widest, root), film, (width, height - strip), legend_of=scenes)
+    due, frame = 0.0, None
     for run, here in retold(document, node, end):
         last = here is node and run.step >= end
         if run.time + 1e-9 < due and not last:
             continue
-        due += stride
-        count = len(run.panes)
-        size = (width, height) if count == 1 else (width // 2 - 4, height if count == 2 else height // 2 - 4)
+        due += film.film_speed / film.fps
+        panes = []
         names = folder_names([pane.law.name for pane in run.panes])
-        frames = []
         for pane, name in zip(run.panes, names, strict=True):
-            painter = painters.get(pane.number)
-            if (
-                painter is None
-                or painter.size != size
-                or painter.environment.boundary != run.scenario.environment.boundary
-            ):
-                layers = standard_layers(film.colours) if count == 1 else pane_layers(film.colours)
-                painter = painters[pane.number] = Painter(run.scenario.environment, size, theme, layers)
+            environment, painter = run.scenario.environment, painters.get(pane.number)
+            if painter is None or painter.environment.boundary != environment.boundary:
+                size, scale = (layout.pane, layout.scale) if layout else ((width, height - strip), None)
+                painter = painters[pane.number] = Painter(environment, size, theme, layers(), scale)
                 painter.change(*film.layers())
-            painter.environment = run.scenario.environment
-            frames.append(painter.frame(_scene(pane, histories, name)))
-        if count == 1:
-            frame = frames[0]
-        else:
-            frame = tiled(frames, 2, 8, theme.grid, theme.background)
+            painter.environment = environment
+            panes.append(painter.frame(_scene(pane, histories, name)))
+        frame = np.full((height, width, 3), theme.background, dtype=np.uint8)
+        top = 0 if layout is None else len(layout.header)
+        if layout is not None:
+            frame[:top, : layout.header.shape[1]] = layout.header
+        body = panes[0] if layout is None else tiled(panes, layout.columns, GAP, theme.grid, theme.background)
+        part = frame[top : top + body.shape[0], : body.shape[1]]
+        part[:] = body[: part.shape[0], : part.shape[1]]
+        words = "" if here.scenario is not None else f"{here.at * dt:.1f} s   {here.words}"
+        frame[height - strip :] = _caption(words, (width, strip), theme)
         yield frame
     if frame is not None:
         for _ in range(round(FILM_HOLD * film.fps)):
             yield frame
+
+
+def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
+    """Return the strip below a film: what was done last, and when."""
+    strip = pygame.Surface(size, 0, 32)
+    strip.fill(theme.panel)
+    text = round(0.5 * size[1])
+    picture = label(shortened(words, text, size[0] - 2 * text, True), text, theme.ink, True)
+    strip.blit(picture, picture.get_rect(midleft=(text, size[1] // 2)))
+    return np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8).reshape(size[1], size[0], 3)
 
 
 def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
@@ -297,7 +353,7 @@ def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: st
     cost = cost_label(mean_label(setup.environment), values[-1], None) if values else ""
     trail, times = pane.trail.until(pane.time)
     scene = Scene.of(
-        setup.environment.at(snapshot.time),
+        setup.environment,
         setup.team,
         snapshot,
         starts=pane.starts if len(pane.starts) == len(setup.numbers) else None,

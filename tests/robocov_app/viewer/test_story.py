@@ -14,11 +14,12 @@ from touched_run import HALL, LLOYD, RAPF, begun, stepped, with_curves
 from robocov.environment import CircleObstacle
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.runs.options import FilmOptions
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.story import parts_of
+from robocov_app.viewer.story import parts_of, story_frames
 
 SMALL = ["--lattice", "16", "--size", "320x240"]
 
@@ -88,6 +89,37 @@ def test_each_branch_is_a_story_of_its_own(tmp_path: Path, capsys: pytest.Captur
         "branch: '9', but one of 1 (robot 2 failed), 2 (robot 4 joined) was wanted" in capsys.readouterr().err
     )
     assert not (tmp_path / "no").exists()
+
+
+@pytest.mark.slow
+def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = saved(played(), tmp_path)
+    assert main(["run", path, *SMALL, "--out", str(tmp_path / "told")]) == 0
+    assert main(["report", str(tmp_path / "told")]) == 0
+    page = (tmp_path / "told" / "report.html").read_text()
+    titles = ["0.0 to 0.2 s, begun", "0.2 to 0.4 s, circle drawn", "0.4 to 0.6 s, robot 4 joined"]
+    assert all(f" · {title}</h2>" in page for title in titles)
+    assert main(["report", path]) == 0
+    page = (tmp_path / "story.html").read_text()
+    assert "0.2 to 0.4 s, robot 2 failed</h2>" in page and titles[2] in page, "all branches are there"
+    assert str(tmp_path) not in page and "/robocov-" not in page, "no place of a machine"
+    (tmp_path / "told" / "story.json").write_text('{"format": "robocov-story"}')
+    capsys.readouterr()
+    assert main(["report", str(tmp_path / "told")]) == 2
+    assert "story.json: cannot be read" in capsys.readouterr().err
+
+
+def test_a_film_explains_what_it_shows_and_says_what_was_done(tmp_path: Path) -> None:
+    session, film = played(), FilmOptions(size="640x360", fps=10, film_speed=1.0)
+    parts = parts_of(session.document, session.head, session.step_now)
+    frames = list(story_frames(session.document, session.head, session.step_now, parts, [], film))
+    assert {frame.shape for frame in frames} == {(360, 640, 3)}
+    first, last = frames[0].astype(int), frames[-1].astype(int)
+    header = first[:20]
+    assert (header.min(axis=2) < 100).sum() > 100 and (header == last[:20]).all(), "one legend for all of it"
+    strip = slice(360 - 14, 360)
+    assert (first[strip].min(axis=2) > 200).all(), "nothing was done yet"
+    assert (last[strip].min(axis=2) < 100).sum() > 50
 
 
 def test_a_drag_belongs_to_the_part_before_and_is_said_there() -> None:
