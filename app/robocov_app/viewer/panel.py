@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import chain, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -238,8 +239,7 @@ class Panel:
             self.desk.attempt(lambda: self.desk.set_parameter(each.name, each.read(text)))
         ui.label(each.unit, key=f"unit:{each.name}", style="unit")
         usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}".rstrip()
-        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {usual}", small=True):
-            self._set(each.name, each.default)
+        self._reset(ui, each, usual)
 
     def _words(self, ui: Ui, each: Pick) -> None:
         """Show buttons side by side, one for each word; where they do not fit, a list."""
@@ -254,7 +254,10 @@ class Panel:
             key, chosen = f"{each.name}:{word}", word == each.value
             if ui.button(word, key=key, tip=each.meaning, chosen=chosen, small=True):
                 self._set(each.name, word)
-        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {each.default}", small=True):
+        self._reset(ui, each, each.default)
+
+    def _reset(self, ui: Ui, each: Parameter | Pick, usual: str) -> None:
+        if ui.button("↺", key=f"reset:{each.name}", tip=f"Back to the default: {usual}", small=True):
             self._set(each.name, each.default)
 
     def _show(self, ui: Ui) -> None:
@@ -264,12 +267,11 @@ class Panel:
         rows = -(-len(names) // 2)
         with ui.scroll("show"):
             ui.row(0, 0, height=21, below=3)
-            for k in range(2 * rows):
-                place = k // 2 + k % 2 * rows  # down the first column, then the second
-                if place >= len(names):
+            # down the first column, then the second
+            for name in chain.from_iterable(zip_longest(names[:rows], names[rows:])):
+                if name is None:
                     ui.cell()
                     continue
-                name = names[place]
                 title = _SHORT.get(self.titles[name], self.titles[name])
                 tip = self._commands[f"layer:{name}"].tip
                 if ui.check(title, key=name, now=name in desk.shown, tip=tip) is not None:

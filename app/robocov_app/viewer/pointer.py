@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pygame
 
 from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import inside
+from robocov_app.viewer.canvas import ViewerCanvas
+from robocov_app.viewer.chart import Chart
+from robocov_app.viewer.panel import Panel
+from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.tools import Brush
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov_app.viewer.canvas import ViewerCanvas
-    from robocov_app.viewer.chart import Chart
-    from robocov_app.viewer.panel import Panel
-    from robocov_app.viewer.presenter import Desk
 
 _TAKES_ROBOTS = ("hand", "eraser", "failure")
 """Tools that take hold of a robot."""
 
 
 class Pointer:
-    """Turns events of the mouse into what panel, arena, chart and tools do: the panel comes first.
+    """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first.
 
-    Parameters
-    ----------
-    desk, arena, chart, panel
-    interrupt : callable
-        Called when something is pressed in the arena: the tour ends.
+    `interrupt` is called when something is pressed on the canvas: a lesson waits.
     """
 
     def __init__(
@@ -112,14 +104,8 @@ class Pointer:
         pane = self._arena.pane_at(event.pos)
         self._pressed_at, self._button = event.pos, event.button
         if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
-            if event.button == 1 and self._chart.offers(event.pos):
-                desk.attempt(self._chart.switch)
-            elif event.button == 1 and (ghost := self._chart.ghost_at(event.pos)) is not None:
-                desk.attempt(lambda: desk.enter(ghost))
-            elif event.button == 1:
-                self._interrupt()
-                self._drag = "time"
-                desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
+            if event.button == 1:
+                self._press_chart(event.pos)
             return
         if pane is None or event.button not in (1, 2, 3):
             return
@@ -148,17 +134,26 @@ class Pointer:
         self._drag = "pan" if desk.tool is desk.hand and not desk.hand.holds else "tool"
         self._held = pane
 
+    def _press_chart(self, at: tuple[int, int]) -> None:
+        """Plot the other quantity, enter a branch by its ghost, or look at the time there."""
+        desk, chart = self._desk, self._chart
+        if chart.offers(at):
+            desk.attempt(chart.switch)
+        elif (ghost := chart.ghost_at(at)) is not None:
+            desk.attempt(lambda: desk.enter(ghost))
+        else:
+            self._interrupt()
+            self._drag = "time"
+            desk.attempt(lambda: desk.look_at(chart.time_at(at[0])))
+
     def _moved(self, event: pygame.event.Event) -> None:
         desk = self._desk
-        pane = self._arena.pane_at(event.pos)
-        over = inside(self._arena.layout.panel, event.pos)
-        desk.cursor = None
-        if pane is not None and not over:
+        pane, desk.cursor = self._arena.pane_at(event.pos), None
+        if pane is not None and not inside(self._arena.layout.panel, event.pos):
             desk.cursor, desk.cursor_pane = self._arena.to_world(event.pos, pane), pane
         self._chart.hover = event.pos if not self._drag else None
         if self._drag == "time":
-            time = self._chart.time_at(event.pos[0])
-            desk.attempt(lambda: desk.look_at(time))
+            desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
         elif self._drag == "pan":
             self._arena.pan(*event.rel)
         elif self._drag == "tool":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
@@ -31,31 +30,21 @@ from robocov_app.viewer.lessons import LessonPlayer, load_lesson
 from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
-from robocov_app.viewer.presenter import plain
+from robocov_app.viewer.presenter import Desk, plain
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, facts, suggestion
 
-if TYPE_CHECKING:
-    from robocov_app.viewer.presenter import Desk
+PAUSE_AT_REST = 0.25  # seconds between two frames while time goes on, but nothing moves any more
+_ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
+_PAN = 60  # pixels that a key pans
 
-PAUSE_AT_REST = 0.25
-"""Seconds between two frames while time goes on, but nothing moves any more."""
-
-_ASKED_AGAIN = 0.2
-"""Seconds between two looks of the inspector."""
-
-_PAN = 60
-"""Pixels that a key pans."""
-
-_GOES_ON_WITH = frozenset(
-    {
-        *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
-        *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot"),
-    }
-)
-"""What may be done without leaving the lesson."""
+_GOES_ON_WITH = {
+    *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
+    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot"),
+}
+"""Commands that do not leave the lesson."""
 
 _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 
@@ -63,16 +52,8 @@ _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan ·
 class Window(BaseWindow):
     """Shows a desk and lets it be touched.
 
-    Parameters
-    ----------
-    desk : Desk
-    size : (width, height), px
-    scale : float
-        Of text and lines.
-    patient : bool
-        Nobody watches: films wait for their encoder instead of leaving frames out.
-    screen : pygame.Surface or None
-        Of a window that is there already.
+    `scale`: of text and lines. `patient`: nobody watches: films wait for their encoder instead of leaving
+    frames out. `screen`: of a window that is there already.
     """
 
     hint = HINT
@@ -103,13 +84,9 @@ class Window(BaseWindow):
         self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._leave_lesson)
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
-        self._report_at = 0.0
-        self._reported: object = None
-        self._now = 0.0
-        self._unfilmed = 0.0
-        self._answers = 0
-        self._steps_rate = 0.0
-        self._serial = -1
+        self._reported: tuple[object, float] = None, 0.0
+        self._now = self._unfilmed = self._steps_rate = 0.0
+        self._answers, self._serial = 0, -1
         self._arrange()
         self.draw()
 
@@ -180,20 +157,12 @@ class Window(BaseWindow):
         if session.serial != self._serial:
             self._serial = session.serial
             desk.costs.forget()
-        point = None
-        if "path" in desk.shown and desk.cursor is not None:
-            point = np.array(desk.cursor)
+        point = np.array(desk.cursor) if "path" in desk.shown and desk.cursor is not None else None
         for lane in session.lanes:
-            positions = session.positions(lane)
-            known = desk.costs.known.get(lane.number)
-            if (
-                known is not None
-                and point is None
-                and abs(known.time - session.time) < 1e-9
-                and np.array_equal(known.result.positions, positions)
-            ):
-                continue
-            desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
+            positions, known = session.positions(lane), desk.costs.known.get(lane.number)
+            fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
+            if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
+                desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
         for pane, known in desk.costs.poll():
             self._answers += 1
             for lane in session.lanes:
@@ -260,10 +229,9 @@ class Window(BaseWindow):
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
             return
-        shown = number, session.time, session.serial, self.desk.version
-        old = shown != self._reported and self._now - self._report_at >= _ASKED_AGAIN
-        if panel.report is None or old:
-            self._report_at, self._reported = self._now, shown
+        shown, (before, at) = (number, session.time, session.serial, self.desk.version), self._reported
+        if panel.report is None or (shown != before and self._now - at >= _ASKED_AGAIN):
+            self._reported = shown, self._now
             panel.report = report_on(self.desk, number)
 
     # doing
