@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
@@ -39,20 +39,9 @@ class Arguments(JsonOption):
     """The file to write."""
     format: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The format, where the suffix does not say it."""
-    cell: float | None = None
-    """Side of a cell, or of a pixel, in metres; 0.05 by default. Walls that are thinner stay whole."""
-    mode: Literal["trinary", "scale", "raw"] | None = None
-    """How a ROS map says what is occupied; trinary by default."""
-    image: Literal["pgm", "png"] | None = None
-    """Kind of the picture of a ROS map; pgm by default."""
-    scale: float | None = None
-    """Metres that a millimetre of an SVG stands for; 0.001, true scale, by default."""
-    digits: int | None = None
-    """Decimals of coordinates; by default a micrometre."""
-    origin: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="LON LAT")] = None
-    """Longitude and latitude of [0, 0] m: GeoJSON in degrees. Needs pyproj: robocov[geo]."""
     overwrite: bool = False
     """Replace existing files."""
+    write: tyro.conf.OmitArgPrefixes[WriteOptions] = field(default_factory=WriteOptions)
 
 
 def command(options: Arguments) -> None:
@@ -61,13 +50,12 @@ def command(options: Arguments) -> None:
         known = ", ".join(EXPORTERS)
         raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
     chosen = exporter(options.out, options.format)
-    how = WriteOptions(**{field.name: getattr(options, field.name) for field in fields(WriteOptions)})
-    for file in chosen.files(options.out, how):
+    for file in chosen.files(options.out, options.write):
         if writable(file).exists() and Path(options.map).exists() and file.samefile(options.map):
             raise InputError(f"{file}: the map that is read; another -o was wanted")
         if file.exists() and not options.overwrite:
             raise InputError(f"{file}: exists already; another -o, or --overwrite, was wanted")
-    report = export_map(load_map(options.map), options.out, format=options.format, options=how)
+    report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:
         print(f"robocov: warning: {line}", file=sys.stderr)
     if options.json:

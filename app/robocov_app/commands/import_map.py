@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
 from robocov.errors import InputError, one_line
 from robocov.mapfile import save_map
-from robocov.robots import DEFAULT_RADIUS
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
 from robocov_app.runs.options import JsonOption
@@ -50,65 +49,10 @@ class Arguments(JsonOption):
     """The format of FILE, where its content does not say it."""
     preview: Annotated[Path | None, tyro.conf.arg(metavar="PICTURE")] = None
     """A picture (.png, .svg or .pdf) of the map as it was read and as it became."""
-
-    simplify: float | None = None
-    """Walls may move by so many metres, and corners by twice as much, where that saves vertices; 0 keeps
-    all. By default one cell of a grid, 0.02 of the rest."""
-    specks: float | None = None
-    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
-    none."""
-    keep: Literal["largest", "all"] = "largest"
-    """Which connected parts of the free space stay."""
-    inside: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")] = None
-    """The part of the free space that holds this place, in the map's metres, stays instead of the largest."""
-    hull: bool = False
-    """The boundary is the convex hull of the free space, not its outline."""
-    margin: float = 0.0
-    """So many metres around the free space are solid."""
-    radius: float = DEFAULT_RADIUS
-    """Radius of a robot in metres: where it passes in FILE, it passes in the map."""
-    default_start: Literal["room", "uniform"] = "room"
-    """The map's default start: a disc at the roomiest place, or anywhere."""
-
-    cell: float | None = None
-    """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
-    unknown: Literal["obstacle", "free", "cut"] | None = None
-    """What unknown or transparent cells are; with cut the map ends where the known cells end."""
-    threshold: float | None = None
-    """From 0 to 1. What is darker in a picture is an obstacle; what is occupied with this probability in
-    a ROS map of mode scale or raw is one. 0.5 by default."""
-    invert: bool = False
-    """In a picture light is an obstacle, not dark."""
-    trees: Literal["obstacle", "free"] | None = None
-    """Whether trees (T) in a MovingAI grid are obstacles (the default)."""
-    water: Literal["obstacle", "free"] | None = None
-    """Whether water (W) in a MovingAI grid, or of OpenStreetMap, is an obstacle (the default)."""
-    anywhere: bool = False
-    """Pictures and includes that a file names may be outside of its folder."""
-
-    scale: float | None = None
-    """Metres that a unit of a drawing, or a pixel of a TMX, stands for."""
-    units: Literal["metres", "degrees"] | None = None
-    """What the coordinates of GeoJSON are, whatever it says of itself."""
-    thickness: float | None = None
-    """Width in metres of walls that are drawn as lines."""
-    pillar: float | None = None
-    """Radius in metres of a pillar for each point; without it points are left out."""
-    outlines: Literal["free", "solid"] | None = None
-    """What closed outlines of a drawing are, but for the boundary."""
-    boundary: str | None = None
-    """Name, id, class or layer of the shape that is the outer boundary."""
-    around: float | None = None
-    """Room in metres around the shapes where none of them is the boundary."""
-    only: tuple[str, ...] | None = None
-    """Names, ids, classes or layers that are read; all else is left out."""
-    skip: tuple[str, ...] | None = None
-    """Names, ids, classes or layers that are left out."""
-    hatches: bool = False
-    """Hatches are areas, as outlines are."""
-
     overwrite: bool = False
     """Replace existing files."""
+    read: tyro.conf.OmitArgPrefixes[ReadOptions] = field(default_factory=ReadOptions)
+    shaping: tyro.conf.OmitArgPrefixes[Shaping] = field(default_factory=Shaping)
 
 
 def command(options: Arguments) -> None:
@@ -124,7 +68,7 @@ def command(options: Arguments) -> None:
     quiet = options.json or not sys.stderr.isatty()
     with progress("importing", 3, quiet=quiet) as done:
         environment, report, foreign = import_map(
-            options.file, format=options.format, options=_read_options(options), shaping=_shaping(options)
+            options.file, format=options.format, options=options.read, shaping=options.shaping
         )
         done(1)
         save_map(environment, out)
@@ -141,13 +85,3 @@ def command(options: Arguments) -> None:
     for line in report.lines():
         print(line)
     print(f"saved in {' and '.join(files.values())}")
-
-
-def _read_options(options: Arguments) -> ReadOptions:
-    """Return what was given for the file; a switch that is off was not given."""
-    given = {field.name: getattr(options, field.name) for field in fields(ReadOptions)}
-    return ReadOptions(**{name: None if value is False else value for name, value in given.items()})
-
-
-def _shaping(options: Arguments) -> Shaping:
-    return Shaping(**{field.name: getattr(options, field.name) for field in fields(Shaping)})

@@ -2,112 +2,63 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, checked, shown
 from robocov_app.formats.foreign import ForeignMap, square_metres
-
-_LENGTHS = ("cell", "scale", "thickness", "pillar", "around")
-_FRACTIONS = ("threshold",)
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a file does not say of itself. None is the format's own default, and "not given".
-
-    Attributes
-    ----------
-    cell : float, m
-        Side of a cell of a grid, width of a tile, metres a pixel of a picture.
-    unknown : str
-        What unknown or transparent cells are: ``obstacle`` (the default), ``free``, or ``cut``: outside
-        of the map, which ends where the known cells end.
-    threshold : float
-        From 0 to 1. Of a picture: what is darker is an obstacle (0.5). Of a ROS map whose mode is
-        scale or raw: what is occupied with at least this probability is one (0.5).
-    invert : bool
-        In a picture light is an obstacle, not dark.
-    trees, water : str
-        What such cells of a MovingAI grid are, and water of OpenStreetMap: ``obstacle`` (the default) or
-        ``free``.
-    anywhere : bool
-        Whether a file may name another one outside of its own folder.
-    scale : float, m
-        Metres that a unit of a vector format, or a pixel of a tile map, stands for.
-    units : str
-        What coordinates on the globe are: ``degrees``, or ``metres``, whatever the file says of itself.
-    thickness : float, m
-        Width of walls that are drawn as lines (0.1, or the line's own where it has one).
-    pillar : float, m
-        Radius of a pillar for each point; without it points are left out.
-    outlines : str
-        What closed outlines are: ``free`` space, or ``solid``, but for the one that is the boundary.
-    boundary : str
-        Name, id, class or layer of the shape that is the outer boundary.
-    around : float, m
-        Room left around the shapes where none of them is the boundary (1).
-    only, skip : tuple of str
-        Names, ids, classes or layers: all else is left out, or these are.
-    hatches : bool
-        Whether hatches are areas, as outlines are; otherwise they are left out.
-
-    Raises
-    ------
-    ParameterError
-        When a value is out of range.
-    """
+    """What a file does not say of itself; what is not given is as its format has it."""
 
     cell: float | None = None
+    """Side of a cell or pixel, or width of a tile, in metres. By default MovingAI's and Tiled's have 1."""
     unknown: Literal["obstacle", "free", "cut"] | None = None
+    """What unknown or transparent cells are; with cut the map ends where the known cells end."""
     threshold: float | None = None
-    invert: bool | None = None
+    """From 0 to 1. What is darker in a picture is an obstacle; what is occupied with this probability in
+    a ROS map of mode scale or raw is one. 0.5 by default."""
+    invert: bool = False
+    """In a picture light is an obstacle, not dark."""
     trees: Literal["obstacle", "free"] | None = None
+    """Whether trees (T) in a MovingAI grid are obstacles (the default)."""
     water: Literal["obstacle", "free"] | None = None
-    anywhere: bool | None = None
+    """Whether water (W) in a MovingAI grid, or of OpenStreetMap, is an obstacle (the default)."""
+    anywhere: bool = False
+    """Pictures and includes that a file names may be outside of its folder."""
     scale: float | None = None
+    """Metres that a unit of a drawing, or a pixel of a TMX, stands for."""
     units: Literal["metres", "degrees"] | None = None
+    """What the coordinates of GeoJSON are, whatever it says of itself."""
     thickness: float | None = None
+    """Width in metres of walls that are drawn as lines."""
     pillar: float | None = None
+    """Radius in metres of a pillar for each point; without it points are left out."""
     outlines: Literal["free", "solid"] | None = None
+    """What closed outlines of a drawing are, but for the boundary."""
     boundary: str | None = None
+    """Name, id, class or layer of the shape that is the outer boundary."""
     around: float | None = None
+    """Room in metres around the shapes where none of them is the boundary."""
     only: tuple[str, ...] | None = None
+    """Names, ids, classes or layers that are read; all else is left out."""
     skip: tuple[str, ...] | None = None
-    hatches: bool | None = None
+    """Names, ids, classes or layers that are left out."""
+    hatches: bool = False
+    """Hatches are areas, as outlines are."""
 
     def __post_init__(self) -> None:
-        for name in _LENGTHS:
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and 1e-6 <= value <= 1e4):
-                raise ParameterError(
-                    f"{name}: {shown(value)}, but a number from 1e-6 to 10000 (m) was wanted"
-                )
-        for name in _FRACTIONS:
-            value = getattr(self, name)
-            if value is not None and not 0.0 <= value <= 1.0:
-                raise ParameterError(f"{name}: {shown(value)}, but a number from 0 to 1 was wanted")
-        for name, choices in _CHOICES.items():
-            value = getattr(self, name)
-            if value is not None and value not in choices:
-                raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(choices)} was wanted")
+        lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), (1e-6, 1e4, "m"))
+        _check(self, lengths | {"threshold": (0.0, 1.0, "")})
 
     def given(self) -> tuple[str, ...]:
-        """Return the names of the options that are not None."""
-        return tuple(field.name for field in fields(self) if getattr(self, field.name) is not None)
-
-
-_CHOICES = {
-    "unknown": ("obstacle", "free", "cut"),
-    "trees": ("obstacle", "free"),
-    "water": ("obstacle", "free"),
-    "units": ("metres", "degrees"),
-    "outlines": ("free", "solid"),
-}
+        """Return the names of the options that are not as by default."""
+        return _given(self)
 
 
 @dataclass(frozen=True)
@@ -131,56 +82,46 @@ class Importer:
 
 @dataclass(frozen=True)
 class WriteOptions:
-    """How a map is written. None is the format's own default, and "not given".
-
-    Attributes
-    ----------
-    cell : float, m
-        Side of a cell of a grid, metres a pixel of a picture.
-    mode : str
-        Of a ROS map: ``trinary`` (the default), ``scale`` or ``raw``.
-    image : str
-        Kind of the picture of a ROS map: ``pgm`` (the default) or ``png``.
-    scale : float, m
-        Metres that a millimetre of a drawing stands for.
-    digits : int
-        Decimals of the coordinates of a vector format.
-    origin : (longitude, latitude), degrees
-        Where on the globe [0, 0] m is: coordinates are written in degrees.
-
-    Raises
-    ------
-    ParameterError
-        When a value is out of range.
-    """
+    """How a map is written; what is not given is as its format has it."""
 
     cell: float | None = None
+    """Side of a cell, or of a pixel, in metres; 0.05 by default. Walls that are thinner stay whole."""
     mode: Literal["trinary", "scale", "raw"] | None = None
+    """How a ROS map says what is occupied; trinary by default."""
     image: Literal["pgm", "png"] | None = None
+    """Kind of the picture of a ROS map; pgm by default."""
     scale: float | None = None
+    """Metres that a millimetre of an SVG stands for; 0.001, true scale, by default."""
     digits: int | None = None
+    """Decimals of coordinates; by default a micrometre."""
     origin: tuple[float, float] | None = None
+    """Longitude and latitude of [0, 0] m: GeoJSON in degrees. Needs pyproj: robocov[geo]."""
 
     def __post_init__(self) -> None:
-        for name in ("cell", "scale"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and 1e-6 <= value <= 1e4):
-                raise ParameterError(
-                    f"{name}: {shown(value)}, but a number from 1e-6 to 10000 (m) was wanted"
-                )
-        if self.digits is not None and not 0 <= self.digits <= 12:
-            raise ParameterError(f"digits: {shown(self.digits)}, but a number from 0 to 12 was wanted")
+        length = (1e-6, 1e4, "m")
+        _check(self, {"cell": length, "scale": length, "digits": (0, 12, "")})
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
             wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
             raise ParameterError(f"origin: {shown(self.origin)}, but {wanted}")
-        for name, choices in (("mode", ("trinary", "scale", "raw")), ("image", ("pgm", "png"))):
-            value = getattr(self, name)
-            if value is not None and value not in choices:
-                raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(choices)} was wanted")
 
     def given(self) -> tuple[str, ...]:
-        """Return the names of the options that are not None."""
-        return tuple(field.name for field in fields(self) if getattr(self, field.name) is not None)
+        """Return the names of the options that are not as by default."""
+        return _given(self)
+
+
+def _given(options: ReadOptions | WriteOptions) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(options) if getattr(options, each.name) != each.default)
+
+
+def _check(options: ReadOptions | WriteOptions, ranges: Mapping[str, tuple[float, float, str]]) -> None:
+    """Raise ParameterError where a value is out of its range, or none of its words."""
+    for name, hint in get_type_hints(type(options)).items():
+        value = getattr(options, name)
+        if value is not None and name in ranges:
+            checked(name, value, *ranges[name])
+        words = [word for kind in get_args(hint) if get_origin(kind) is Literal for word in get_args(kind)]
+        if words and value is not None and value not in words:
+            raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(words)} was wanted")
 
 
 @dataclass(frozen=True)

@@ -63,45 +63,28 @@ MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
 
 @dataclass(frozen=True)
 class Shaping:
-    """How a foreign map becomes an environment.
-
-    Attributes
-    ----------
-    simplify : float or None, m
-        Walls may move by so much, and corners by twice as much, where that saves vertices; 0 keeps
-        all. None: one cell of a raster but no more than a robot's diameter, 2 cm elsewhere.
-    specks : float or None, m²
-        Smaller obstacles, and smaller separate parts of the free space, are dropped; 0 keeps all. None:
-        what is noise in maps of that format, as single cells are in those that robots made.
-    keep : str
-        ``largest``: the largest connected part of the free space, or, where the file places robots, the one
-        with most of them; ``all``: every part.
-    inside : (x, y) or None, m
-        The connected part that holds this place is kept, instead of the largest: in metres of the map, as
-        the report and the preview give them.
-    hull : bool
-        Whether the boundary is the convex hull of the free space, instead of its outline.
-    margin : float, m
-        So much solid is left around the free space, inside the boundary.
-    radius : float, m
-        Of a robot: what it can pass before, it can pass afterwards.
-    default_start : str
-        Which start comes first: ``room``, a disc at the roomiest place, or ``uniform``.
-
-    Raises
-    ------
-    ParameterError
-        When a value is out of range, or one part and all are to be kept.
-    """
+    """How a foreign map becomes an environment."""
 
     simplify: float | None = None
+    """Walls may move by so many metres, and corners by twice as much, where that saves vertices; 0 keeps
+    all. By default one cell of a grid, 0.02 of the rest."""
     specks: float | None = None
+    """Obstacles smaller than so many m² are dropped. By default single cells of ROS maps and JPEGs are, else
+    none."""
     keep: Literal["largest", "all"] = "largest"
+    """Which connected parts of the free space stay; where the file places robots, the one with most of them
+    counts as the largest."""
     inside: tuple[float, float] | None = None
+    """The part of the free space that holds this place, x and y in the map's metres, stays instead of the
+    largest."""
     hull: bool = False
+    """The boundary is the convex hull of the free space, not its outline."""
     margin: float = 0.0
+    """So many metres around the free space are solid."""
     radius: float = DEFAULT_RADIUS
+    """Radius of a robot in metres: where it passes in the file, it passes in the map."""
     default_start: Literal["room", "uniform"] = "room"
+    """The map's default start: a disc at the roomiest place, or anywhere."""
 
     def __post_init__(self) -> None:
         ranges = {"simplify": (0.0, 10.0, "m"), "specks": (0.0, 1e6, "m²"), "margin": (0.0, 100.0, "m")}
