@@ -89,13 +89,9 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
 
 
 def _helps(settings: type) -> dict[str, str]:
-    """Return what the docstring of a class says of its attributes, a line each."""
-    entries = re.findall(r"^(\w+(?:, \w+)*) : .*\n((?:    .+\n?)+)", inspect.getdoc(settings) or "", re.M)
-    return {
-        name: " ".join(words.replace("`", "").replace("None:", "By default").split())
-        for names, words in entries
-        for name in names.split(", ")
-    }
+    """Return the docstrings of the fields of a class, a line each."""
+    entries = re.findall(r'^    (\w+): .*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
+    return {name: " ".join(words.split()) for name, words in entries}
 
 
 @dataclass(frozen=True, eq=False)
