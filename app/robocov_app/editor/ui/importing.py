@@ -90,7 +90,7 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
 
 def _helps(settings: type) -> dict[str, str]:
     """Return the docstrings of the fields of a class, a line each."""
-    entries = re.findall(r'^    (\w+): .*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
+    entries = re.findall(r'^    (\w+): [^\n]*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
     return {name: " ".join(words.split()) for name, words in entries}
 
 
