@@ -119,7 +119,7 @@ def range_layer(kind: str, title: str) -> Layer:
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             canvas.circle((x, y), 6.5 * canvas.scale, canvas.theme.ink, dashed)
 
-        return [LegendEntry(title.lower(), glyph)] if np.isfinite(ranges(scene)).any() else []
+        return [LegendEntry(f"{kind} range", glyph)] if np.isfinite(ranges(scene)).any() else []
 
     return Layer(kind, title, draw, ("snapshot",), legend, default=False)
 

@@ -28,14 +28,6 @@ TABS = ("parameters", "show", "robot", "keep")
 NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
 """Layers without a check box: a picture without them is no use; they have keys all the same."""
 
-_SHORT = {
-    "Nearest obstacle points": "Nearest obstacle",
-    "Repulsion from robots": "Repulsion: robots",
-    "Repulsion from obstacle": "Repulsion: wall",
-    "Path from the cursor": "Path from cursor",
-    "Communication range": "Comm. range",
-}
-
 _KEPT = (
     (("Screenshot", "screenshot"), ("Record film", "film")),
     (("Save session", "save:session"), ("Recover…", "recover")),
@@ -272,9 +264,8 @@ class Panel:
                 if name is None:
                     ui.cell()
                     continue
-                title = _SHORT.get(self.titles[name], self.titles[name])
                 tip = self._commands[f"layer:{name}"].tip
-                if ui.check(title, key=name, now=name in desk.shown, tip=tip) is not None:
+                if ui.check(self.titles[name], key=name, now=name in desk.shown, tip=tip) is not None:
                     self._do(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)

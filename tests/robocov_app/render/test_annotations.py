@@ -97,8 +97,8 @@ def test_the_legend_lists_exactly_what_is_shown():
         "communication": "communication range",
         "obstacle_points": "nearest obstacle point",
         "force_attraction": "attraction",
-        "force_repulsion_robots": "repulsion from robots",
-        "force_repulsion_obstacle": "repulsion from obstacle",
+        "force_repulsion_robots": "robot repulsion",
+        "force_repulsion_obstacle": "obstacle repulsion",
         "force_viscosity": "viscosity",
         "force_resultant": "resultant force",
     }
