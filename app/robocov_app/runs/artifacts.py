@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from robocov.compiled import compile_kernels
 from robocov.controllers import controller_kind, gains_of
 from robocov.cost import CoverageCost, MomentaryCost
-from robocov.errors import ParameterError, unknown_name
+from robocov.errors import ParameterError, counted, unknown_name
 from robocov.files.result_folder import Kind, results
 from robocov_app.figures.coverage import Moment, plot_coverage
 from robocov_app.figures.curves import Curve
@@ -120,9 +120,14 @@ def save_pictures(
     finals = [float(run.history.mean_distance[-1]) for run in runs]
     film = options.film
     theme, size = film.colour_theme, film.picture_size()
-    curves = [
-        (run.record.label, run.record.controller, run.history.time, run.history.mean_distance) for run in runs
-    ]
+
+    def curves(kind: str) -> list[Curve]:
+        values = [getattr(run.history, kind) for run in runs]
+        return [
+            (run.record.label, run.record.controller, run.history.time, value)
+            for run, value in zip(runs, values, strict=True)
+            if value is not None and (kind == "mean_distance" or np.isfinite(value).any())
+        ]
 
     def trajectories() -> Figure:
         if comparison:
@@ -130,11 +135,18 @@ def save_pictures(
         return plot_trajectories(records[0], None, theme, film.colours, size, finals[0], times[0])
 
     def costs() -> Figure:
-        n = len(records[0].team)
-        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {n} robot{'s' if n > 1 else ''}"
-        return plot_coverage(curves, last_moments(runs, cost), theme, size, title, time_curves(runs))
+        robots = counted(len(records[0].team), "robot")
+        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {robots}"
+        moments = last_moments(runs, cost)
+        return plot_coverage(curves("mean_distance"), moments, theme, size, title, curves("mean_time"))
 
-    save_figures(folder, {"trajectories": trajectories, "cost": costs}, quiet=options.json)
+    with progress("pictures", 4, quiet=options.json) as update:
+        done = counting(update)
+        for stem, draw in (("trajectories", trajectories), ("cost", costs)):
+            figure = draw()
+            for suffix in (".png", ".svg"):
+                save_figure(figure, folder / (stem + suffix))
+                done()
 
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
@@ -150,33 +162,13 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
             drawn = record.environment
             cost = built_cost(drawn, cost.lattice, quiet=True)
         momentary, time = MomentaryCost(cost), float(record.time[-1])
-        counted = momentary.counted(time, record.positions[-1], record.working[-1])
-        if not counted.any():
+        working = momentary.counted(time, record.positions[-1], record.working[-1])
+        if not working.any():
             continue
-        now, rows = momentary.at(time), np.flatnonzero(counted)
+        now, rows = momentary.at(time), np.flatnonzero(working)
         field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
-        some = None if counted.all() else rows
+        some = None if working.all() else rows
         moments.append(
             Moment.last_of(record, field, float(run.history.mean_distance[-1]), some, run.final_time)
         )
     return moments
-
-
-def time_curves(runs: Sequence[Run]) -> list[Curve]:
-    """Return the curves of the mean time of runs; none where robots are equally fast, or none worked."""
-    return [
-        (run.record.label, run.record.controller, run.history.time, run.history.mean_time)
-        for run in runs
-        if run.history.mean_time is not None and np.isfinite(run.history.mean_time).any()
-    ]
-
-
-def save_figures(folder: Path, figures: Mapping[str, Callable[[], Figure]], *, quiet: bool) -> None:
-    """Draw each figure and write it as PNG and SVG under its name."""
-    with progress("pictures", 2 * len(figures), quiet=quiet) as update:
-        done = counting(update)
-        for stem, draw in figures.items():
-            figure = draw()
-            for suffix in (".png", ".svg"):
-                save_figure(figure, folder / (stem + suffix))
-                done()

@@ -56,10 +56,8 @@ def draw_distances(
     from robocov_app.figures.files import save_figure
     from robocov_app.render.distance_field import Field, FieldLattice
 
-    team, field = (
-        Team.homogeneous(len(positions), radius=radius),
-        Field(FieldLattice(cost.sites), cost(positions, speeds)),
-    )
+    team = Team.homogeneous(len(positions), radius=radius)
+    field = Field(FieldLattice(cost.sites), cost(positions, speeds))
     facts = f"{counted(len(team), 'robot')}, {mean}"
     moment = Moment(cost.environment, team, field, cost.environment.name, facts)
     save_figure(plot_coverage([], [moment], theme, title=title), path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,9 +40,6 @@ FILM_SCALE = 1.3
 FILMS = "run.mp4", "comparison.mp4"  # of one run, of several side by side
 FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
-Costs: TypeAlias = "tuple[Array, Array] | tuple[Array, Array, Array]"
-"""Times, s, and mean distances, m; and mean times, s, where robots are not equally fast."""
-
 
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
     """Return which row of a record of ascending times, (T,) s, each frame shows.
@@ -67,7 +64,7 @@ def iter_frames(
     size: tuple[int, int] = (1280, 720),
     layers: Sequence[Layer] | None = None,
     scale: float | None = None,
-    cost: Costs | None = None,
+    cost: CostHistory | None = None,
     rows: IntArray | None = None,
     fields: Fields | None = None,
 ) -> Iterator[Frame]:
@@ -75,7 +72,7 @@ def iter_frames(
 
     `size`: (width, height) in px. `layers`: from the lowest to the topmost, `standard_layers` by default.
     `scale`: of text and lines, by default what suits the size. `cost`: of which each frame tells the latest
-    known, see `told_costs`. `rows`: of the record, by default those of `frame_rows`. `fields`: what layers of
+    known. `rows`: of the record, by default those of `frame_rows`. `fields`: what layers of
     distances draw.
     """
     painter = _painter(record, film, size, layers or standard_layers(film.colours), scale)
@@ -98,18 +95,12 @@ def _painter(
     return painter
 
 
-def told_costs(history: CostHistory) -> Costs:
-    """Return of a cost history what frames tell."""
-    if history.mean_time is None:
-        return history.time, history.mean_distance
-    return history.time, history.mean_distance, history.mean_time
-
-
-def _cost_text(what: str, time: float, cost: Costs | None) -> str:
+def _cost_text(what: str, time: float, cost: CostHistory | None) -> str:
     if cost is None:
         return ""
-    known = int(np.searchsorted(cost[0], time + 5e-7, side="right")) - 1
-    return cost_label(what, *(values[known] for values in cost[1:])) if known >= 0 else ""
+    known = int(np.searchsorted(cost.time, time + 5e-7, side="right")) - 1
+    mean_time = None if cost.mean_time is None else cost.mean_time[known]
+    return cost_label(what, cost.mean_distance[known], mean_time) if known >= 0 else ""
 
 
 class PaneLayout(NamedTuple):
@@ -172,7 +163,7 @@ def pane_layout(
 
 def comparison_frames(
     records: Sequence[Record],
-    costs: Sequence[Costs],
+    costs: Sequence[CostHistory],
     layout: PaneLayout,
     film: FilmOptions,
     *,
@@ -258,7 +249,7 @@ def save_moving(
     if not (film.frames or film.video):
         return
     fields = film_fields(bare or runs, cost, film, quiet=quiet)
-    records, costs = [run.record for run in runs], [told_costs(run.history) for run in runs]
+    records, costs = [run.record for run in runs], [run.history for run in runs]
     rows = frame_rows(max(records, key=len).time, film.fps, film.film_speed, FILM_HOLD)
     if len(runs) == 1:
         frames = iter_frames(records[0], film, size=film.film_size(), cost=costs[0], rows=rows, fields=fields)

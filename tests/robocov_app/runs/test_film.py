@@ -4,16 +4,22 @@ import numpy as np
 import pytest
 from drawn_run import CORRIDOR, ROOMS, SHAFT, run_of
 
+from robocov.metrics import CostHistory
 from robocov_app.render.picture import pane_layers
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.runs.film import comparison_frames, frame_rows, iter_frames, pane_layout, tiled
 from robocov_app.runs.options import FilmOptions
 
 
+def known(record):
+    one = np.array([1.0])
+    return CostHistory(record.time[:1], one, one, one)
+
+
 def film(records, theme="light", colours="robots", size=None, speed=4.0):
     style = FilmOptions(theme=theme, colours=colours, fps=5, film_speed=speed)
     layout = pane_layout(records, style, size)
-    costs = [(record.time[:1], np.array([1.0])) for record in records]
+    costs = [known(record) for record in records]
     return layout, comparison_frames(records, costs, layout, style)
 
 
@@ -76,7 +82,7 @@ class TestFrames:
         for records in ([first, second], [second, first]):
             layout, frames = film(records, size=(1280, 640))
             style, layers = FilmOptions(fps=5), pane_layers("robots")
-            cost = records[1].time[:1], np.array([1.0])
+            cost = known(records[1])
             alone = iter_frames(
                 records[1], style, layers=layers, cost=cost, size=layout.pane, scale=layout.scale
             )

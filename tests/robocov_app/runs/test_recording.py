@@ -17,7 +17,7 @@ from hypothesis.extra.numpy import arrays
 
 from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
-from robocov_app.runs.film import frame_rows, iter_frames, told_costs
+from robocov_app.runs.film import frame_rows, iter_frames
 from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import png_bytes, save_film, save_moving_picture
 from robocov_app.viewer.film import Film
@@ -77,7 +77,8 @@ class TestFrames:
         rows = np.array([10])
 
         def shown(times, values):
-            cost = (np.array(times), np.array(values)) if times else None
+            mean = np.array(values)
+            cost = CostHistory(np.array(times), mean, mean, mean) if times else None
             return next(iter_frames(record, FilmOptions(), size=(480, 240), rows=rows, cost=cost)).tobytes()
 
         known = shown([0.0, 1.0, 1.5], [3.0, 2.0, 1.0])
@@ -91,8 +92,7 @@ class TestFrames:
         time, mean = np.array([0.0]), np.array([3.0])
         histories = [CostHistory(time, mean, mean, mean, other) for other in (None, mean, 2.0 * mean)]
         frames = [
-            next(iter_frames(record, FilmOptions(), cost=told_costs(each), **options)).tobytes()
-            for each in histories
+            next(iter_frames(record, FilmOptions(), cost=each, **options)).tobytes() for each in histories
         ]
         assert len(set(frames)) == 3
 
