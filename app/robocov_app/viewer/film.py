@@ -27,22 +27,10 @@ _WAITING = 45
 class Film:
     """Writes frames to an MP4 film.
 
-    The encoder is a process of its own, which ends the film properly when its input ends, however that
-    comes about.
-
-    Parameters
-    ----------
-    path : Path
-        Not there yet.
-    size : (width, height), px
-        Of the film; frames of other sizes are fitted in.
-    patient : bool
-        Wait for the encoder instead of leaving frames out.
-
-    Raises
-    ------
-    OutputError
-        When there is no encoder, or the folder cannot be made.
+    The encoder is a process of its own, which ends the film properly when its input ends, however that comes
+    about. `path`: not there yet. `size`, (width, height) px: of the film; frames of other sizes are fitted
+    in. `patient`: wait for the encoder instead of leaving frames out. Raises OutputError when there is no
+    encoder, or the folder cannot be made.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, patient: bool = False) -> None:
@@ -89,13 +77,7 @@ class Film:
             self.frames += 1
 
     def close(self) -> None:
-        """End the film; wait until it is written.
-
-        Raises
-        ------
-        OutputError
-            When the encoder failed.
-        """
+        """End the film; wait until it is written. Raises OutputError when the encoder failed."""
         self._queue.put(None)
         self._thread.join()
         if self._process.wait() != 0:

@@ -87,16 +87,8 @@ def holds(condition: ConditionModel, session: Session) -> bool:
 class LessonPlayer:
     """Plays the chapters of a lesson on a desk, and gives it its own session back.
 
-    Attributes
-    ----------
-    number : int
-        Which chapter is played, from 0.
-    state : str
-        ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
-    answer : int or None
-        What was answered, from 1.
-    alone : bool
-        Nobody is there to answer or to do tasks, as in a film.
+    `number`: which chapter is played, from 0. `state`: ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
+    `answer`: what was answered, from 1. `alone`: nobody is there to answer or to do tasks, as in a film.
     """
 
     def __init__(

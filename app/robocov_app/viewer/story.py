@@ -85,17 +85,8 @@ def _apply(run: Lockstep, node: Node) -> None:
 class Part:
     """A stretch of a story with the same map, team and controllers in all panes.
 
-    Attributes
-    ----------
-    node : Node
-    begin : int
-        Step.
-    setups : dict of pane to Circumstances
-    recorders : dict of pane to Recorder
-    touched : list of [begin, end, robot]
-        Steps between which a robot was moved by hand.
-    scenes : list of Scene
-        Of its beginning, and at the end of the story of that, one for each pane: what a legend explains.
+    `begin`: step. `touched`: steps between which a robot was moved by hand. `scenes`: of its beginning, and
+    at the end of the story of that, one for each pane: what a legend explains.
     """
 
     node: Node

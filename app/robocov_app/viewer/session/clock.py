@@ -46,16 +46,9 @@ def speed_index(speed: float) -> int:
 class Clock:
     """Turns seconds that have passed into steps.
 
-    Attributes
-    ----------
-    dt : float, s
-        Control period.
-    speed : float
-        Simulated seconds per second.
-    budget : float, s
-        So long the steps of one frame may take, infinite to make them all whatever they take.
-    behind : bool
-        Whether the last frame's steps were more than its budget.
+    `dt`, s: control period. `speed`: simulated seconds per second. `budget`, s: so long the steps of one
+    frame may take, infinite to make them all whatever they take. `behind`: whether the last frame's steps
+    were more than its budget.
     """
 
     dt: float

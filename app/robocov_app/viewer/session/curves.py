@@ -21,12 +21,7 @@ MOST_SAMPLES = 3000
 class Event:
     """Something that happened.
 
-    Attributes
-    ----------
-    time : float, s
-    kind : str
-        ``obstacle``, ``robot``, ``failure``, ``law``, ``limits`` or ``hand``.
-    text : str
+    `time` in s. `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ``limits`` or ``hand``.
     """
 
     time: float
@@ -111,18 +106,8 @@ class Curve:
 class Ghost:
     """The rest of a curve that was left when the run was resumed from an earlier moment.
 
-    Attributes
-    ----------
-    law : str
-        Name of the controller.
-    words : str
-        What was different then.
-    time : (k,) s
-    value : (k,) m or s
-    of : str
-        What the value is: "distance" or "time".
-    node : int
-        Of the document, at whose end the branch ends.
+    `law`: name of the controller. `words`: what was different then. `time`: (k,) s. `value`: (k,) m or s.
+    `of`: what the value is: "distance" or "time". `node`: of the document, at whose end the branch ends.
     """
 
     law: str
@@ -134,15 +119,7 @@ class Ghost:
 
 
 class Plotted(NamedTuple):
-    """What can be plotted.
-
-    Attributes
-    ----------
-    name : str
-    title, short : str
-        As people call it.
-    unit : str
-    """
+    """What can be plotted. `title`, `short`: as people call it."""
 
     name: str
     title: str

@@ -26,25 +26,11 @@ MOST_KEPT = 160
 class Node:
     """One touch, and the time that passed after it until the next.
 
-    Attributes
-    ----------
-    number : int
-    parent : Node or None
-    at : int
-        Step of the parent's time at which it was made.
-    kind, words : str
-        As of an `Event`.
-    changes : list of (step, Change)
-        What the touch consists of, in its own time.
-    end : int
-        Step up to which the run has come.
-    name : str
-        What people call the branch that ends here; empty for none.
-    redo : Node or None
-        The child that was left by undo.
-    kept, curves, controllers, happenings
-        Remembered while another branch is shown: moments, cost curves by pane and kind, controllers of the
-        panes, who failed and joined by itself. It can be made again, and is in no file.
+    `at`: step of the parent's time at which it was made. `kind`, `words`: as of an `Event`. `changes`: what
+    the touch consists of, in its own time. `end`: step up to which the run has come. `name`: what people call
+    the branch that ends here; empty for none. `redo`: the child that was left by undo. `kept`, `curves`,
+    `controllers`, `happenings`: remembered while another branch is shown: moments, cost curves by pane and
+    kind, controllers of the panes, who failed and joined by itself. It can be made again, and is in no file.
     """
 
     number: int
@@ -81,13 +67,7 @@ class Node:
 class Branch(NamedTuple):
     """A story that can be gone back to: the end of a node after which nothing else was done.
 
-    Attributes
-    ----------
-    node : Node
-    end : int
-        Its last step.
-    words : str
-        What people call it, or else its newest touch.
+    `end`: its last step. `words`: what people call it, or else its newest touch.
     """
 
     node: Node

@@ -303,17 +303,7 @@ class SessionModel(_Model, title="robocov session"):
 
 @dataclass(frozen=True, eq=False)
 class SavedSession:
-    """What a session file holds.
-
-    Attributes
-    ----------
-    document : Document
-    head : Node
-    step : int
-        The present.
-    view : dict
-        What is shown, and how.
-    """
+    """What a session file holds. `step`: the present. `view`: what is shown, and how."""
 
     document: Document
     head: Node

@@ -40,18 +40,10 @@ _KEPT = 0.75
 class Circumstances:
     """What stays as it is from one touch to the next.
 
-    Attributes
-    ----------
-    environment : Environment
-        The map as it is, without robots that failed.
-    law : Law
-    limits : Limits
-    numbers : (n,) int
-        What people call the robots that work, in the order of the rows.
-    failed : dict of number to (x, y) m
-        Robots that stand where they failed.
-    conditions : Conditions or None
-        What goes wrong with messages and sensors; None: nothing. Failing and joining is not among it.
+    `environment`: the map as it is, without robots that failed. `numbers`, (n,) int: what people call the
+    robots that work, in the order of the rows. `failed`, (x, y) m each: robots that stand where they failed.
+    `conditions`: what goes wrong with messages and sensors; None: nothing. Failing and joining is not among
+    it.
     """
 
     environment: Environment
@@ -87,16 +79,9 @@ def _with_wrecks(
 class State(NamedTuple):
     """One pane at one moment.
 
-    Attributes
-    ----------
-    circumstances : Circumstances
-    positions, velocities : (n, 2) m and m/s
-    memory : object
-        What the controller remembered; None where it can do without.
-    recorded : Decision or None
-        What was decided then, where it comes from a record.
-    inbox : Inbox or None
-        The messages that the robots had; None where they know the others as they are.
+    `positions`, `velocities`: (n, 2) m and m/s. `memory`: what the controller remembered; None where it can
+    do without. `recorded`: what was decided then, where it comes from a record. `inbox`: the messages that
+    the robots had; None where they know the others as they are.
     """
 
     circumstances: Circumstances
@@ -110,17 +95,9 @@ class State(NamedTuple):
 class Moment(NamedTuple):
     """All panes at one moment: enough to go on from there, bit for bit.
 
-    Attributes
-    ----------
-    step : int
-        Steps since the start.
-    states : dict of pane to State
-    scenario : Scenario or None
-        Controllers, limits and map as they were last chosen; None in the past of a record.
-    hand : (number, (x, y) m) or None
-        The robot that is dragged, and where to.
-    node : int
-        Node of the document in whose time it is.
+    `step`: steps since the start. `scenario`: controllers, limits and map as they were last chosen; None in
+    the past of a record. `hand`, (number, (x, y) m) or None: the robot that is dragged, and where to. `node`:
+    node of the document in whose time it is.
     """
 
     step: int
@@ -133,14 +110,9 @@ class Moment(NamedTuple):
 class History:
     """Moments in their order.
 
-    When they would take more than `most_bytes`, the older ones are thinned: of those that have grown old
-    only every second step stays, of still older ones every fourth, and so on. The newest all stay, and so
-    do, unless they are too many themselves, those since which something was touched.
-
-    Parameters
-    ----------
-    dt : float, s
-    most_bytes : int
+    When they would take more than `most_bytes`, the older ones are thinned: of those that have grown old only
+    every second step stays, of still older ones every fourth, and so on. The newest all stay, and so do,
+    unless they are too many themselves, those since which something was touched. `dt` in s.
     """
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:

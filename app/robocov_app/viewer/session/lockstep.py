@@ -49,15 +49,9 @@ class Happening(NamedTuple):
 class Lockstep:
     """Panes that begin as a scenario says; StartError, ParameterError when they cannot.
 
-    Attributes
-    ----------
-    scenario : Scenario
-        What the run began with; controllers, gains, limits and the map as they were last chosen.
-    panes : list of Lane
-    step : int
-        Control steps since the beginning.
-    hand : (number, (x, y) m) or None
-        The robot that is dragged, and where to.
+    `scenario`: what the run began with; controllers, gains, limits and the map as they were last chosen.
+    `step`: control steps since the beginning. `hand`, (number, (x, y) m) or None: the robot that is dragged,
+    and where to.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -111,9 +105,7 @@ class Lockstep:
     def apply(self, change: Change) -> None:
         """Carry a change out; when that cannot be, an error says why, and nothing has changed.
 
-        Raises
-        ------
-        StartError, ParameterError, MapError
+        Raises StartError, ParameterError, MapError.
         """
         match change:
             case Drag(robot, to):

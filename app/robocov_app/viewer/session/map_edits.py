@@ -116,13 +116,7 @@ def words_for(obstacle: Obstacle) -> str:
 
 
 def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
-    """Return the polygon with these corners.
-
-    Raises
-    ------
-    MapError
-        When they are too few, or enclose nothing.
-    """
+    """Return the polygon with these corners. Raises MapError when they are too few, or enclose nothing."""
     ring = _rounded(points)
     if len(ring) > 2 and ring[0] == ring[-1]:
         ring = ring[:-1]
@@ -134,13 +128,7 @@ def polygon_of(points: list[tuple[float, float]]) -> PolygonObstacle:
 
 
 def wall_of(points: list[tuple[float, float]], width: float) -> WallObstacle:
-    """Return the wall along these points.
-
-    Raises
-    ------
-    MapError
-        When it has no length.
-    """
+    """Return the wall along these points. Raises MapError when it has no length."""
     line = _rounded(points)
     if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
@@ -148,13 +136,7 @@ def wall_of(points: list[tuple[float, float]], width: float) -> WallObstacle:
 
 
 def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleObstacle:
-    """Return the circle round `center` through `rim`.
-
-    Raises
-    ------
-    MapError
-        When it has no size.
-    """
+    """Return the circle round `center` through `rim`. Raises MapError when it has no size."""
     radius = float(np.hypot(rim[0] - center[0], rim[1] - center[1]))
     if radius < SHORTEST:
         raise MapError("a circle needs a radius: drag from its middle to its rim")

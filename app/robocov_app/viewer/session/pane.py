@@ -31,14 +31,7 @@ SENSED_EVERY = 3
 
 
 class Wanted(NamedTuple):
-    """How a lane is to go on.
-
-    Attributes
-    ----------
-    circumstances : Circumstances
-    positions, velocities : (n, 2) m and m/s, or None
-        By default the present ones.
-    """
+    """How a lane is to go on. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
 
     circumstances: Circumstances
     positions: Array | None = None
@@ -83,10 +76,7 @@ class Lane:
     def decide(self) -> Decision:
         """Let the controller decide on the present, which the next step carries out.
 
-        Raises
-        ------
-        ParameterError
-            When it fails.
+        Raises ParameterError when it fails.
         """
         return self.simulation.snapshot.decision
 
@@ -111,14 +101,8 @@ class Lane:
     def changed(self, wanted: Wanted) -> Simulation:
         """Return the simulation that goes on from here as wanted; the lane stays as it is.
 
-        Robots that do not fit any more are pushed out of what is in the way.
-
-        Raises
-        ------
-        StartError
-            When there is no room for a robot.
-        ParameterError
-            When the controller or the team does not take a value.
+        Robots that do not fit any more are pushed out of what is in the way. Raises StartError when there is
+        no room for a robot; ParameterError when the controller or the team does not take a value.
         """
         old, circumstances = self.simulation, wanted.circumstances
         environment, team = circumstances.solid, circumstances.team
@@ -221,10 +205,7 @@ def _fitted(
 ) -> Simulation:
     """Return what `make` makes of (n, 2) m and m/s; robots that do not fit come to rest where they do.
 
-    Raises
-    ------
-    StartError
-        When there is no room for a robot.
+    Raises StartError when there is no room for a robot.
     """
     try:
         return make(positions, velocities)

@@ -29,10 +29,7 @@ if TYPE_CHECKING:
 class Past:
     """Explains states; it keeps what many of them have in common.
 
-    Attributes
-    ----------
-    dt : float, s
-        The control period, which messages and noise depend on.
+    `dt`, s: the control period, which messages and noise depend on.
     """
 
     def __init__(self, dt: float = DEFAULT_DT) -> None:
@@ -41,13 +38,7 @@ class Past:
         self._explaining = lru_cache(maxsize=8)(_Explaining)
 
     def snapshot(self, state: State, time: float) -> Snapshot:
-        """Return the moment as it was; a controller that fails on it decided nothing.
-
-        Parameters
-        ----------
-        state : State
-        time : float, s
-        """
+        """Return the moment as it was; a controller that fails on it decided nothing. `time` in s."""
         return self._explaining(state.circumstances, self.dt).snapshot(state, time)
 
 

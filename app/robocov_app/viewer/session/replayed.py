@@ -41,12 +41,7 @@ _OF_A_MOMENT = 1500
 class LostLaw(Law):
     """A controller that is not loaded, or does not take its gains: its runs can be looked at.
 
-    Attributes
-    ----------
-    title : str
-        What people called it.
-    reason : str
-        Why it cannot be had.
+    `title`: what people called it. `reason`: why it cannot be had.
     """
 
     title: str = ""
@@ -63,13 +58,7 @@ class LostLaw(Law):
         return {}
 
     def made(self) -> Controller:
-        """Say that there is no such controller.
-
-        Raises
-        ------
-        ParameterError
-            Always.
-        """
+        """Say that there is no such controller. Raises ParameterError always."""
         raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
 
 
@@ -100,19 +89,9 @@ class _Nobody:
 def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) -> Session:
     """Return a session whose past is a saved run, or the runs of a comparison side by side.
 
-    Its beginning is looked at, and it plays.
-
-    Parameters
-    ----------
-    saved : sequence of Saved
-    controllers : sequence of str
-        Those that may be loaded beside the built-in ones, so that their runs can be gone on with: names
-        that the user has typed, never ones of the runs themselves.
-
-    Raises
-    ------
-    InputError
-        When the runs do not go together, or are none that the window can show.
+    Its beginning is looked at, and it plays. `controllers`: those that may be loaded beside the built-in
+    ones, so that their runs can be gone on with: names that the user has typed, never ones of the runs
+    themselves. Raises InputError when the runs do not go together, or are none that the window can show.
     """
     saved = [each._replace(record=_paced(each.record)) for each in saved]
     records = [each.record for each in saved]

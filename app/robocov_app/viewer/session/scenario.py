@@ -37,25 +37,14 @@ MOST_PANES = 4
 class Law:
     """A controller as the user chose it.
 
-    Attributes
-    ----------
-    name : str
-        As `make_controller` takes it.
-    gains : dict of name to value
-        Those that differ from their defaults.
+    `name`: as `make_controller` takes it. `gains`: those that differ from their defaults.
     """
 
     name: str
     gains: Mapping[str, Value] = field(default_factory=dict)
 
     def made(self) -> Controller:
-        """Return the controller.
-
-        Raises
-        ------
-        ParameterError
-            As `make_controller`.
-        """
+        """Return the controller. Raises ParameterError as `make_controller`."""
         return make_controller(self.name, self.gains)
 
     # kept, for to look at a controller in a file is to run that file
@@ -77,10 +66,7 @@ class Law:
     def with_gain(self, gain: str, value: Value) -> Law:
         """Return the law with another value of one gain.
 
-        Raises
-        ------
-        ParameterError
-            When there is no such gain, or the value is out of range.
+        Raises ParameterError when there is no such gain, or the value is out of range.
         """
         gains = {**self.gains, gain: value}
         replace(self, gains=gains).made()
@@ -109,12 +95,9 @@ def _said(value: Value) -> str:
 class Limits:
     """What each robot of the team is and can do; SI units, infinite for no limit.
 
-    Attributes
-    ----------
-    radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range
-        As `Team` has them.
-    different : tuple of (name, ((number, value), ...))
-        Parameters in which robots differ, with the values of those that have one of their own.
+    `radius`, `mass`, `max_speed`, `max_acceleration`, `viscosity`, `sensing_range`, `communication_range`: as
+    `Team` has them. `different`: parameters in which robots differ, with the values of those that have one of
+    their own.
     """
 
     radius: float = 0.1
@@ -129,10 +112,7 @@ class Limits:
     def team(self, robots: int | Sequence[int]) -> Team:
         """Return a team of so many robots, or of those with such numbers.
 
-        Raises
-        ------
-        ParameterError
-            When a value is out of range.
+        Raises ParameterError when a value is out of range.
         """
         numbers = range(1, robots + 1) if isinstance(robots, int) else robots
         team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
@@ -164,25 +144,10 @@ class Limits:
 class Scenario:
     """What a run begins with; immutable.
 
-    Attributes
-    ----------
-    environment : Environment
-    laws : tuple of Law
-        One for each pane.
-    robots : int
-    start : str or None
-        Named start of the map, its first by default.
-    seed : int
-        Of the starts.
-    limits : Limits
-    dt : float, s
-        Control period.
-    given : (n, 2) m or None
-        Starts that come from somewhere else, as from a saved run.
-    moving : (n, 2) m/s or None
-        Velocities there; at rest by default.
-    conditions : Conditions or None
-        What goes wrong, and when robots fail and join by themselves.
+    `laws`: one for each pane. `start`: named start of the map, its first by default. `seed`: of the starts.
+    `dt`, s: control period. `given`, (n, 2) m or None: starts that come from somewhere else, as from a saved
+    run. `moving`, (n, 2) m/s or None: velocities there; at rest by default. `conditions`: what goes wrong,
+    and when robots fail and join by themselves.
     """
 
     environment: Environment
@@ -217,13 +182,7 @@ class Scenario:
         return self.environment.start(self.start).name
 
     def positions(self) -> Array:
-        """Return the starts, (robots, 2) m.
-
-        Raises
-        ------
-        StartError
-            When there is no room for the team.
-        """
+        """Return the starts, (robots, 2) m. Raises StartError when there is no room for the team."""
         if self.given is not None:
             return self.given
         start = self.environment.start(self.start)

@@ -75,25 +75,10 @@ class Session:
     """What is going on in the window; StartError, ParameterError when the scenario cannot be begun.
 
     What touches it goes on from the moment that is looked at. What cannot be is refused with an error, and
-    nothing has changed then.
-
-    Attributes
-    ----------
-    document : Document
-    head : Node
-        Where in the document the present is.
-    playing : bool
-    clock : Clock
-    stop_when_settled : bool
-    settled : bool
-        Whether no robot has got anywhere for a while.
-    recorded_until : float or None, s
-        Up to there the run is a record; None where there is none.
-    history : History
-    serial : int
-        Grows when what is known of times so far does not hold any more.
-    revision : int
-        Grows with every touch.
+    nothing has changed then. `head`: where in the document the present is. `settled`: whether no robot has
+    got anywhere for a while. `recorded_until`, s: up to there the run is a record; None where there is none.
+    `serial`: grows when what is known of times so far does not hold any more. `revision`: grows with every
+    touch.
     """
 
     def __init__(self, scenario: Scenario) -> None:

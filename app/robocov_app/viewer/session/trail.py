@@ -20,12 +20,7 @@ MOST_ROWS = 4096
 
 
 class Trail:
-    """Positions at ascending times, for the robots that work now; bounded.
-
-    Parameters
-    ----------
-    n : int
-    """
+    """Positions at ascending times, for the robots that work now; bounded."""
 
     def __init__(self, n: int) -> None:
         self._rows = np.empty((64, n, 2))

@@ -36,14 +36,7 @@ class Recovered(NamedTuple):
 
 
 class Workspace:
-    """The file of the session that is open.
-
-    Attributes
-    ----------
-    session : Session
-    path : Path or None
-        Its file; None if it never had one.
-    """
+    """The file of the session that is open. `path`: its file; None if it never had one."""
 
     def __init__(
         self, session: Session, folder: Path | None, path: Path | None = None, resumed: Path | None = None
