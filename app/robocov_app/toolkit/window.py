@@ -6,6 +6,7 @@ import gc
 import os
 import sys
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -31,7 +32,7 @@ PAUSE = 0.1
 """Seconds between two looks for something new, at most, while it waits."""
 
 
-class BaseWindow:
+class BaseWindow(ABC):
     """A window that is drawn while something moves, and otherwise only when something is different.
 
     A window of its own kind has `take`, `update`, `draw` and `look`.
@@ -47,21 +48,21 @@ class BaseWindow:
         self._touched = False
         self._drawn: object = None
 
+    @abstractmethod
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
-        raise NotImplementedError
 
+    @abstractmethod
     def update(self, seconds: float) -> None:
         """Let so many seconds pass."""
-        raise NotImplementedError
 
+    @abstractmethod
     def draw(self) -> None:
         """Draw everything, and show it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
-        raise NotImplementedError
 
     def close(self) -> None:
         """End what is going on beside the window."""

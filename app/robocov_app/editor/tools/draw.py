@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 from itertools import pairwise
 from math import copysign
@@ -50,9 +50,9 @@ class DrawTool(Tool, ABC):
         self._pressed: Point = (0.0, 0.0)
         self._dragging = False
 
-    @abstractmethod
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
-        """Return what the points make."""
+    def made(self, context: ToolContext, points: Sequence[Point]) -> Change | None:
+        """Return what the points make of the map."""
+        return None
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
@@ -125,7 +125,9 @@ class DrawTool(Tool, ABC):
             points.append(self.at)
         if len(points) < self.least:
             raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
-        context.change(self.made(context, points))
+        change = self.made(context, points)
+        if change is not None:
+            context.change(change)
         return True
 
     def back(self, context: ToolContext) -> bool:
@@ -195,9 +197,6 @@ class MeasureTool(DrawTool):
     def __init__(self) -> None:
         super().__init__()
         self._kept: tuple[Point, ...] = ()
-
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
-        raise NotImplementedError
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         self._kept = ()
