@@ -64,6 +64,7 @@ class BaseWindow(ABC):
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
 
+    @abstractmethod
     def close(self) -> None:
         """End what is going on beside the window."""
 
