@@ -31,6 +31,9 @@ class Counting(BaseWindow):
     def draw(self) -> None:
         self.drawn += 1
 
+    def close(self) -> None:
+        pass
+
     def look(self) -> object:
         return None if self.shows == "moves" else self.shows
 
