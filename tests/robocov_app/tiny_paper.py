@@ -9,9 +9,8 @@ import pytest
 
 from robocov.errors import OutputError
 from robocov.files.atomic import locked
-from robocov_app.replication.beyond_plan import BeyondPlan
-from robocov_app.replication.plan import Plan
-from robocov_app.replication.studying import Means
+from robocov_app.replication.plan import BeyondPlan, Plan
+from robocov_app.replication.running import RunnerOptions
 from robocov_app.terminal.interruption import Interruption
 
 TINY = Plan(
@@ -29,32 +28,32 @@ TINY = Plan(
     convex_seeds=(0,),
     restarts=2,
     lattice=16,
+    beyond=BeyondPlan(
+        bundled=None,
+        generated=None,
+        starts=("corner",),
+        tuning=(101,),
+        seeds=(0,),
+        own_seeds=(0,),
+        shared_seeds=(0,),
+        unseen=(201,),
+        maps=(1, 2),
+        map_starts=("corner",),
+        conditions_maps=("rooms",),
+        conditions_seeds=1,
+        conditions_duration=3.0,
+        probe=2.0,
+        worst=1,
+        warm_up=1,
+        blocks=2,
+        large=8,
+        huge=10,
+    ),
 )
 
 
-TINY_BEYOND = BeyondPlan(
-    bundled=None,
-    generated=None,
-    starts=("corner",),
-    tuning=(101,),
-    seeds=(0,),
-    own_seeds=(0,),
-    shared_seeds=(0,),
-    unseen=(201,),
-    maps=(1, 2),
-    map_starts=("corner",),
-    conditions_maps=("rooms",),
-    conditions_seeds=1,
-    conditions_duration=3.0,
-    probe=2.0,
-    worst=1,
-    warm_up=1,
-    blocks=2,
-)
-
-
-def means(workers: int = 2) -> Means:
-    return Means(workers=workers, scheduler=None, quiet=True, stop=Interruption())
+def options(workers: int = 2) -> RunnerOptions:
+    return RunnerOptions(workers=workers, scheduler=None, quiet=True, stop=Interruption())
 
 
 @contextmanager

@@ -161,7 +161,8 @@ def jobs_of(options: Arguments) -> list[Job]:
         seeds = range(options.seed, options.seed + (options.count or 1))
         digits = len(str(seeds[-1]))
         return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
-    from robocov_app.replication.plan import FULL, QUICK, claim_maps, convex_maps, tuning_maps
+    from robocov_app.replication.plan import FULL, QUICK
+    from robocov_app.replication.studies import claim_maps, convex_maps, tuning_maps
 
     plan = FULL if options.study == "full" else QUICK
     maps, bundled = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan)), bundled_maps()

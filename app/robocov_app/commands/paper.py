@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,10 +16,8 @@ from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.replication.figures import Shown
-    from robocov_app.replication.studying import Forecast, Means
+    from robocov_app.replication.running import Forecast, RunnerOptions
     from robocov_app.replication.verdicts import Claim
-
 
 _MOST_WORKERS = 1024
 
@@ -76,77 +74,61 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> int:
     """Run the study and write all that comes of it."""
-    from robocov_app.replication.asking import asked
-    from robocov_app.replication.beyond import forecast_beyond, studied_beyond
-    from robocov_app.replication.beyond_writing import beyond_claims, save_beyond_page, save_beyond_pictures
+    from robocov_app.replication import beyond_claims, claims, pages, results
     from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.studying import (
-        Means,
-        Stopped,
-        begun,
-        first_record,
-        forecast,
-        studied,
-        studied_figures,
-        together,
-    )
-    from robocov_app.replication.writing import save_claims, save_page, save_pictures
+    from robocov_app.replication.running import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite
 
     plan = QUICK if options.quick else FULL
     out, quiet = options.out, options.json
-    begun(out, plan)
-    workers = options.workers or processors()
-    claims: Sequence[Claim] = ()
-    more: Sequence[Claim] = ()
-    material = beyond = None
-    wanted = plan.beyond is not None and not (options.figures_only or options.without_beyond)
-    alone = options.beyond_only
+    open_folder(out, plan)
+    with_claims = not (options.figures_only or options.beyond_only)
+    with_beyond = not (options.figures_only or options.without_beyond)
+    found: tuple[Claim, ...] = ()
+    more: tuple[Claim, ...] = ()
+    paper = beyond = None
     with Interruption() as stop:
-        means = Means(workers, options.scheduler, quiet, stop, options.keep_versions)
+        runner = RunnerOptions(
+            options.workers or processors(), options.scheduler, quiet, stop, options.keep_versions
+        )
         if not quiet:
-            expected = [forecast(out, plan, workers, figures_only=options.figures_only or alone)]
-            if wanted:
-                expected.append(forecast_beyond(out, plan, workers, alone=alone))
-            _announce(together(expected), plan.name, means)
+            expected = forecast(out, plan, runner.workers, claims=with_claims, beyond=with_beyond)
+            _announce(expected, plan.name, runner)
         try:
-            runs: Mapping[str, Shown]
-            if options.figures_only or alone:
-                runs = studied_figures(out, plan, means)
-            else:
-                material = studied(out, plan, means)
-                runs = material.figures
-                claims = asked(material.convex, material.claims, material.gains)
-                save_claims(out, claims)
-            if wanted:
-                beyond = studied_beyond(out, plan, means, material)
-                more = beyond_claims(beyond)
-                save_claims(out, [*claims, *more])
-            first = first_record()
-            images = save_pictures(out, runs, first, material, quiet=quiet)
+            if with_claims:
+                paper = results.run_paper(out, plan, runner)
+                found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
+                pages.save_claims(out, found)
+            runs = paper.figures if paper else results.run_figures(out, plan, runner)
+            if with_beyond:
+                beyond = results.run_beyond(out, plan, runner, paper)
+                more = beyond_claims.beyond_claims(beyond)
+                pages.save_claims(out, (*found, *more))
+            first = results.partition_record()
+            images = pages.save_paper_figures(out, runs, first, paper, quiet=quiet)
             if beyond is not None:
-                save_beyond_page(out, save_beyond_pictures(out, beyond, quiet=quiet), beyond)
-            save_page(out, plan, images, runs, first, material, claims, more)
-        except Stopped:
+                pages.save_beyond_page(out, pages.save_beyond_figures(out, beyond, quiet=quiet), beyond)
+            pages.save_paper_page(out, plan, images, runs, first, paper, found, more)
+        except Interrupted:
             return _stopped(options)
-    failed = (material.failed if material else 0) + (beyond.failed if beyond else 0)
+    failed = sum(part.failed for part in (paper, beyond) if part)
     if options.json:
         answer = {
             "out": str(out),
             "plan": plan.name,
             "interrupted": False,
-            "runs": (material.runs if material else len(runs)) + (beyond.runs if beyond else 0),
+            "runs": (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0),
             "failed": failed,
             "page": str(out / "index.html"),
-            "claims": [claim.to_json() for claim in (*claims, *more)],
+            "claims": [claim.to_json() for claim in (*found, *more)],
         }
         print(json.dumps(finite(answer)))
         return int(failed > 0)
-    if claims or more:
-        print_claims((*claims, *more))
-    written = ["index.html", *["beyond.html"] * wanted, *["claims.json"] * bool(claims or more)]
+    if found or more:
+        print_claims((*found, *more))
+    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(found or more)]
     print(f"saved in {out}/: {', '.join(written)}, figures/, studies/")
     if failed:
         print(f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why")
@@ -172,22 +154,19 @@ def print_claims(claims: Sequence[Claim]) -> None:
     )
 
 
-def _announce(forecast: Forecast, name: str, means: Means) -> None:
+def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
     from robocov_app.sweep.sweeping import duration
 
     if forecast.left == 0:
         words = f"all {forecast.runs:,} runs are there"
     else:
-        there = (
-            f", {forecast.runs - forecast.left:,} of them there already"
-            if forecast.left < forecast.runs
-            else ""
-        )
+        done = forecast.runs - forecast.left
+        there = f", {done:,} of them there already" if done else ""
         each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
-        if means.scheduler:
-            long = f"about {duration(forecast.seconds * means.workers)} of computing, on a Dask cluster"
+        if runner.scheduler:
+            long = f"about {duration(forecast.seconds * runner.workers)} of computing, on a Dask cluster"
         else:
-            long = f"about {duration(forecast.seconds)} on {means.workers} processes"
+            long = f"about {duration(forecast.seconds)} on {runner.workers} processes"
         words = f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"
     sys.stderr.write(f"paper ({name}): {words}\n")
     sys.stderr.flush()

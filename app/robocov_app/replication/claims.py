@@ -1,4 +1,4 @@
-"""The paper's claims, one function each: from what many runs gave to a verdict.
+"""The paper's claims: from what many runs gave to a verdict.
 
 All thresholds stand here, with their reasons; they were set before the study was run, and are the same for
 every run of it. Statistics are medians over scenarios with 95 % bootstrap intervals that draw whole maps.
@@ -6,16 +6,23 @@ every run of it. Statistics are medians over scenarios with 95 % bootstrap inter
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import Interval, Paired, bootstrap, paired, spread
-from robocov_app.replication.contenders import LABELS
-from robocov_app.replication.outcomes import Outcomes
-from robocov_app.replication.placements import spread_of_placements
-from robocov_app.replication.verdicts import Claim, Criterion, amount
+from robocov_app.figures.statistics import bootstrap, spread
+from robocov_app.replication.contenders import LABELS, potential_text
+from robocov_app.replication.maps import CONVEX_KINDS
+from robocov_app.replication.outcomes import (
+    EARLY,
+    FIRST_MINUTE,
+    Comparison,
+    GainOutcomes,
+    Outcomes,
+    spread_of_placements,
+)
+from robocov_app.replication.verdicts import Claim, Criterion, amount, described
 
 SAME_COST = 0.02
 """Two costs are the same when the median of their ratio is within 2 % of 1."""
@@ -28,12 +35,6 @@ NEARLY_ALWAYS = 0.9
 
 CLEARLY_BELOW = 0.95
 """A law is better than another one when the median of the ratio of their costs is below this."""
-
-EARLY = 20.0
-"""Seconds in which a team spreads over a convex region of ten metres; Lloyd's algorithm has settled then."""
-
-FIRST_MINUTE = 60.0
-"""Seconds that count as "during the motion"."""
 
 BARELY = 0.05
 """A result barely depends on the gains when its standard deviation over them is below 5 % of its mean."""
@@ -52,149 +53,226 @@ SAME_PLACEMENT = 0.25
 NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
 """A team is near the reference within 10 % of its cost, and far from it above 25 %."""
 
+CLUSTERED = CONVEX_KINDS[:-1]
+"""Starts in convex regions in which the robots are close together."""
 
-def compared(
-    outcomes: Outcomes, first: str, second: str, measure: str = "final"
-) -> tuple[Paired, Outcomes] | None:
-    """Return how `first` compares with `second`, and in which scenarios; None where there are none."""
-    fine = outcomes.among(outcomes.together((first, second), measure))
-    if not fine.scenarios:
-        return None
-    return paired(fine.of(first, measure), fine.of(second, measure), fine.maps), fine
+QUESTIONS = {
+    1: "In convex regions: does RAPF do as well as Lloyd's algorithm, and spread faster?",
+    2: "In non-convex environments: is RAPF better than RPF?",
+    3: "Does RAPF's result depend on the gains?",
+    4: "Does RAPF's result depend on the starts?",
+    5: "Lloyd's algorithm in non-convex environments: how often are robots stuck?",
+    6: "How far are they from what a team could reach that knew the map?",
+}
+"""The questions that the claims belong to."""
+
+
+def paper_claims(
+    convex: Outcomes, nonconvex: Outcomes, gains: Mapping[str, GainOutcomes]
+) -> tuple[Claim, ...]:
+    """Return all claims with what the runs say of them; `gains` are RAPF's and RPF's."""
+    rapf, rpf = same_scenarios(gains["rapf"], gains["rpf"])
+    return (
+        convex_final(convex),
+        convex_spreading(convex),
+        *(against_rpf(nonconvex, at, moment) for moment in ("final", "motion") for at in ("shared", "best")),
+        gains_result(rapf, rpf),
+        gains_choice(rapf, rpf),
+        starts_cost(nonconvex),
+        starts_placement(nonconvex),
+        lloyd_stuck(nonconvex),
+        against_lloyd(nonconvex),
+        *(gap_to_reference(nonconvex, law) for law in ("rapf-shared", "rpf-shared", "lloyd")),
+    )
+
+
+def pair_claim(
+    head: Claim,
+    pairs: Comparison | None,
+    ratio: str,
+    wins: str,
+    explain: Callable[[Comparison], str],
+    *,
+    below: float = 1.0,
+    share: float = 0.5,
+) -> Claim:
+    """Judge whether the first of a pair has the lower values: in the median ratio, and in most runs.
+
+    `ratio` and `wins` name these measures; `below` and `share` are what they have to reach.
+    """
+    if pairs is None:
+        return head
+    criteria = (
+        Criterion(ratio, pairs.ratio, high=below),
+        Criterion(wins, pairs.wins, share, unit="%"),
+    )
+    return head.judged(criteria, explain(pairs), pairs.fine, 2)
 
 
 def convex_final(outcomes: Outcomes) -> Claim:
     """Test whether RAPF ends at LA's cost in convex regions (figure 3)."""
-    claim = "In a convex region RAPF ends at the same cost as Lloyd's algorithm."
-    found = compared(outcomes, "rapf-shared", "lloyd")
-    if found is None:
-        return _untested("convex-final", 1, claim, "VI-A, figures 2 and 3")
-    pairs, fine = found
-    ratio = fine.of("rapf-shared", "final") / fine.of("lloyd", "final")
-    near = bootstrap((np.abs(ratio - 1.0) <= NEARLY_SAME).astype(float), "mean", fine.maps)
+    text = "In a convex region RAPF ends at the same cost as Lloyd's algorithm."
+    head = Claim("convex-final", 1, text, "VI-A, figures 2 and 3")
+    pairs = outcomes.compared("rapf-shared", "lloyd")
+    if pairs is None:
+        return head
+    near = bootstrap((np.abs(pairs.ratios - 1.0) <= NEARLY_SAME).astype(float), "mean", pairs.fine.maps)
     criteria = (
         Criterion("median of J(RAPF) / J(LA) at the end", pairs.ratio, 1.0 - SAME_COST, 1.0 + SAME_COST),
         Criterion(f"runs that end within {amount(NEARLY_SAME, '%')} of LA", near, NEARLY_ALWAYS, unit="%"),
     )
-    told = (
-        f"The ratio lies between {amount(float(ratio.min()))} and {amount(float(ratio.max()))}; "
-        f"LA ends in a centroidal tessellation, of which a region has several. "
-        + _best_and_default(outcomes, "lloyd")
+    least = amount(float(pairs.ratios.min()))
+    explanation = (
+        f"The ratio lies between {least} and {amount(pairs.worst[0])}; LA ends in "
+        f"a centroidal tessellation, of which a region has several. {_other_gains(outcomes)}"
     )
-    return _tested("convex-final", 1, claim, criteria, fine, 2, told, "VI-A, figures 2 and 3")
+    return head.judged(criteria, explanation, pairs.fine, 2)
 
 
-def convex_spreading(outcomes: Outcomes, clustered: Iterable[str]) -> Claim:
+def convex_spreading(outcomes: Outcomes) -> Claim:
     """Test whether RAPF spreads faster than LA over a convex region from clustered starts."""
-    claim = "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm."
-    found = compared(outcomes.from_starts(clustered), "rapf-shared", "lloyd", "early")
-    if found is None:
-        return _untested("convex-spreading", 1, claim, "VI-A")
-    pairs, fine = found
+    text = "From starts close together RAPF spreads faster over a convex region than Lloyd's algorithm."
     what = f"mean distance over the first {EARLY:g} s"
-    criteria = (
-        Criterion(f"median ratio, RAPF to LA, of the {what}", pairs.ratio, high=1.0),
-        Criterion(f"runs in which RAPF's {what} is the lower one", pairs.wins, 0.5, unit="%"),
+    return pair_claim(
+        Claim("convex-spreading", 1, text, "VI-A"),
+        outcomes.from_starts(*CLUSTERED).compared("rapf-shared", "lloyd", "early"),
+        f"median ratio, RAPF to LA, of the {what}",
+        f"runs in which RAPF's {what} is the lower one",
+        lambda pairs: (
+            f"Per start: {_by_start(pairs)}. The paper itself concludes that “the improvement of RAPF is "
+            f"negligible” in convex regions, after having called it “quite better” from close starts."
+        ),
     )
-    told = (
-        f"Per start: {_by_start(fine, 'rapf-shared', 'lloyd', 'early')}. "
-        f"The paper itself concludes that “the improvement of RAPF is negligible” in convex regions, "
-        f"after having called it “quite better” from close starts."
-    )
-    return _tested("convex-spreading", 1, claim, criteria, fine, 2, told, "VI-A")
 
 
-def nonconvex(outcomes: Outcomes, gains: str, moment: str) -> Claim:
-    """Test whether RAPF's cost is below RPF's, at the end or during the motion.
-
-    Parameters
-    ----------
-    gains : {"shared", "best"}
-    moment : {"final", "motion"}
-    """
-    measure = "final" if moment == "final" else "first_minute"
+def against_rpf(outcomes: Outcomes, gains: str, moment: str) -> Claim:
+    """Test whether RAPF's cost is below RPF's, at {"shared", "best"} gains, in {"final", "motion"}."""
     at = "with the same potential parameters" if gains == "shared" else "each with its own best gains"
-    end = "ends at a lower cost than RPF" if moment == "final" else "has a lower cost than RPF while it moves"
-    claim = f"In a non-convex environment RAPF {end}, {at}."
-    key, source = f"nonconvex-{moment}-{gains}", "VI-B, figures 4 to 7"
-    ours, theirs = f"rapf-{gains}", f"rpf-{gains}"
-    found = compared(outcomes, ours, theirs, measure)
-    if found is None:
-        return _untested(key, 2, claim, source)
-    pairs, fine = found
-    what = "the final cost" if moment == "final" else f"the cost averaged over {FIRST_MINUTE:g} s"
-    criteria = (
-        Criterion(f"median ratio, RAPF to RPF, of {what}", pairs.ratio, high=CLEARLY_BELOW),
-        Criterion("runs in which RAPF's is the lower one", pairs.wins, NEARLY_ALWAYS, unit="%"),
+    end, what, measure = {
+        "final": ("ends at a lower cost than RPF", "the final cost", "final"),
+        "motion": (
+            "has a lower cost than RPF while it moves",
+            f"the cost averaged over {FIRST_MINUTE:g} s",
+            "first_minute",
+        ),
+    }[moment]
+    text = f"In a non-convex environment RAPF {end}, {at}."
+    return pair_claim(
+        Claim(f"nonconvex-{moment}-{gains}", 2, text, "VI-B, figures 4 to 7"),
+        outcomes.compared(f"rapf-{gains}", f"rpf-{gains}", measure),
+        f"median ratio, RAPF to RPF, of {what}",
+        "runs in which RAPF's is the lower one",
+        lambda pairs: f"Median ratio per start: {_by_start(pairs)}. {lost_text(pairs, 'RAPF')}",
+        below=CLEARLY_BELOW,
+        share=NEARLY_ALWAYS,
     )
-    told = f"Median ratio per start: {_by_start(fine, ours, theirs, measure)}." + _lost(
-        fine, ours, theirs, measure
-    )
-    return _tested(key, 2, claim, criteria, fine, 2, told, source)
 
 
-def outperforms_lloyd(outcomes: Outcomes) -> Claim:
+def against_lloyd(outcomes: Outcomes) -> Claim:
     """Test whether RAPF outperforms LA in non-convex environments, which the paper does not show."""
-    claim = "In a non-convex environment RAPF significantly outperforms Lloyd's algorithm too."
+    text = "In a non-convex environment RAPF significantly outperforms Lloyd's algorithm too."
     source = "VII: “significantly outperforms other existing approaches”; the paper shows RPF only"
-    found = compared(outcomes, "rapf-shared", "lloyd")
-    if found is None:
-        return _untested("nonconvex-lloyd", 5, claim, source)
-    pairs, fine = found
-    criteria = (
-        Criterion("median of J(RAPF) / J(LA) at the end", pairs.ratio, high=CLEARLY_BELOW),
-        Criterion("runs in which RAPF's is the lower one", pairs.wins, 0.5, unit="%"),
+    return pair_claim(
+        Claim("nonconvex-lloyd", 5, text, source),
+        outcomes.compared("rapf-shared", "lloyd"),
+        "median of J(RAPF) / J(LA) at the end",
+        "runs in which RAPF's is the lower one",
+        lambda _: f"LA here slides along what it touches. {_other_gains(outcomes)}",
+        below=CLEARLY_BELOW,
     )
-    told = "LA here slides along what it touches. " + _best_and_default(outcomes, "lloyd")
-    return _tested("nonconvex-lloyd", 5, claim, criteria, fine, 2, told, source)
+
+
+def gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
+    """Test whether RAPF's final cost barely depends on the gains, and RPF's does, in the same scenarios."""
+    text = "RAPF's final cost barely depends on the gains, RPF's does."
+    head = Claim("gains-result", 3, text, "VI-B: “by using the RAPF, it is almost independent”")
+    if not rapf.scenarios:
+        return head
+    ours, theirs, maps = variation(rapf), variation(rpf), rapf.maps
+    measure = "median standard deviation of the final cost over the gains, by its mean"
+    criteria = (
+        Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY, unit="%"),
+        Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY, unit="%"),
+        Criterion(
+            "median ratio of that deviation, RAPF to RPF",
+            bootstrap(ours / np.maximum(theirs, 1e-12), clusters=maps),
+            high=1.0,
+        ),
+    )
+    levels = sorted({float(gains["k_att"] or 0.0) for gains in rapf.gains if "k_att" in gains})
+    at = "; ".join(
+        f"k_att = {level:g}: {median_text(variation(part), '%')}, "
+        f"worst by best {median_text(worst_by_best(part))}"
+        for level in levels
+        if len((part := rapf.with_gain("k_att", level)).gains) > 1
+    )
+    explanation = (
+        f"{len(rapf.gains)} sets of gains for RAPF and {len(rpf.gains)} for RPF. Worst by best set, median: "
+        f"RAPF {median_text(worst_by_best(rapf))}, RPF {median_text(worst_by_best(rpf))}. "
+        f"RAPF at one attraction: {at}."
+    )
+    return head.judged(criteria, explanation, rapf, len(rapf.gains) + len(rpf.gains))
+
+
+def gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
+    """Test whether the best gains depend on the environment for RPF, and hardly do for RAPF."""
+    text = "Which gains are best depends on the environment for RPF, and hardly does for RAPF."
+    source = "VI-B: “the best choice of the potential parameters is environment dependent”"
+    head = Claim("gains-choice", 3, text, source)
+    (ours, maps), (theirs, _) = regrets(rapf), regrets(rpf)
+    if not len(ours):
+        return head
+    measure = "mean cost, in excess, of the gains that are best on other maps instead of on the same one"
+    criteria = (
+        Criterion(f"RPF: {measure}", bootstrap(theirs, "mean", maps), low=REGRET, unit="%"),
+        Criterion("RAPF: the same", bootstrap(ours, "mean", maps), high=REGRET, unit="%"),
+    )
+    best = [potential_text(grid.gains[grid.best()]) for grid in (rapf, rpf)]
+    explanation = (
+        f"Both sets are judged from a start that neither was chosen on. Highest excess: RPF "
+        f"{amount(float(theirs.max()), '%')}, RAPF {amount(float(ours.max()), '%')}. Best over all maps: "
+        f"RAPF {best[0]}, RPF {best[1]}."
+    )
+    return head.judged(criteria, explanation, rapf, len(rapf.gains) + len(rpf.gains))
 
 
 def starts_cost(outcomes: Outcomes) -> Claim:
     """Test whether RAPF's final cost barely depends on the starts, and RPF's does."""
-    claim = "RAPF's final cost barely depends on where the robots start, RPF's does."
-    source = "VI-B, figures 6 and 8"
-    fine = outcomes.among(outcomes.together(("rapf-shared", "rpf-shared"), "final"))
-    groups = _groups_of_starts(fine)
-    if not groups:
-        return _untested("starts-cost", 4, claim, source)
-    maps = [map_ for map_, _ in groups]
-    ours, theirs = (
-        np.array([spread(fine.of(law, "final")[rows]) for _, rows in groups])
-        for law in ("rapf-shared", "rpf-shared")
-    )
+    text = "RAPF's final cost barely depends on where the robots start, RPF's does."
+    head = Claim("starts-cost", 4, text, "VI-B, figures 6 and 8")
+    fine = outcomes.measured("final", "rapf-shared", "rpf-shared")
+    maps = [name for name, _ in _groups_of_starts(fine)]
+    if not maps:
+        return head
+    ours, theirs = (_variation_by_start(fine, law) for law in ("rapf-shared", "rpf-shared"))
+    measure = "median standard deviation of the final cost over the starts, by its mean"
     criteria = (
-        Criterion(
-            "RAPF: median standard deviation of the final cost over the starts, by its mean",
-            bootstrap(ours, clusters=maps),
-            high=BARELY_BY_START,
-            unit="%",
-        ),
+        Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY_BY_START, unit="%"),
         Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY_BY_START, unit="%"),
     )
-    told = (
+    of = {
+        law: median_text(_variation_by_start(outcomes.measured("final", law), law), "%")
+        for law in ("rapf-best", "rpf-best", "lloyd")
+    }
+    explanation = (
         f"Over the same map and seed, from {len(set(fine.starts))} kinds of starts. RPF's varies "
         f"{amount(float(np.median(theirs) / max(np.median(ours), 1e-12)))} times as much as RAPF's. At their "
-        f"best gains: RAPF {_variation(outcomes, 'rapf-best')}, RPF {_variation(outcomes, 'rpf-best')}; "
-        f"LA {_variation(outcomes, 'lloyd')}."
+        f"best gains: RAPF {of['rapf-best']}, RPF {of['rpf-best']}; LA {of['lloyd']}."
     )
-    return _tested("starts-cost", 4, claim, criteria, fine, 2, told, source)
+    return head.judged(criteria, explanation, fine, 2)
 
 
 def starts_placement(outcomes: Outcomes) -> Claim:
     """Test whether RAPF's final placement barely depends on the starts, and RPF's does."""
-    claim = "RAPF's final placement varies little with where the robots start, RPF's strongly."
-    source = "VI-B, figures 6 and 8"
-    laws = ("rapf-shared", "rpf-shared")
-    fine = outcomes.among(outcomes.together(laws, "final"))
-    apart = {law: _placement_spreads(fine, law) for law in laws}
-    maps = [map_ for map_ in apart[laws[0]] if map_ in apart[laws[1]]]
+    text = "RAPF's final placement varies little with where the robots start, RPF's strongly."
+    head = Claim("starts-placement", 4, text, "VI-B, figures 6 and 8")
+    fine = outcomes.measured("final", "rapf-shared", "rpf-shared")
+    rapf, rpf = (_placement_spreads(fine, law) for law in ("rapf-shared", "rpf-shared"))
+    maps = [name for name in rapf if name in rpf]
     if not maps:
-        return _untested("starts-placement", 4, claim, source)
-    ours, theirs = (np.array([apart[law][map_] for map_ in maps]) for law in laws)
-    pairs = paired(ours, theirs, maps)
-    metres = {
-        law: bootstrap([apart[law][map_] * fine.shares[map_] for map_ in maps], clusters=maps) for law in laws
-    }
+        return head
+    ours, theirs = (np.array([apart[name] for name in maps]) for apart in (rapf, rpf))
+    metres = [median_text(apart * [fine.shares[name] for name in maps], "m") for apart in (ours, theirs)]
     criteria = (
         Criterion(
             "RAPF: matched distance between the ends from different starts, by the side of a robot's share",
@@ -202,188 +280,196 @@ def starts_placement(outcomes: Outcomes) -> Claim:
             high=SAME_PLACEMENT,
             unit="%",
         ),
-        Criterion("median ratio of that distance, RAPF to RPF", pairs.ratio, high=1.0),
+        Criterion(
+            "median ratio of that distance, RAPF to RPF", bootstrap(ours / theirs, clusters=maps), high=1.0
+        ),
     )
-    told = (
-        f"In metres: RAPF {amount(metres[laws[0]].estimate, 'm')}, "
-        f"RPF {amount(metres[laws[1]].estimate, 'm')} (medians over maps). "
+    explanation = (
+        f"In metres: RAPF {metres[0]}, RPF {metres[1]} (medians over maps). "
         f"Robots are matched so that the sum of straight distances is least. "
         f"A placement can differ while its cost does not: many are equally good."
     )
-    return _tested("starts-placement", 4, claim, criteria, fine, 2, told, source)
+    return head.judged(criteria, explanation, fine, 2)
 
 
-def stuck(outcomes: Outcomes) -> Claim:
+def lloyd_stuck(outcomes: Outcomes) -> Claim:
     """Test how often LA leaves robots stuck in non-convex environments."""
-    claim = "Lloyd's algorithm is unusable in presence of obstacles: its robots get stuck."
-    source = "I and IV"
-    fine = outcomes.among(outcomes.together(("lloyd",), "stuck"))
+    text = "Lloyd's algorithm is unusable in presence of obstacles: its robots get stuck."
+    head = Claim("lloyd-stuck", 5, text, "I and IV")
+    fine = outcomes.measured("stuck", "lloyd")
     if not fine.scenarios:
-        return _untested("lloyd-stuck", 5, claim, source)
+        return head
     count = fine.of("lloyd", "stuck")
     some = bootstrap((count > 0).astype(float), "mean", fine.maps)
-    gap = fine.of("lloyd", "gap")
-    kept = np.isfinite(gap)
     criteria = [Criterion("runs of LA that end with a robot stuck", some, 0.5, unit="%")]
-    if kept.any():
-        maps = [map_ for map_, good in zip(fine.maps, kept, strict=True) if good]
-        criteria.append(
-            Criterion(
-                "LA: median of J/J_ref - 1", bootstrap(gap[kept], clusters=maps), FAR_FROM_OPTIMUM, unit="%"
-            )
-        )
+    near = fine.measured("gap", "lloyd")
+    if near.scenarios:
+        gap = bootstrap(near.of("lloyd", "gap"), clusters=near.maps)
+        criteria.append(Criterion("LA: median of J/J_ref - 1", gap, FAR_FROM_OPTIMUM, unit="%"))
     others = ", ".join(
-        f"{LABELS[law]} {_share_stuck(outcomes, law)}" for law in ("rapf-shared", "rapf-best", "rapf-default")
+        f"{LABELS[law]} {amount(share_above_zero(outcomes.of(law, 'stuck')), '%')}"
+        for law in ("rapf-shared", "rapf-best", "rapf-default")
     )
-    told = (
+    explanation = (
         f"On average {amount(float(count.mean()))} robots are stuck in a run. "
         f"Runs with a stuck robot of other laws: {others}. Stuck: the goal is more than 0.5 m away and the "
         f"robot moved less than 0.05 m in the last 5 s."
     )
-    return _tested("lloyd-stuck", 5, claim, tuple(criteria), fine, 1, told, source)
+    return head.judged(criteria, explanation, fine, 1)
 
 
 def gap_to_reference(outcomes: Outcomes, law: str) -> Claim:
-    """Test how far a law stays above the centralised reference.
-
-    Parameters
-    ----------
-    law : {"rapf-shared", "rpf-shared", "lloyd"}
-    """
-    near = law != "rpf-shared"
-    claim, source = {
-        "rapf-shared": ("RAPF's coverage is nearly optimal.", "VII: “to achieve an optimal coverage”"),
-        "rpf-shared": ("RPF comes to rest far from the optimum.", "IV and I: “usually far from the optimal”"),
-        "lloyd": ("Lloyd's algorithm, ignorant of obstacles, is nearly optimal all the same.", ""),
+    """Test how far {"rapf-shared", "rpf-shared", "lloyd"} stays above the centralised reference."""
+    text, source, low, high = {
+        "rapf-shared": (
+            "RAPF's coverage is nearly optimal.",
+            "VII: “to achieve an optimal coverage”",
+            -np.inf,
+            NEAR_OPTIMUM,
+        ),
+        "rpf-shared": (
+            "RPF comes to rest far from the optimum.",
+            "IV and I: “usually far from the optimal”",
+            FAR_FROM_OPTIMUM,
+            np.inf,
+        ),
+        "lloyd": (
+            "Lloyd's algorithm, ignorant of obstacles, is nearly optimal all the same.",
+            "",
+            -np.inf,
+            NEAR_OPTIMUM,
+        ),
     }[law]
-    key = f"gap-{law.removesuffix('-shared')}"
-    fine = outcomes.among(outcomes.together((law,), "gap"))
+    head = Claim(f"gap-{law.removesuffix('-shared')}", 6, text, source)
+    fine = outcomes.measured("gap", law)
     if not fine.scenarios:
-        return _untested(key, 6, claim, source)
+        return head
     gap = fine.of(law, "gap")
     found = bootstrap(gap, clusters=fine.maps)
-    criteria = (
-        Criterion(
-            f"{LABELS[law]}: median of J/J_ref - 1",
-            found,
-            *((-np.inf, NEAR_OPTIMUM) if near else (FAR_FROM_OPTIMUM, np.inf)),
-            unit="%",
-        ),
+    criteria = (Criterion(f"{LABELS[law]}: median of J/J_ref - 1", found, low, high, "%"),)
+    beaten = (
+        f", and was beaten in {amount(float((gap < 0).mean()), '%')} of the runs" if (gap < 0).any() else ""
     )
+    explanation = (
+        f"{half_text(gap)[:-1]}; the worst is {amount(float(gap.max()), '%')} above it "
+        f"({fine.scenarios[int(np.argmax(gap))]}). {_by_family(fine, gap)} "
+        f"J_ref is the best of many descents with the whole map known; it is no bound, "
+        f"only hard to beat{beaten}."
+    )
+    return head.judged(criteria, explanation, fine, 1)
+
+
+def variation(grid: GainOutcomes) -> Array:
+    """Return the standard deviation of the cost over the gains by its mean, for each scenario, (m,)."""
+    return np.array([spread(column) for column in grid.excess.T])
+
+
+def worst_by_best(grid: GainOutcomes) -> Array:
+    """Return the cost of the worst gains by that of the best ones, for each scenario, (m,)."""
+    return np.asarray(grid.excess.max(axis=0) / grid.excess.min(axis=0))
+
+
+def regrets(grid: GainOutcomes) -> tuple[Array, tuple[str, ...]]:
+    """Return what it costs not to know the map when gains are chosen, (k,), and the map of each value.
+
+    For every scenario two sets of gains are compared: the best one on the *other starts of the same map*,
+    and the best one on the other maps. Neither was chosen on the scenario itself, so chance favours none. A
+    regret is J with the gains of other maps by J with those of the same map, minus 1.
+    """
+    found, where = [], []
+    for column, (name, start, _) in enumerate(grid.scenarios):
+        same = [k for k, each in enumerate(grid.scenarios) if each.map == name and each.start != start]
+        others = [k for k, each in enumerate(grid.scenarios) if each.map != name]
+        if same and others:
+            known, unknown = grid.best(same), grid.best(others)
+            found.append(float(grid.excess[unknown, column] / grid.excess[known, column]) - 1.0)
+            where.append(name)
+    return np.array(found), tuple(where)
+
+
+def share_above_zero(counts: Array) -> float:
+    """Return the share of counts above zero among those that are there; nan where none is."""
+    fine = counts[np.isfinite(counts)]
+    return float((fine > 0).mean()) if len(fine) else float("nan")
+
+
+def half_text(gap: Array) -> str:
+    """Return the quartiles of gaps in words."""
     low, high = np.quantile(gap, [0.25, 0.75]).tolist()
-    worst = fine.scenarios[int(np.argmax(gap))]
-    told = (
-        f"Half of the runs lie between {amount(low, '%')} and {amount(high, '%')}; the worst is "
-        f"{amount(float(gap.max()), '%')} above it ({worst.map}, start {worst.start}, seed {worst.seed}). "
-        f"{_by_family(fine, gap)} "
-        f"J_ref is the best of many descents with the whole map known; it is no bound, only hard to beat"
-        + (
-            f", and was beaten in {amount(float((gap < 0).mean()), '%')} of the runs."
-            if (gap < 0).any()
-            else "."
-        )
+    return f"Half of the runs lie between {amount(low, '%')} and {amount(high, '%')}."
+
+
+def lost_text(pairs: Comparison, who: str) -> str:
+    """Return in words how many pairs the first loses, and the highest ratio."""
+    ratio, where = pairs.worst
+    return f"{who} loses {pairs.lost} of {len(pairs.ratios)}; the highest ratio is {amount(ratio)} ({where})."
+
+
+def median_text(values: Array, unit: str = "") -> str:
+    """Return the median as it is read, a dash where there is none."""
+    return amount(float(np.median(values)), unit) if len(values) else "–"
+
+
+def _by_start(pairs: Comparison) -> str:
+    starts = np.array(pairs.fine.starts)
+    return ", ".join(
+        f"{start} {median_text(pairs.ratios[starts == start])}" for start in dict.fromkeys(pairs.fine.starts)
     )
-    return _tested(key, 6, claim, criteria, fine, 1, told, source)
-
-
-def _tested(
-    key: str,
-    part: int,
-    claim: str,
-    criteria: tuple[Criterion, ...],
-    fine: Outcomes,
-    laws: int,
-    explanation: str,
-    source: str,
-) -> Claim:
-    maps = len(set(fine.maps))
-    return Claim(key, part, claim, criteria, laws * len(fine.scenarios), maps, explanation, source)
-
-
-def _untested(key: str, part: int, claim: str, source: str) -> Claim:
-    return Claim(key, part, claim, (), 0, 0, "There is no run that could tell.", source)
-
-
-def _by_start(outcomes: Outcomes, first: str, second: str, measure: str) -> str:
-    ratio = outcomes.of(first, measure) / outcomes.of(second, measure)
-    parts = []
-    for start in dict.fromkeys(outcomes.starts):
-        chosen = [each == start for each in outcomes.starts]
-        parts.append(f"{start} {amount(float(np.median(ratio[chosen])))}")
-    return ", ".join(parts)
 
 
 def _by_family(outcomes: Outcomes, gap: Array) -> str:
     """Return the medians on generated and on bundled maps, which are larger, and harder."""
-    drawn = np.array([map_.startswith("generated-") for map_ in outcomes.maps], dtype=bool)
+    drawn = np.array([name.startswith("generated-") for name in outcomes.maps], dtype=bool)
     parts = [
-        f"on {name} maps {amount(float(np.median(gap[chosen])), '%')}"
+        f"on {name} maps {median_text(gap[chosen], '%')}"
         for name, chosen in (("generated", drawn), ("bundled", ~drawn))
         if chosen.any()
     ]
     return f"Medians: {', '.join(parts)}."
 
 
-def _lost(outcomes: Outcomes, first: str, second: str, measure: str) -> str:
-    ratio = outcomes.of(first, measure) / outcomes.of(second, measure)
-    worst = int(np.argmax(ratio))
-    lost = int((ratio >= 1.0).sum())
-    where = outcomes.scenarios[worst]
-    return (
-        f" RAPF loses {lost} of {len(ratio)}; the highest ratio is {amount(float(ratio[worst]))} "
-        f"({where.map}, start {where.start}, seed {where.seed})."
-    )
-
-
-def _best_and_default(outcomes: Outcomes, other: str) -> str:
+def _other_gains(outcomes: Outcomes) -> str:
+    """Return how RAPF compares with LA at its best gains, and at robocov's default."""
     parts = []
     for law in ("rapf-best", "rapf-default"):
-        found = compared(outcomes, law, other)
-        if found is not None:
-            pairs, _ = found
+        pairs = outcomes.compared(law, "lloyd")
+        if pairs is not None:
             wins = amount(pairs.wins.estimate, "%")
-            parts.append(f"{LABELS[law]}: ratio {_short(pairs.ratio)}, lower in {wins} of the runs")
-    return ("; ".join(parts) + ".") if parts else ""
+            parts.append(f"{LABELS[law]}: ratio {described(pairs.ratio)}, lower in {wins} of the runs")
+    return f"{'; '.join(parts)}." if parts else ""
 
 
-def _short(interval: Interval) -> str:
-    if np.isnan(interval.low):
-        return amount(interval.estimate)
-    return f"{amount(interval.estimate)} ({amount(interval.low)} to {amount(interval.high)})"
-
-
-def _groups_of_starts(outcomes: Outcomes) -> list[tuple[str, list[int]]]:
-    """Return the scenarios of each map and seed, where there are several starts."""
+def _groups_of_starts(outcomes: Outcomes) -> Iterator[tuple[str, list[int]]]:
+    """Yield the scenarios of each map and seed, where there are several starts."""
     groups: dict[tuple[str, int], list[int]] = {}
-    for k, (map_, _, seed) in enumerate(outcomes.scenarios):
-        groups.setdefault((map_, seed), []).append(k)
-    return [(map_, rows) for (map_, _), rows in groups.items() if len(rows) > 1]
+    for k, (name, _, seed) in enumerate(outcomes.scenarios):
+        groups.setdefault((name, seed), []).append(k)
+    yield from ((name, rows) for (name, _), rows in groups.items() if len(rows) > 1)
 
 
-def _variation(outcomes: Outcomes, law: str) -> str:
-    fine = outcomes.among(outcomes.together((law,), "final"))
-    groups = _groups_of_starts(fine)
-    if not groups:
-        return "–"
-    found = [spread(fine.of(law, "final")[rows]) for _, rows in groups]
-    return amount(float(np.median(found)), "%")
+def _variation_by_start(outcomes: Outcomes, law: str) -> Array:
+    """Return the variation of the final cost over the starts, for each map and seed."""
+    final = outcomes.of(law, "final")
+    return np.array([spread(final[rows]) for _, rows in _groups_of_starts(outcomes)])
 
 
 def _placement_spreads(outcomes: Outcomes, law: str) -> dict[str, float]:
     """Return for each map how far ends from different starts are apart, by the side of a robot's share."""
     places = outcomes.placements.get(law)
-    if places is None:
-        return {}
     found: dict[str, float] = {}
-    for map_ in dict.fromkeys(outcomes.maps):
-        rows: Sequence[int] = [k for k, each in enumerate(outcomes.maps) if each == map_]
-        apart = spread_of_placements(places[rows], [outcomes.starts[k] for k in rows])
-        if np.isfinite(apart) and map_ in outcomes.shares:
-            found[map_] = apart / outcomes.shares[map_]
+    for name in dict.fromkeys(outcomes.maps) if places is not None else ():
+        rows = [k for k, each in enumerate(outcomes.maps) if each == name]
+        apart = spread_of_placements(np.asarray(places)[rows], [outcomes.starts[k] for k in rows])
+        if np.isfinite(apart) and name in outcomes.shares:
+            found[name] = apart / outcomes.shares[name]
     return found
 
 
-def _share_stuck(outcomes: Outcomes, law: str) -> str:
-    count: Array = outcomes.of(law, "stuck")
-    fine = np.isfinite(count)
-    return amount(float((count[fine] > 0).mean()), "%") if fine.any() else "–"
+def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
+    """Return what both laws did in the scenarios where no run of either failed."""
+    rapf, rpf = rapf.complete, rpf.complete
+    common = set(rapf.scenarios) & set(rpf.scenarios)
+    return (
+        rapf.where([each in common for each in rapf.scenarios]),
+        rpf.where([each in common for each in rpf.scenarios]),
+    )

@@ -1,17 +1,21 @@
-"""Who is compared: the laws with their gains."""
+"""Who is compared: controllers with their gains, those of the paper, those of other authors, and our own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import product
 
-from robocov.controllers.gains import value_text
+from robocov.controllers import CONTROLLERS, gain_values, make_controller
+from robocov.controllers.gains import Value, value_text
 
-if TYPE_CHECKING:
-    from robocov.controllers.gains import Value
+PAPER = ("rapf", "rpf", "lloyd")
+"""Controllers of the paper's claims."""
 
-SHARED = {"k_rep": 1.0, "rho_0": 2.0}
+OURS = ("atlas", "atlas-shared")
+"""The project's own controllers; the goals are for the first."""
+
+SHARED: Mapping[str, Value] = {"k_rep": 1.0, "rho_0": 2.0}
 """Potential parameters that RAPF and RPF share, as in the paper, which does not print its own.
 
 The repulsion then holds a robot that is pulled with 1 N about 0.83 m off a wall."""
@@ -19,49 +23,112 @@ The repulsion then holds a robot that is pulled with 1 N about 0.83 m off a wall
 SHARED_ATTRACTION = 3.0
 """RAPF's k_att beside them: a metre from its goal a robot is pulled with 3 N, enough for full speed."""
 
+LABELS = {
+    "rapf-shared": "RAPF, shared gains",
+    "rapf-best": "RAPF, its best gains",
+    "rapf-default": "RAPF, robocov's default",
+    "lloyd": "LA",
+    "rpf-shared": "RPF, shared gains",
+    "rpf-best": "RPF, its best gains",
+}
+"""Labels of the contenders of the paper's claims, in the order of tables."""
+
 
 @dataclass(frozen=True)
 class Contender:
-    """A law with its gains.
-
-    Attributes
-    ----------
-    key : str
-        What it is called in files: "rapf-shared".
-    label : str
-        What it is called on the page.
-    controller : str
-    gains : dict of name to value
-        All that differ from the controller's defaults.
-    """
+    """A controller with the gains that differ from its defaults; `key` names it in files."""
 
     key: str
     label: str
     controller: str
     gains: Mapping[str, Value]
 
+    @property
+    def all_gains(self) -> dict[str, Value]:
+        """All gains, the controller's defaults among them."""
+        return dict(gain_values(make_controller(self.controller, self.gains)))
 
-RAPF_SHARED = Contender(
-    "rapf-shared",
-    "RAPF, shared gains",
-    "rapf",
-    {**SHARED, "k_att": SHARED_ATTRACTION, "attraction_limit": None},
+    @property
+    def gains_text(self) -> str:
+        """All gains of the potential: "(k_rep 1, rho_0 2, no limit)"."""
+        return potential_text(self.all_gains, "no limit")
+
+
+def of_paper(key: str, gains: Mapping[str, Value]) -> Contender:
+    """Return a contender of the paper's claims."""
+    return Contender(key, LABELS[key], key.partition("-")[0], dict(gains))
+
+
+def with_gains(name: str, gains: Mapping[str, Value]) -> Contender:
+    """Return a registered controller with other gains than its defaults."""
+    return Contender(name, CONTROLLERS[name].label, name, dict(gains))
+
+
+RAPF_SHARED = of_paper("rapf-shared", {**SHARED, "k_att": SHARED_ATTRACTION, "attraction_limit": None})
+RPF_SHARED = of_paper("rpf-shared", SHARED)
+LLOYD = of_paper("lloyd", {})
+RAPF_DEFAULT = of_paper("rapf-default", {})
+
+UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
+"""The paper's contenders whose gains no grid chooses."""
+
+TARGETS = (
+    Contender("centroid", "the centroid", "rapf", {}),
+    Contender("median", "the geometric median", "rapf", {"target": "median"}),
+    Contender("sensing", "a sensor's best place, h = 1 m", "rapf", {"target": "sensing"}),
 )
-RPF_SHARED = Contender("rpf-shared", "RPF, shared gains", "rpf", SHARED)
-LLOYD = Contender("lloyd", "LA", "lloyd", {})
-RAPF_DEFAULT = Contender("rapf-default", "RAPF, robocov's default", "rapf", {})
+"""RAPF with each target in its cell."""
+
+TEAMS = tuple(
+    Contender(f"{name}-{cells}", f"{CONTROLLERS[name].label}, cells by {cells}", name, {"cells": cells})
+    for name in ("rapf", "lloyd")
+    for cells in ("distance", "time")
+)
+"""Controllers of teams with mixed speeds, with each kind of cells."""
+
+OWN = tuple(with_gains(name, {}) for name in OURS)
+"""Our own controllers with their default gains."""
 
 
-LABELS = {each.key: each.label for each in (RAPF_SHARED, RPF_SHARED, LLOYD, RAPF_DEFAULT)} | {
-    "rapf-best": "RAPF, its best gains",
-    "rpf-best": "RPF, its best gains",
+def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
+    """Return all combinations of values of gains."""
+    return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
+
+
+GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
+    "howard": grid(k_robots=(3.0, 10.0, 30.0), k_obs=(0.3, 1.0, 3.0)),
+    "poduri": grid(link_range=(4.0, 6.0, 12.0), k_cover=(3.0, 10.0, 30.0), k_obs=(0.1, 0.3)),
+    "dispersion": (
+        *grid(reach=(3.5, 4.25, 5.0, 6.0, 7.0), k_disperse=(1.0,)),
+        *grid(reach=(5.0,), k_disperse=(0.3, 3.0)),
+    ),
+    "range-limited": grid(interaction_range=(4.0, 6.0, 9.0, 12.0)),
+    # with a detour of 2 it does not get out of a trap any more
+    "tangentbug": (*grid(detour=(4.0, 8.0, 16.0), moved=(0.5,)), {"detour": 4.0, "moved": 0.25}),
+    # a higher gamma lets robots of 2 m/s into the safe gap
+    "barrier": (*grid(gamma=(5.0, 20.0), braking=(0.8,)), {"gamma": 20.0, "braking": 0.5}),
+    "geodesic-lloyd": grid(exponent=(1.0, 1.5, 2.0)),
 }
-"""What every contender is called."""
+"""Sets of gains that are tried of each baseline; what they do not name has its default.
+
+One to three gains are varied that decide where a controller ends, not how hard a robot is driven or how
+finely something is sampled. What a baseline is for stays: `poduri` keeps two neighbours, `range-limited` a
+range, `barrier` its safe gap. The defaults of `robocov.controllers` are the best sets of the full study;
+those that they replaced are among the sets."""
 
 
-def best(controller: str, gains: Mapping[str, Value]) -> Contender:
-    """Return RAPF or RPF with the gains that were best on the maps of the tuning."""
-    return Contender(f"{controller}-best", LABELS[f"{controller}-best"], controller, dict(gains))
+def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
+    """Return all registered controllers of other authors, each with its `best` gains or its defaults."""
+    others = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
+    return tuple(with_gains(name, best.get(name, {})) for name in others)
+
+
+def paper_contenders(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
+    """Return the paper's contenders, where they are known also RAPF and RPF at their `best` gains."""
+    if not best:
+        return UNTUNED
+    rapf, rpf = (of_paper(f"{name}-best", best[name]) for name in ("rapf", "rpf"))
+    return (RAPF_SHARED, rapf, RAPF_DEFAULT, RPF_SHARED, rpf, LLOYD)
 
 
 def strongest(contenders: Sequence[Contender]) -> list[Contender]:
@@ -71,17 +138,20 @@ def strongest(contenders: Sequence[Contender]) -> list[Contender]:
     return [each for each in (rapf, by_key.get("lloyd")) if each is not None]
 
 
+def distinct_gains(contenders: Sequence[Contender]) -> dict[str, list[dict[str, Value]]]:
+    """Return all sets of gains by controller, each once: a controller's best gains may be the shared ones."""
+    found: dict[str, list[dict[str, Value]]] = {}
+    for each in contenders:
+        sets = found.setdefault(each.controller, [])
+        if each.all_gains not in sets:
+            sets.append(each.all_gains)
+    return found
+
+
 def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
-    """Return gains of the potential as they are read: "(k_rep 1, rho_0 2, no limit)".
+    """Return gains of the potential: "(k_rep 1, rho_0 2)"; `no_limit` stands for an unlimited attraction.
 
-    Words are left out, and what goes with them: in the whole study a law heads for the centroids of the
-    nearest robots' cells.
-
-    Parameters
-    ----------
-    gains : dict of name to value
-    no_limit : str
-        What stands for an attraction without limit; by default nothing does.
+    Gains that are words are left out, and what goes with them: no contender of the paper's claims has others.
     """
     parts = []
     for name, value in gains.items():

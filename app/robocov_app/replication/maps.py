@@ -1,12 +1,12 @@
-"""The maps of the study, and the same three kinds of starts on all of them.
+"""The maps of the study, and the same kinds of starts on all of them.
 
 - ``corner``: a disc near the lower left corner, as in the paper's figures 4 and 6;
 - ``centre``: a disc near the middle;
 - ``uniform``: anywhere in the free space.
 
-The discs are put by a rule, not by hand: of `ROOMY` metres radius (or the next of `RADII` that fits), wholly
-free, as near to the corner, or the middle, of the map's bounding box as can be. In convex regions there is
-also ``tight``, the smallest disc that holds six robots with a little room, as near to the corner.
+The discs are put by a rule: of the first of `RADII` that fits, wholly free, as near to the corner, or the
+middle, of the map's bounding box as can be. In convex regions there is also ``tight``, the smallest disc that
+holds six robots with a little room, as near to the corner.
 """
 
 from __future__ import annotations
@@ -17,14 +17,18 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
 from robocov.errors import StartError
+from robocov.generator import generated_map
+from robocov.mapfile import load_map
+from robocov_app.sweep.study import StudyMap
 
 KINDS = ("corner", "centre", "uniform")
 """The starts on non-convex maps; all but the last are clustered."""
 
 CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
-"""The starts in convex regions."""
+"""The starts in convex regions; all but the last are clustered."""
 
 RADII = (0.8, 0.6, 0.45)
 """Radii of the discs of clustered starts, m; the first that fits is taken."""
@@ -45,30 +49,40 @@ CONVEX = ("square", "pentagon")
 SIDE = 10.0
 """Metres of the square in which regions are drawn by chance."""
 
+HOT_SPOTS = 2
+"""Gaussians that are drawn by chance on each map: 20 times as much counts a place in the middle of one."""
+
 _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 
-def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
-    """Return the map with the study's starts in place of its own.
+def bundled(name: str, kinds: Iterable[str] = KINDS) -> StudyMap:
+    """Return a bundled map with the study's starts."""
+    return StudyMap(name, with_kinds_of_starts(load_map(name), kinds))
 
-    Raises
-    ------
-    StartError
-        When no disc of `RADII` fits the map.
+
+def generated(seed: int) -> StudyMap:
+    """Return a non-convex map drawn by chance, with the study's starts.
+
+    Four to eight obstacles, of five about three convex, one an L and one a U, block 16 to 25 % of a square of
+    ten metres; every passage is at least 0.6 m wide, and the free space is in one piece.
     """
-    return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
+    rng = np.random.default_rng([seed, 2])
+    environment = generated_map(
+        seed,
+        kind="polygons",
+        obstacles=int(rng.integers(4, 9)),
+        area=round(float(rng.uniform(0.16, 0.25)), 3),
+        gap=0.6,
+        side=SIDE,
+    )
+    return StudyMap(f"generated-{seed}", with_kinds_of_starts(environment))
 
 
-def convex_region(seed: int) -> Environment:
-    """Return a convex region without obstacles, drawn by chance.
+def convex_region(seed: int) -> StudyMap:
+    """Return a convex region without obstacles drawn by chance, with the study's starts.
 
     It is the convex hull of nine points that are uniform in a square of ten metres; hulls below 40 m², and
     those narrower than 5 m, are drawn again. Coordinates are whole centimetres.
-
-    Parameters
-    ----------
-    seed : int
-        The same seed gives the same region.
     """
     rng = np.random.default_rng([seed, 1])
     while True:
@@ -78,7 +92,23 @@ def convex_region(seed: int) -> Environment:
             break
     ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
     corners = tuple((float(x), float(y)) for x, y in ring)
-    return Environment(f"convex-{seed}", corners, description="A convex region drawn by chance.")
+    region = Environment(f"convex-{seed}", corners, description="A convex region drawn by chance.")
+    return StudyMap(region.name, with_kinds_of_starts(region, CONVEX_KINDS))
+
+
+def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
+    """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
+    start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
+    centres = start.sample(HOT_SPOTS, seed=seed, radius=0.3)
+    peaks = tuple(
+        Gaussian((round(float(x), 2), round(float(y), 2)), weight=20.0, sigma=1.0) for x, y in centres
+    )
+    return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
+
+
+def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
+    """Return the map with the study's starts in place of its own; StartError where no disc fits."""
+    return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
 
 
 def side_of_share(environment: Environment, robots: int) -> float:

@@ -1,4 +1,4 @@
-"""What came out of many runs, laid out so that contenders can be compared in the same scenarios.
+"""Tables of outcomes: what contenders reached in the same scenarios.
 
 A *scenario* is a map, a start and a seed: every contender began from the same positions there. A run that
 failed is nan, and drops out of every comparison that needs it.
@@ -6,16 +6,40 @@ failed is nan, and drops out of every comparison that needs it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
+from robocov.controllers import CONTROLLERS, gains_of
+from robocov.controllers.gains import Value
+from robocov.metrics import CostHistory
+from robocov.metrics.results import read_results
+from robocov_app.figures.statistics import Interval, bootstrap
+from robocov_app.replication.maps import side_of_share
+from robocov_app.replication.plan import ROBOTS
+from robocov_app.replication.references import Reference
+from robocov_app.replication.studies import Contest
+from robocov_app.sweep.study import Study
 
-if TYPE_CHECKING:
-    from robocov.controllers.gains import Value
+EARLY = 20.0
+"""Seconds in which a team spreads over a convex region of ten metres; Lloyd's algorithm has settled then."""
+
+FIRST_MINUTE = 60.0
+"""Seconds that count as "during the motion"."""
+
+COLUMNS = {
+    "final": "mean_distance_m",
+    "contacts": "contacts",
+    "stuck": "stuck_robots",
+    "settled": "settled_at_s",
+}
+"""Measures that stand in the table of a sweep, and their columns."""
 
 
 class Scenario(NamedTuple):
@@ -24,6 +48,9 @@ class Scenario(NamedTuple):
     map: str
     start: str
     seed: int
+
+    def __str__(self) -> str:
+        return f"{self.map}, start {self.start}, seed {self.seed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +61,8 @@ class Outcomes:
     ----------
     scenarios : m scenarios
     values : dict of (contender, measure) to (m,)
-        Measures: ``final`` and ``reference`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute``
-        (m, time averages), ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not).
+        Measures: ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
+        ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not).
     placements : dict of contender to (m, n, 2) m
         Where the robots were at the end; nan where the run failed.
     shares : dict of map to float, m
@@ -62,26 +89,9 @@ class Outcomes:
         """The start of each scenario."""
         return tuple(scenario.start for scenario in self.scenarios)
 
-    def together(self, contenders: Iterable[str], measure: str) -> BoolArray:
-        """Return in which scenarios all of these contenders have a finite value, (m,)."""
-        finite = np.ones(len(self.scenarios), dtype=bool)
-        for contender in contenders:
-            finite &= np.isfinite(self.of(contender, measure))
-        return finite
-
-    def median_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:
-        """Return the median of what a contender reached on each map on which it has a finite value."""
-        values = self.of(contender, measure)
-        found: dict[str, float] = {}
-        for map_ in dict.fromkeys(self.maps):
-            here = values[[each == map_ for each in self.maps]]
-            here = here[np.isfinite(here)]
-            if len(here):
-                found[map_] = float(np.median(here))
-        return found
-
-    def among(self, chosen: BoolArray) -> Outcomes:
+    def where(self, chosen: Sequence[bool] | BoolArray) -> Outcomes:
         """Return some of the scenarios."""
+        chosen = np.array(chosen, dtype=bool)
         return Outcomes(
             tuple(scenario for scenario, kept in zip(self.scenarios, chosen, strict=True) if kept),
             {key: values[chosen] for key, values in self.values.items()},
@@ -89,14 +99,66 @@ class Outcomes:
             self.shares,
         )
 
-    def from_starts(self, starts: Iterable[str]) -> Outcomes:
+    def measured(self, measure: str, *contenders: str) -> Outcomes:
+        """Return the scenarios in which all of these contenders have a finite value."""
+        return self.where(np.all([np.isfinite(self.of(each, measure)) for each in contenders], axis=0))
+
+    def from_starts(self, *starts: str) -> Outcomes:
         """Return the scenarios that begin from these starts."""
-        wanted = set(starts)
-        return self.among(np.array([start in wanted for start in self.starts], dtype=bool))
+        return self.where([start in starts for start in self.starts])
+
+    def median_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:
+        """Return the median of what a contender reached on each map on which it has a finite value."""
+        here = self.measured(measure, contender)
+        values, names = here.of(contender, measure), np.array(here.maps)
+        return {name: float(np.median(values[names == name])) for name in dict.fromkeys(here.maps)}
+
+    def compared(self, first: str, second: str, measure: str = "final") -> Comparison | None:
+        """Return how `first` compares with `second`; None where they never met."""
+        fine = self.measured(measure, first, second)
+        return Comparison(fine, first, second, measure) if fine.scenarios else None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two contenders pair by pair, in the scenarios in which both have a value."""
+
+    fine: Outcomes
+    first: str
+    second: str
+    measure: str
+
+    @cached_property
+    def ratios(self) -> Array:
+        """The first's value by the second's, (m,)."""
+        return self.fine.of(self.first, self.measure) / self.fine.of(self.second, self.measure)
+
+    @cached_property
+    def ratio(self) -> Interval:
+        """Median of the ratios."""
+        return bootstrap(self.ratios, clusters=self.fine.maps)
+
+    @cached_property
+    def wins(self) -> Interval:
+        """Share of pairs in which the first's value is the lower one; ties count half."""
+        first, second = (self.fine.of(each, self.measure) for each in (self.first, self.second))
+        won = np.where(first < second, 1.0, np.where(first == second, 0.5, 0.0))
+        return bootstrap(won, "mean", self.fine.maps)
+
+    @property
+    def lost(self) -> int:
+        """How many pairs the first does not win."""
+        return int((self.ratios >= 1.0).sum())
+
+    @property
+    def worst(self) -> tuple[float, Scenario]:
+        """The highest ratio, and where."""
+        k = int(np.argmax(self.ratios))
+        return float(self.ratios[k]), self.fine.scenarios[k]
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
-    """Return the outcomes of several studies together; a contender has nan where it did not take part.
+    """Return the outcomes of several sweeps together; a contender has nan where it did not take part.
 
     Scenarios keep the order in which they are first met. Where several parts have a contender in the same
     scenario, the last one counts.
@@ -119,7 +181,7 @@ def joined(parts: Sequence[Outcomes]) -> Outcomes:
 
 @dataclass(frozen=True, eq=False)
 class GainOutcomes:
-    """What one law reached with every set of gains of a grid.
+    """What one controller reached with every set of gains of a grid.
 
     Attributes
     ----------
@@ -141,9 +203,12 @@ class GainOutcomes:
     @property
     def complete(self) -> GainOutcomes:
         """The scenarios in which no run failed."""
-        fine: BoolArray = np.asarray(np.isfinite(self.excess).all(axis=0))
-        kept = tuple(each for each, good in zip(self.scenarios, fine, strict=True) if good)
-        return GainOutcomes(kept, self.gains, self.excess[:, fine])
+        return self.where(np.asarray(np.isfinite(self.excess).all(axis=0)))
+
+    def where(self, chosen: Sequence[bool] | BoolArray) -> GainOutcomes:
+        """Return some of the scenarios."""
+        kept = tuple(each for each, wanted in zip(self.scenarios, chosen, strict=True) if wanted)
+        return GainOutcomes(kept, self.gains, self.excess[:, np.array(chosen, dtype=bool)])
 
     def best(self, columns: Sequence[int] | None = None) -> int:
         """Return the number of the gains whose mean of J/J_ref is least, over all scenarios or some.
@@ -157,3 +222,135 @@ class GainOutcomes:
         """Return the part of the grid in which one gain has this value."""
         rows = [k for k, gains in enumerate(self.gains) if gains.get(name) == value]
         return GainOutcomes(self.scenarios, tuple(self.gains[k] for k in rows), self.excess[rows])
+
+
+def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Value]]:
+    """Return the best gains of each controller, but for those with a failed run in every scenario."""
+    return {name: grid.gains[grid.best()] for name, grid in found.items() if grid.complete.scenarios}
+
+
+def read_outcomes(
+    folder: Path,
+    contest: Contest,
+    references: Mapping[str, Reference],
+    columns: Mapping[str, str] = COLUMNS,
+) -> Outcomes:
+    """Return what the contenders of a sweep reached; without a reference there is no gap on a map.
+
+    `columns` of its table by measure. Raises InputError when the results cannot be read.
+    """
+    results = read_results(folder)
+    scenarios = scenarios_of(contest.study)
+    keys: dict[Any, list[str]] = {}
+    for each in contest.contenders:
+        keys.setdefault(_law(each.controller, each.all_gains), []).append(each.key)
+    values = {
+        (each.key, measure): np.full(len(scenarios), np.nan)
+        for each in contest.contenders
+        for measure in (*columns, "early", "first_minute", "gap")
+    }
+    placements = {each.key: np.full((len(scenarios), ROBOTS, 2), np.nan) for each in contest.contenders}
+    for at, row in _rows(folder, scenarios):
+        own = keys.get(_law(row["controller"], row))
+        if own is None:
+            continue
+        history, reference = results.history(row["run"]), references.get(row["map"])
+        found = {
+            measure: np.nan if row[column] is None else float(row[column])
+            for measure, column in columns.items()
+        }
+        found["early"] = mean_until(history, EARLY)
+        found["first_minute"] = mean_until(history, FIRST_MINUTE)
+        if reference is not None:
+            found["gap"] = found["final"] / reference.mean_distance - 1.0
+        for key in own:
+            placements[key][at] = results.record(row["run"]).positions[-1]
+            for measure, value in found.items():
+                values[key, measure][at] = value
+    shares = {each.name: side_of_share(each.environment, ROBOTS) for each in contest.study.maps}
+    return Outcomes(scenarios, values, placements, shares)
+
+
+def read_gain_outcomes(
+    folder: Path, study: Study, references: Mapping[str, Reference]
+) -> dict[str, GainOutcomes]:
+    """Return what each controller of a sweep reached with every set of its gains.
+
+    Raises InputError when the results cannot be read.
+    """
+    scenarios = scenarios_of(study)
+    choices = {name: study.gains_of(name).choices for name in study.controllers}
+    excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
+    place = {_law(name, each): (name, k) for name, sets in choices.items() for k, each in enumerate(sets)}
+    for at, row in _rows(folder, scenarios):
+        known = place.get(_law(row["controller"], row))
+        if known is not None and row["map"] in references:
+            name, k = known
+            excess[name][k, at] = row["mean_distance_m"] / references[row["map"]].mean_distance
+    return {name: GainOutcomes(scenarios, choices[name], excess[name]) for name in study.controllers}
+
+
+def scenarios_of(study: Study) -> tuple[Scenario, ...]:
+    """Return the scenarios of a sweep, in the order of its table."""
+    return tuple(
+        Scenario(each.name, start, seed)
+        for each in study.maps
+        for start in study.starts_on(each)
+        for seed in study.seeds
+    )
+
+
+def mean_until(history: CostHistory, until: float) -> float:
+    """Return the mean distance averaged over the time up to `until`, s, by the trapezoidal rule; m.
+
+    A run that ends before is averaged over all of it.
+    """
+    end = min(until, float(history.time[-1]))
+    inside = history.time < end
+    time = np.append(history.time[inside], end)
+    values = np.append(history.mean_distance[inside], np.interp(end, history.time, history.mean_distance))
+    if len(time) < 2:
+        return float(values[-1])
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
+
+
+def matched_distance(first: Array, second: Array) -> float:
+    """Return the mean distance, m, between the robots of two placements (n, 2), matched as well as can be.
+
+    Robots are alike: each place of one is assigned to one of the other with the least sum of straight
+    distances.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    apart = np.hypot(*(first[:, None] - second[None]).transpose(2, 0, 1))
+    rows, columns = linear_sum_assignment(apart)
+    return float(apart[rows, columns].mean())
+
+
+def spread_of_placements(placements: Array, starts: Sequence[str]) -> float:
+    """Return the median matched distance between the ends (m, n, 2) of runs on one map from different starts.
+
+    Runs with nan do not count; nan where there is no pair.
+    """
+    fine = np.flatnonzero(np.isfinite(placements).all(axis=(1, 2))).tolist()
+    pairs = [
+        matched_distance(placements[i], placements[k])
+        for i, k in combinations(fine, 2)
+        if starts[i] != starts[k]
+    ]
+    return float(np.median(pairs)) if pairs else float("nan")
+
+
+def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the rows of a table that did not fail, each with the number of its scenario."""
+    place = {scenario: k for k, scenario in enumerate(scenarios)}
+    for batch in read_results(folder).batches():
+        for row in batch.to_pylist():
+            at = place.get(Scenario(row["map"], row["start"], row["seed"]))
+            if at is not None and row["error"] is None:
+                yield at, row
+
+
+def _law(controller: str, gains: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what tells laws apart: the controller and the values of all its gains."""
+    return (controller, *(gains[name] for name in gains_of(CONTROLLERS.get(controller))))

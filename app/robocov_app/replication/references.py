@@ -10,18 +10,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robocov.errors import OutputError
 from robocov.files.atomic import written
-from robocov.mapfile import to_json
+from robocov.mapfile import from_json, to_json
+from robocov_app.replication.plan import ROBOTS, TEAM, Plan
+from robocov_app.sweep.study import StudyMap
+from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
 from robocov_app.toolkit import worker
-
-if TYPE_CHECKING:
-    from robocov_app.sweep.study import StudyMap
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.toolkit.worker import Line
 
 _FORMAT = "robocov-reference 1"
 """Another one whenever the search gives other results."""
@@ -32,15 +30,7 @@ _PATIENCE = 0.2
 
 @dataclass(frozen=True)
 class Question:
-    """What a reference depends on.
-
-    Attributes
-    ----------
-    document : dict
-        The map as JSON.
-    robots, lattice, restarts, seed : int
-    radius : float, m
-    """
+    """What a reference depends on: the map as JSON, the team, and how well it is searched for."""
 
     document: Mapping[str, Any]
     robots: int
@@ -59,14 +49,9 @@ class Question:
 
 @dataclass(frozen=True)
 class Reference:
-    """The best placement that was found with the whole map known.
+    """The best placement that was found with the whole map known, m.
 
-    Attributes
-    ----------
-    mean_distance : float, m
-    positions : n pairs of x, y, m
-    agreement : float
-        Share of the restarts that end within 0.5 % of the best.
+    `agreement` is the share of the restarts that end within 0.5 % of it.
     """
 
     mean_distance: float
@@ -74,83 +59,61 @@ class Reference:
     agreement: float
 
 
-def answered(question: Question) -> Reference:
-    """Search for the reference; takes some seconds."""
-    from robocov.mapfile import from_json
-    from robocov.optimum import optimum
-
-    best = optimum(
-        from_json(dict(question.document)),
-        question.robots,
-        radius=question.radius,
-        lattice=question.lattice,
-        restarts=question.restarts,
-        seed=question.seed,
-    )
-    positions = tuple((float(x), float(y)) for x, y in best.positions.tolist())
-    return Reference(float(best.mean_distance), positions, float(best.agreement()))
-
-
 class Searching:
     """Searches for references in a process of its own."""
 
     failing = "the search failed"
 
-    def __call__(self, questions: list[Question], line: Line) -> Reference:
-        """Search for one."""
-        return answered(questions[-1])
+    def __call__(self, questions: list[Question], line: worker.Line) -> Reference:
+        """Search for one; takes some seconds."""
+        from robocov.optimum import optimum
+
+        asked = questions[-1]
+        best = optimum(
+            from_json(dict(asked.document)),
+            asked.robots,
+            radius=asked.radius,
+            lattice=asked.lattice,
+            restarts=asked.restarts,
+            seed=asked.seed,
+        )
+        positions = tuple((float(x), float(y)) for x, y in best.positions.tolist())
+        return Reference(float(best.mean_distance), positions, float(best.agreement()))
 
 
-def references(
+def find_references(
     maps: Sequence[StudyMap],
     folder: Path,
+    plan: Plan,
     *,
-    robots: int,
-    radius: float,
-    lattice: int,
-    restarts: int,
     workers: int,
     quiet: bool,
     stop: Interruption,
+    robots: int = ROBOTS,
+    radius: float = TEAM["radius"],
 ) -> dict[str, Reference]:
-    """Return the reference of every map by its name: from `folder` where it is there, else searched for.
+    """Return the reference of every map by its name: as kept in a file of `folder`, else searched for.
 
-    Parameters
-    ----------
-    maps : sequence of StudyMap
-    folder : Path
-        One file a map; made where it is missing.
-    robots, radius, lattice, restarts
-        As for `robocov.optimum.optimum`.
-    workers : int
-        Processes.
-    quiet : bool
-        Tell nothing.
-    stop : Interruption
-        Asked now and then; what is there by then is returned.
-
-    Raises
-    ------
-    OutputError
-        When a file cannot be written, or a process ends in the midst of a search.
+    `stop` is asked now and then; what is there by then is returned. Raises OutputError when a file cannot be
+    written, or a process ends in the midst of a search.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
     found: dict[str, Reference] = {}
-    open_questions: dict[str, Question] = {}
+    missing: dict[str, Question] = {}
     for each in maps:
-        question = Question(to_json(each.environment), robots, radius, lattice, restarts)
+        question = Question(to_json(each.environment), robots, radius, plan.lattice, plan.restarts)
         kept = _kept(folder / f"{each.name}.json", question)
         if kept is None:
-            open_questions[each.name] = question
+            missing[each.name] = question
         else:
             found[each.name] = kept
-    if open_questions:
-        with progress("references", len(open_questions), quiet=quiet) as update:
-            for number, (name, answer) in enumerate(_searched(open_questions, workers, stop), start=1):
-                _keep(folder / f"{name}.json", open_questions[name], answer)
+    if missing:
+        with progress("references", len(missing), quiet=quiet) as update:
+            for number, (name, answer) in enumerate(_searched(missing, workers, stop), start=1):
+                _keep(folder / f"{name}.json", missing[name], answer)
                 found[name] = answer
                 update(number)
     return found
@@ -195,12 +158,12 @@ def _searched(
         waiting.put(item)
     answers: queue.SimpleQueue[tuple[str, Reference | OutputError]] = queue.SimpleQueue()
     ended = threading.Event()
-    hands = [
+    threads = [
         threading.Thread(target=_work, args=(waiting, answers, ended), daemon=True)
         for _ in range(min(workers, len(questions)))
     ]
-    for hand in hands:
-        hand.start()
+    for thread in threads:
+        thread.start()
     try:
         left = len(questions)
         while left and not stop.requested:
@@ -212,8 +175,8 @@ def _searched(
                 yield name, answer
     finally:
         ended.set()
-        for hand in hands:
-            hand.join()
+        for thread in threads:
+            thread.join()
 
 
 def _work(

@@ -13,31 +13,32 @@ and open where it reaches over an end of the range.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
 
-if TYPE_CHECKING:
-    from robocov_app.figures.statistics import Interval
+from robocov_app.figures.statistics import Interval
+from robocov_app.replication.outcomes import GainOutcomes, Outcomes
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
 
 LEAST_MAPS = 5
 """A bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)."""
 
+VERDICTS: dict[Verdict, str] = {
+    "holds": "hold",
+    "holds partly": "hold partly",
+    "does not hold": "do not hold",
+    "undecided": "are undecided",
+}
+"""Verdicts, and how they are said of several claims."""
+
 
 @dataclass(frozen=True)
 class Criterion:
-    """What has to be so for a claim to hold.
+    """A measure whose interval has to lie between `low` and `high`, both included, for a claim to hold.
 
-    Attributes
-    ----------
-    text : str
-        What is measured: "median of J(RAPF) / J(LA)".
-    interval : Interval
-    low, high : float
-        The range in which it has to lie, both ends included.
-    unit : {"", "%", "m", "s"}
-        How it is written; with "%", 0.5 is 50 %.
+    `unit` is "", "%", "m" or "s"; with "%", 0.5 is written as 50 %.
     """
 
     text: str
@@ -94,19 +95,17 @@ class Claim:
     key : str
         Stays the same over versions: "nonconvex-final-shared".
     part : int
-        Which of the study's six questions it belongs to.
+        Which question it belongs to.
     claim : str
         The paper's sentence in our words.
-    criteria : tuple of Criterion
-        The first one is the main one: its estimate stands for the claim.
-    runs : int
-        Simulated runs that went into it.
-    maps : int
-        Different maps among them.
-    explanation : str
-        What else there is to say, with numbers.
     source : str
         Where the paper says it; empty where the question is ours.
+    criteria : tuple of Criterion
+        The first one is the main one: its estimate stands for the claim.
+    runs, maps : int
+        Simulated runs that went into it, and different maps among them.
+    explanation : str
+        What else there is to say, with numbers.
     least_maps : int
         On fewer maps it is undecided.
     """
@@ -114,12 +113,24 @@ class Claim:
     key: str
     part: int
     claim: str
-    criteria: tuple[Criterion, ...]
-    runs: int
-    maps: int
-    explanation: str = ""
     source: str = ""
+    criteria: tuple[Criterion, ...] = ()
+    runs: int = 0
+    maps: int = 0
+    explanation: str = "There is no run that could tell."
     least_maps: int = LEAST_MAPS
+
+    def judged(
+        self, criteria: Sequence[Criterion], explanation: str, on: Outcomes | GainOutcomes, runs: int
+    ) -> Claim:
+        """Return the claim with what `runs` runs in each of some scenarios say of it."""
+        return replace(
+            self,
+            criteria=tuple(criteria),
+            explanation=explanation,
+            runs=runs * len(on.scenarios),
+            maps=len(set(on.maps)),
+        )
 
     @property
     def verdict(self) -> Verdict:
@@ -182,3 +193,15 @@ def described(interval: Interval, unit: str = "") -> str:
     return (
         f"{amount(interval.estimate, unit)} ({amount(interval.low, unit)} to {amount(interval.high, unit)})"
     )
+
+
+def verdict_counts(claims: Sequence[Claim]) -> str:
+    """Return in words how many claims hold, hold partly, do not hold, or are undecided."""
+    found = [claim.verdict for claim in claims]
+    one = {"undecided": "is undecided"}
+    parts = [
+        f"{found.count(verdict)} {one.get(verdict, verdict) if found.count(verdict) == 1 else several}"
+        for verdict, several in VERDICTS.items()
+        if verdict in found
+    ]
+    return f"Of {len(claims)} claims {', '.join(parts)}."

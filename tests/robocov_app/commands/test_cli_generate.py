@@ -14,7 +14,8 @@ from robocov.generator import GENERATORS, generated_map
 from robocov.mapfile import bundled_maps, dump_map, load_map
 from robocov_app.cli import main
 from robocov_app.commands.generate import KindName
-from robocov_app.replication.plan import QUICK, claim_maps, convex_maps, tuning_maps
+from robocov_app.replication.plan import QUICK
+from robocov_app.replication.studies import claim_maps, convex_maps, tuning_maps
 
 
 def test_every_kind_can_be_asked_for() -> None:

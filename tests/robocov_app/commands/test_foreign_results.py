@@ -13,8 +13,9 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.notebook import record_html, record_png
-from robocov_app.replication.plan import Contender
-from robocov_app.replication.reading import read_outcomes
+from robocov_app.replication.contenders import Contender
+from robocov_app.replication.outcomes import read_outcomes
+from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study_file import read_study
 from robocov_app.viewer.session.replayed import LostLaw
 from robocov_app.viewer.session.session import Session
@@ -142,8 +143,8 @@ def test_nor_does_python(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         record_html(record), record_png(record)
     results = read_results(shared / "sweep")
     assert results.record(0).controller == results.to_pandas()["controller"][0] == "mine.py:Mine"
-    contenders = (Contender("ours", "ours", "lloyd", {}),)
-    read_outcomes(shared / "sweep", read_study(shared / "ours.toml"), contenders, {})
+    contest = Contest(read_study(shared / "ours.toml"), (Contender("ours", "ours", "lloyd", {}),))
+    read_outcomes(shared / "sweep", contest, {})
     assert not (shared / "marker").exists()
 
 

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from robocov.errors import ParameterError
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.degradation import Degradation
-from robocov_app.replication.degradation_plots import plot_degradations
+from robocov_app.replication.plots import plot_degradations
+from robocov_app.replication.results import Degradation
 
 
 def found() -> list[Degradation]:
@@ -17,7 +19,7 @@ def found() -> list[Degradation]:
         for k, value in enumerate(values):
             for name, label in (("rapf", "RAPF"), ("lloyd", "LA")):
                 ratio = Interval(1.0 + 0.2 * k, 1.0, 1.0 + 0.4 * k)
-                rows.append(Degradation(axis, value, name, label, ratio, 6, 0))
+                rows.append(Degradation(axis, value, name, label, ratio, 6))
     return rows
 
 
@@ -49,8 +51,8 @@ def test_a_panel_for_each_thing_and_a_curve_for_each_controller(theme: str) -> N
 
 def test_what_has_no_ratio_is_left_out() -> None:
     nothing = Interval(float("nan"), float("nan"), float("nan"))
-    rows = [each._replace(ratio=nothing) if each.value == 0.1 else each for each in found()]
+    rows = [replace(each, ratio=nothing) if each.value == 0.1 else each for each in found()]
     figure = plot_degradations(rows)
     assert figure.axes[2].get_ylim() == figure.axes[0].get_ylim()
     with pytest.raises(ParameterError, match="none with a ratio"):
-        plot_degradations([each._replace(ratio=nothing) for each in found()])
+        plot_degradations([replace(each, ratio=nothing) for each in found()])

@@ -1,5 +1,6 @@
 import json
 import threading
+from dataclasses import replace
 
 import pytest
 from drawn_run import SQUARE
@@ -8,7 +9,8 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
-from robocov_app.replication.references import Question, Reference, references
+from robocov_app.replication.plan import QUICK
+from robocov_app.replication.references import Question, Reference, find_references
 from robocov_app.sweep.study import StudyMap
 from robocov_app.terminal.interruption import Interruption
 
@@ -17,8 +19,9 @@ MAPS = (StudyMap("square", SQUARE), StudyMap("hall", HALL))
 
 
 def found(folder, maps=MAPS, restarts=2, stop=None, **other):
-    options = {"robots": 3, "radius": 0.1, "lattice": 16, "workers": 2, "quiet": True, **other}
-    return references(maps, folder, restarts=restarts, stop=stop or Interruption(), **options)
+    plan = replace(QUICK, lattice=other.pop("lattice", 16), restarts=restarts)
+    options = {"robots": 3, "radius": 0.1, "workers": 2, "quiet": True, **other}
+    return find_references(maps, folder, plan, stop=stop or Interruption(), **options)
 
 
 @pytest.mark.slow

@@ -1,12 +1,13 @@
 import json
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
 import pytest
 
-from robocov_app.replication import steps
+from robocov_app.replication import step_times as steps
 from robocov_app.replication.plan import QUICK
-from robocov_app.replication.steps import StepTimes, step_times
+from robocov_app.replication.step_times import StepTimes, step_times
 
 
 @pytest.fixture(autouse=True)
@@ -15,8 +16,8 @@ def short_blocks(monkeypatch):
 
 
 def timed(folder, wanted=None, **other):
-    options = {"dt": 0.02, "team": QUICK.team, "warm_up": 1, "blocks": 3, **other}
-    return step_times(folder, wanted or {3: ("rpf", "lloyd")}, **options)
+    plan = replace(QUICK, beyond=replace(QUICK.beyond, warm_up=1, blocks=other.pop("blocks", 3)))
+    return step_times(folder, wanted or {3: ("rpf", "lloyd")}, plan, **other)
 
 
 def test_controllers_are_timed_in_turn_beside_rapf(tmp_path):

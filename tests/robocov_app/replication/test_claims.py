@@ -9,10 +9,15 @@ from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
 from robocov_app.replication import claims
-from robocov_app.replication.gain_claims import gains_choice, gains_result, regrets
-from robocov_app.replication.outcomes import GainOutcomes, Outcomes, Scenario
-from robocov_app.replication.placements import matched_distance, spread_of_placements
-from robocov_app.replication.verdicts import Claim, Criterion, amount
+from robocov_app.replication.claims import gains_choice, gains_result, regrets, same_scenarios
+from robocov_app.replication.outcomes import (
+    GainOutcomes,
+    Outcomes,
+    Scenario,
+    matched_distance,
+    spread_of_placements,
+)
+from robocov_app.replication.verdicts import Claim, Criterion, amount, verdict_counts
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
@@ -75,12 +80,12 @@ class TestVerdicts:
         criteria = tuple(
             Criterion("x", Interval(1.0, *interval[word]), 0.0, 1.0) for word in outcomes.split()
         )
-        assert Claim("k", 1, "c", criteria, runs=50, maps=20).verdict == verdict
-        assert Claim("k", 1, "c", criteria, runs=50, maps=4).verdict == "undecided"
+        assert Claim("k", 1, "c", "", criteria, runs=50, maps=20).verdict == verdict
+        assert Claim("k", 1, "c", "", criteria, runs=50, maps=4).verdict == "undecided"
 
     def test_json_has_what_was_promised(self):
         criterion = Criterion("ratio", Interval(0.9, 0.8, 0.95), high=1.0)
-        found = Claim("k", 2, "It is lower.", (criterion,), 40, 10, "Why.").to_json()
+        found = Claim("k", 2, "It is lower.", "VI", (criterion,), 40, 10, "Why.").to_json()
         assert found["claim"] == "It is lower."
         assert (found["verdict"], found["estimate"], found["interval"]) == ("holds", 0.9, [0.8, 0.95])
         assert (found["runs"], found["key"], found["criteria"][0]["met"]) == (40, "k", True)
@@ -125,30 +130,34 @@ class TestConvex:
             odd = np.array([int(map_.split()[1]) % 2 for map_ in found.maps])
             values["rapf-shared", "early"] = values["lloyd", "early"] * np.where(odd, 1.1, 1 / 1.1)
             found = Outcomes(found.scenarios, values)
-        assert claims.convex_spreading(found, ("corner", "centre")).verdict == verdict
+        assert claims.convex_spreading(found).verdict == verdict
 
     def test_only_starts_close_together_count(self):
         found = outcomes(measure="early", rapf_shared=[0.9, 0.9, 5.0], lloyd=1.0)
-        claim = claims.convex_spreading(found, ("corner", "centre"))
+        claim = claims.convex_spreading(found)
         assert claim.verdict == "holds"
         assert claim.runs == 2 * MANY * 2 * 2
 
 
 class TestNonConvex:
-    @pytest.mark.parametrize("gains", ["shared", "best"])
-    @pytest.mark.parametrize(("moment", "measure"), [("final", "final"), ("motion", "first_minute")])
     @pytest.mark.parametrize(
-        ("level", "verdict"),
-        [(0.7, "holds"), (0.97, "holds partly"), (1.1, "does not hold"), ([0.6, 0.6, 1.2], "holds partly")],
+        ("level", "verdict", "gains", "moment"),
+        [
+            (0.7, "holds", "shared", "final"),
+            (0.97, "holds partly", "best", "final"),
+            (1.1, "does not hold", "shared", "motion"),
+            ([0.6, 0.6, 1.2], "holds partly", "best", "motion"),
+        ],
     )
-    def test_against_rpf(self, gains, moment, measure, level, verdict):
+    def test_against_rpf(self, gains, moment, level, verdict):
+        measure = {"final": "final", "motion": "first_minute"}[moment]
         laws = {f"rapf_{gains}": level, f"rpf_{gains}": 1.0}
-        claim = claims.nonconvex(outcomes(measure=measure, **laws), gains, moment)
+        claim = claims.against_rpf(outcomes(measure=measure, **laws), gains, moment)
         assert claim.verdict == verdict
         assert claim.key == f"nonconvex-{moment}-{gains}"
 
     def test_where_it_loses_is_told(self):
-        claim = claims.nonconvex(outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final")
+        claim = claims.against_rpf(outcomes(rapf_shared=[0.6, 0.7, 1.2], rpf_shared=1.0), "shared", "final")
         assert "corner 0.6, centre 0.7, uniform 1.2" in claim.explanation
         assert f"RAPF loses {MANY * 2} of {MANY * 6}" in claim.explanation
         assert "start uniform" in claim.explanation
@@ -157,17 +166,17 @@ class TestNonConvex:
         ("level", "verdict"), [(0.8, "holds"), (0.99, "holds partly"), (1.1, "does not hold")]
     )
     def test_against_lloyd(self, level, verdict):
-        assert claims.outperforms_lloyd(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
+        assert claims.against_lloyd(outcomes(rapf_shared=level, lloyd=1.0)).verdict == verdict
 
     def test_few_maps_decide_nothing(self):
-        claim = claims.nonconvex(outcomes(FEW, rapf_shared=0.5, rpf_shared=1.0), "shared", "final")
+        claim = claims.against_rpf(outcomes(FEW, rapf_shared=0.5, rpf_shared=1.0), "shared", "final")
         assert (claim.verdict, claim.maps) == ("undecided", FEW)
 
     def test_runs_that_failed_drop_out_in_pairs(self):
         whole = outcomes(rapf_shared=0.5, rpf_shared=1.0)
         whole.values["rapf-shared", "final"][3] = np.nan
         whole.values["rpf-shared", "final"][[3, 7]] = np.nan
-        claim = claims.nonconvex(whole, "shared", "final")
+        claim = claims.against_rpf(whole, "shared", "final")
         assert claim.runs == 2 * (MANY * 6 - 2)
         assert claim.criteria[0].interval.estimate == pytest.approx(0.5, rel=0.01)
 
@@ -215,7 +224,7 @@ class TestStuckAndGap:
         where = scenarios(MANY, 4)
         count = (np.arange(len(where)) % 10 < 10 * share) * 2.0
         values = {("lloyd", "stuck"): count, ("lloyd", "gap"): np.full(len(where), gap)}
-        claim = claims.stuck(Outcomes(where, values))
+        claim = claims.lloyd_stuck(Outcomes(where, values))
         assert claim.verdict == verdict
         assert f"{amount(float(count.mean()))} robots" in claim.explanation
 
@@ -284,7 +293,7 @@ class TestGains:
     def test_scenarios_with_a_failed_run_do_not_count(self):
         broken = grid(0.02)
         broken.excess[2, 5] = np.nan
-        claim = gains_result(broken, grid(0.9))
+        claim = gains_result(*same_scenarios(broken, grid(0.9)))
         assert claim.runs == 2 * 9 * (MANY * 3 - 1)
         assert broken.best() == 4
 
@@ -293,12 +302,12 @@ class TestGains:
     "claim",
     [
         claims.convex_final,
-        lambda o: claims.convex_spreading(o, STARTS),
-        lambda o: claims.nonconvex(o, "best", "motion"),
-        claims.outperforms_lloyd,
+        claims.convex_spreading,
+        lambda o: claims.against_rpf(o, "best", "motion"),
+        claims.against_lloyd,
         claims.starts_cost,
         claims.starts_placement,
-        claims.stuck,
+        claims.lloyd_stuck,
         lambda o: claims.gap_to_reference(o, "lloyd"),
     ],
 )
@@ -335,3 +344,18 @@ class TestMatchedDistance:
         ends = np.array([[[0.0, 0.0]], [[9.0, 0.0]], [[1.0, 0.0]], [[np.nan, 0.0]]])
         assert spread_of_placements(ends, ["a", "a", "b", "b"]) == pytest.approx(4.5)
         assert np.isnan(spread_of_placements(ends[:2], ["a", "a"]))
+
+
+def test_how_many_claims_hold_is_told_in_words():
+    def of(*verdicts):
+        kinds = {
+            "holds": Interval(0.5, 0.4, 0.6),
+            "not": Interval(2.0, 1.9, 2.1),
+            "open": Interval(1.0, 0.9, 1.1),
+        }
+        return [Claim("k", 1, "", "", (Criterion("", kinds[word], high=1.0),), 9, 9) for word in verdicts]
+
+    assert verdict_counts(of("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
+    assert verdict_counts(of("holds", "not", "open", "open")) == (
+        "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
+    )

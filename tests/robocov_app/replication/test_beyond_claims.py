@@ -4,32 +4,35 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication import goals as judged
-from robocov_app.replication.beyond_plan import HUGE, LARGE
-from robocov_app.replication.beyond_studies import TARGETS, TEAMS, UNTUNED, contender
-from robocov_app.replication.degradation import Degradation
-from robocov_app.replication.extensions import conditions_claim, density_claim, targets_claim, teams_claim
-from robocov_app.replication.goals import (
+from robocov_app.replication.beyond_claims import (
     GOALS,
     RIVALS,
+    Goal,
+    conditions_claim,
+    density_claim,
+    goal_counts,
     goals,
     rival_claims,
+    targets_claim,
+    teams_claim,
     unseen_claim,
     worst_median,
     worst_ratio,
 )
+from robocov_app.replication.contenders import TARGETS, TEAMS, UNTUNED, with_gains
 from robocov_app.replication.outcomes import Outcomes, Scenario
-from robocov_app.replication.steps import StepTimes
-from robocov_app.replication.verdicts import Claim, Criterion
-from robocov_app.replication.writing import told_counts
+from robocov_app.replication.plan import FULL
+from robocov_app.replication.results import Degradation
+from robocov_app.replication.step_times import StepTimes
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
 MAPS = ("a", "b", "c", "d", "e", "f")
-OURS = contender("howard")
+OURS = with_gains("howard", {})
 """Stands for ours: goals are asked of any contender."""
 
 RAPF, LLOYD = UNTUNED[1], UNTUNED[3]
+LARGE, HUGE = FULL.beyond.large, FULL.beyond.huge
 
 
 def outcomes(ours: float = 1.01, rapf: float = 1.05, lloyd: float = 1.08, **other: float) -> Outcomes:
@@ -52,8 +55,8 @@ def steps(ratio: float = 5.0, part: float = 0.5) -> dict[int, StepTimes]:
     }
 
 
-def asked(what: Outcomes, times: dict[int, StepTimes] | None = None) -> dict[str, judged.Goal]:
-    found = goals(what, OURS, (RAPF, LLOYD, OURS), steps() if times is None else times, 120.0)
+def asked(what: Outcomes, times: dict[int, StepTimes] | None = None) -> dict[str, Goal]:
+    found = goals(what, OURS, (RAPF, LLOYD, OURS), steps() if times is None else times, FULL)
     return {goal.claim.key.removeprefix("goal-"): goal for goal in found}
 
 
@@ -119,7 +122,7 @@ def test_on_maps_that_nobody_looked_at_it_is_judged_once_more(changes, verdict):
 
 def test_where_it_has_not_run_nothing_is_claimed():
     there = outcomes()
-    nowhere = there.among(np.zeros(len(there.scenarios), dtype=bool))
+    nowhere = there.where(np.zeros(len(there.scenarios), dtype=bool))
     assert unseen_claim(nowhere, OURS, (RAPF, LLOYD, OURS)) is None
 
 
@@ -135,9 +138,10 @@ def test_on_one_bad_map_the_goal_for_every_map_is_missed():
 
 
 def test_without_a_run_no_goal_is_judged():
-    empty = outcomes().among(np.zeros(12, dtype=bool))
+    empty = outcomes().where(np.zeros(12, dtype=bool))
     assert set(asked(empty)) == {"step", "real-time"}
     assert asked(empty, {}) == {}
+    assert goal_counts([]) == "Nothing was measured."
 
 
 @given(st.lists(st.tuples(st.sampled_from("xyz"), st.floats(0.0, 2.0)), min_size=1, max_size=20))
@@ -152,7 +156,7 @@ def test_the_worst_median_is_that_of_the_worst_map(rows):
 
 
 def test_ours_is_compared_pair_by_pair_with_everybody():
-    rival = contender("geodesic-lloyd")
+    rival = with_gains("geodesic-lloyd", {})
     what = outcomes()
     values = {**what.values, (rival.key, "final"): np.full(12, 2.01)}
     found = {
@@ -167,7 +171,7 @@ def test_ours_is_compared_pair_by_pair_with_everybody():
     closed = found["beyond-howard-closes"]
     assert closed.criteria[0].interval.estimate == pytest.approx(1.0 - 0.01 / 0.05)
     assert closed.verdict == "holds"
-    unmet = rival_claims(what, OURS, (contender("poduri"),))
+    unmet = rival_claims(what, OURS, (with_gains("poduri", {}),))
     assert [each.verdict for each in unmet] == ["undecided"]
 
 
@@ -184,14 +188,8 @@ def test_targets_make_a_difference_or_none():
 
 
 def test_knowing_the_density_helps_or_does_not():
-    from robocov_app.replication.beyond import Weighed
-
-    def weighed(known: float) -> Weighed:
-        return Weighed(level({"known": known, "ignored": 1.0}), None, (known, 1.0))  # type: ignore[arg-type]
-
-    assert density_claim(weighed(0.8)).verdict == "holds"
-    assert density_claim(weighed(0.97)).verdict == "holds partly"
-    assert density_claim(weighed(1.2)).verdict == "does not hold"
+    for known, verdict in ((0.8, "holds"), (0.97, "holds partly"), (1.2, "does not hold")):
+        assert density_claim(level({"known": known, "ignored": 1.0})).verdict == verdict
 
 
 @pytest.mark.parametrize("controller", ["rapf", "lloyd"])
@@ -206,7 +204,7 @@ def test_cells_by_time_help_or_do_not(controller):
 def test_messages_are_borne_or_not():
     def found(loss: float, delay: float) -> list[Degradation]:
         return [
-            Degradation(axis, value, "rapf", "RAPF", Interval(ratio, ratio, ratio), 9, 0)
+            Degradation(axis, value, "rapf", "RAPF", Interval(ratio, ratio, ratio), 9)
             for axis, value, ratio in (("loss", 0.6, loss), ("delay", 1.0, delay))
         ]
 
@@ -215,18 +213,3 @@ def test_messages_are_borne_or_not():
     assert conditions_claim(found(1.2, 1.5), 6).verdict == "does not hold"
     assert "1.5, with delay 1" in conditions_claim(found(1.2, 1.5), 6).explanation
     assert conditions_claim([], 6).verdict == "undecided"
-
-
-def test_how_many_claims_hold_is_told_in_words():
-    def claims(*verdicts):
-        inside, outside, open_ = Interval(0.5, 0.4, 0.6), Interval(2.0, 1.9, 2.1), Interval(1.0, 0.9, 1.1)
-        kinds = {"holds": inside, "not": outside, "open": open_}
-        return [
-            Claim(str(k), GOALS, "", (Criterion("", kinds[word], high=1.0),), 9, 9, "", "", 1)
-            for k, word in enumerate(verdicts)
-        ]
-
-    assert told_counts(claims("holds", "holds", "open")) == "Of 3 claims 2 hold, 1 is undecided."
-    assert told_counts(claims("holds", "not", "open", "open")) == (
-        "Of 4 claims 1 holds, 1 does not hold, 2 are undecided."
-    )

@@ -5,20 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.controllers import gain_values, make_controller
 from robocov.files.atomic import written
 from robocov.mapfile import load_map
 from robocov.record import versions
-
-if TYPE_CHECKING:
-    from robocov_app.figures.statistics import Interval
+from robocov_app.figures.statistics import Interval, bootstrap
+from robocov_app.replication.plan import TEAM, Plan
+from robocov_app.runs.spec import RunSpec
+from robocov_app.sweep.study import team_of
 
 YARDSTICK = "rapf"
 """The controller whose steps the others' are measured by."""
@@ -36,123 +38,93 @@ _FINE = 1e-5
 
 _HEAD = {"format": "robocov-steps", "version": 1}
 
+UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
+
 
 @dataclass(frozen=True)
 class StepTimes:
-    """How long a step takes, in blocks of `BLOCK` steps.
+    """Time of a step, s, in each of some blocks of `BLOCK` steps, by controller; all were timed in turn.
 
-    Attributes
-    ----------
-    robots : int
-    dt : float, s
-        Simulated time of a step.
-    seconds : dict of controller to (blocks,)
-        A step's share of each block. The blocks of all controllers were timed in turn.
+    `dt`, s, is the simulated time of a step.
     """
 
     robots: int
     dt: float
     seconds: Mapping[str, tuple[float, ...]]
 
-    def ratio(self, controller: str) -> float:
-        """Return the median over the blocks of the time by RAPF's in the same turn; nan where unmeasured."""
+    def ratios(self, controller: str) -> Array:
+        """Return the time by RAPF's in the same turn, for each block; none where it is not measured."""
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
-        if not own or not yardstick:
-            return float("nan")
-        return float(np.median(np.array(own) / np.array(yardstick)))
+        return np.array(own) / np.array(yardstick) if own and yardstick else np.empty(0)
+
+    def ratio(self, controller: str) -> float:
+        """Return the median of these ratios; nan where unmeasured."""
+        ratios = self.ratios(controller)
+        return float(np.median(ratios)) if len(ratios) else float("nan")
 
     def ratio_interval(self, controller: str) -> Interval:
         """Return that ratio with its bootstrap interval over the blocks."""
-        from robocov_app.figures.statistics import Interval, bootstrap
-
-        own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
-        if not own or not yardstick:
-            return Interval(*[float("nan")] * 3)
-        return bootstrap(np.array(own) / np.array(yardstick))
+        ratios = self.ratios(controller)
+        return bootstrap(ratios) if len(ratios) else UNKNOWN
 
     def interval(self, controller: str) -> Interval:
         """Return the median time of a step, s, with its bootstrap interval over the blocks."""
-        from robocov_app.figures.statistics import Interval, bootstrap
-
         own = self.seconds.get(controller)
-        return bootstrap(own) if own else Interval(*[float("nan")] * 3)
+        return bootstrap(own) if own else UNKNOWN
 
 
 def step_times(
     folder: Path,
     wanted: Mapping[int, Sequence[str]],
+    plan: Plan,
     *,
-    dt: float,
-    team: Mapping[str, Any],
-    warm_up: int,
-    blocks: int,
     stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] | None = None,
 ) -> dict[int, StepTimes]:
-    """Return how long steps take, by the size of the team: from `folder` where they are there, else timed.
+    """Return how long steps of controllers take, by the size of the team: as kept in `folder`, else timed.
 
-    Parameters
-    ----------
-    folder : Path
-        For `FILE`; times that were kept are those of the same controllers on the machine that measured them.
-    wanted : dict of number of robots to controllers
-    dt : float, s
-    team : dict of name to value
-        As `robocov.Team.homogeneous` takes them, None for a range without limit.
-    warm_up, blocks : int
-        Steps before the first that counts, and blocks of `BLOCK` that count.
-    stopped : callable
-        Asked between two blocks; what is whole by then is returned.
-    clock : callable or None
-        Returns seconds; by default those that this process computes, where the system counts them finely:
-        what else is going on then hardly matters.
-
-    Raises
-    ------
-    OutputError
-        When the file cannot be written.
+    Times that were kept are those of the machine that measured them. `stopped` is asked between two blocks;
+    what is whole by then is returned. `clock` returns seconds; by default those that this process computes,
+    where the system counts them finely: what else is going on then hardly matters. Raises OutputError when
+    the file cannot be written.
     """
     found = {}
     path = folder / FILE
     kept = _kept(path)
+    beyond = plan.beyond
     for robots, controllers in wanted.items():
-        laws = list(dict.fromkeys((YARDSTICK, *controllers)))
-        digest = _digest([robots, dt, dict(team), warm_up, blocks, _gains(laws), versions()["robocov"]])
+        names = list(dict.fromkeys((YARDSTICK, *controllers)))
+        gains = {name: dict(gain_values(make_controller(name))) for name in names}
+        content = [robots, plan.dt, dict(TEAM), beyond.warm_up, beyond.blocks, gains, versions()["robocov"]]
+        digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         entry = kept.get(str(robots))
         if entry is None or entry["digest"] != digest:
-            seconds = _timed(robots, laws, dt, team, warm_up, blocks, stopped, clock or _finest_clock())
+            seconds = _timed(robots, names, plan, stopped, clock or _finest_clock())
             if seconds is None:
                 break
-            entry = {"digest": digest, "seconds_per_step": seconds}
-            kept[str(robots)] = entry
-            content = {**_HEAD, "map": MAP, "dt_s": dt, "steps_per_block": BLOCK, "robots": kept}
+            kept[str(robots)] = entry = {"digest": digest, "seconds_per_step": seconds}
+            document = {**_HEAD, "map": MAP, "dt_s": plan.dt, "steps_per_block": BLOCK, "robots": kept}
             with written(path) as part:
-                part.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+                part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
         taken = {name: tuple(map(float, values)) for name, values in entry["seconds_per_step"].items()}
-        found[robots] = StepTimes(robots, dt, taken)
+        found[robots] = StepTimes(robots, plan.dt, taken)
     return found
 
 
 def _timed(
     robots: int,
-    controllers: Iterable[str],
-    dt: float,
-    team: Mapping[str, Any],
-    warm_up: int,
-    blocks: int,
+    controllers: Sequence[str],
+    plan: Plan,
     stopped: Callable[[], bool],
     clock: Callable[[], float],
 ) -> dict[str, list[float]] | None:
-    from robocov_app.runs.spec import RunSpec
-    from robocov_app.sweep.study import team_of
-
-    spec = RunSpec(load_map(MAP), team=team_of(robots, team), start="uniform", dt=dt)
+    spec = RunSpec(load_map(MAP), team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
     runs = {name: replace(spec, controller=name).simulation() for name in controllers}
     for run in runs.values():
-        for _ in range(warm_up):
+        for _ in range(plan.beyond.warm_up):
             run.step()
     taken: dict[str, list[float]] = {name: [] for name in runs}
-    for _ in range(blocks):
+    for _ in range(plan.beyond.blocks):
         for name, run in runs.items():
             if stopped():
                 return None
@@ -166,14 +138,6 @@ def _timed(
 def _finest_clock() -> Callable[[], float]:
     fine = time.get_clock_info("process_time").resolution <= _FINE
     return time.process_time if fine else time.perf_counter
-
-
-def _gains(controllers: Iterable[str]) -> dict[str, Any]:
-    return {name: dict(gain_values(make_controller(name))) for name in controllers}
-
-
-def _digest(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _kept(path: Path) -> dict[str, Any]:

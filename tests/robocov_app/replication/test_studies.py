@@ -1,0 +1,280 @@
+"""What is run: maps, starts, contenders and their gains."""
+
+import numpy as np
+import pytest
+import shapely
+from tiny_paper import TINY
+
+from robocov.controllers import CONTROLLERS, gain_values, gains_of, make_controller
+from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
+from robocov.errors import StartError
+from robocov.mapfile import bundled_maps, load_map
+from robocov_app.replication import maps, studies
+from robocov_app.replication.contenders import (
+    GRIDS,
+    LLOYD,
+    OURS,
+    PAPER,
+    RAPF_SHARED,
+    RPF_SHARED,
+    UNTUNED,
+    baselines,
+    distinct_gains,
+    paper_contenders,
+)
+from robocov_app.replication.evidence import account_of
+from robocov_app.replication.plan import FULL, QUICK, TEAM
+from robocov_app.replication.verdicts import LEAST_MAPS
+from robocov_app.sweep.study import TEAM as TEAM_PARAMETERS
+from robocov_app.sweep.study import tasks_of
+
+BEST = {
+    "rapf": {"k_rep": 0.3, "rho_0": 3.0, "k_att": 30.0, "attraction_limit": None},
+    "rpf": {"k_rep": 10.0, "rho_0": 6.0},
+}
+PAPERS = paper_contenders(BEST)
+
+both = pytest.mark.parametrize(
+    "plan", [pytest.param(FULL, marks=pytest.mark.slow), QUICK], ids=["full", "quick"]
+)
+
+
+class TestMaps:
+    @pytest.mark.parametrize("name", [*maps.NON_CONVEX, *maps.CONVEX])
+    def test_every_kind_of_start_has_room_on_every_map(self, name):
+        environment = maps.bundled(name, maps.CONVEX_KINDS).environment
+        assert tuple(environment.starts) == maps.CONVEX_KINDS
+        for kind, spec in environment.starts.items():
+            assert environment.start(kind).sample(6, seed=1).shape == (6, 2)
+            if isinstance(spec, DiscStart):
+                assert environment.free.contains(shapely.Point(spec.center).buffer(spec.radius - 0.01))
+
+    def test_they_are_all_but_three_of_those_that_are_not_convex(self):
+        convex = {name for name in bundled_maps() if load_map(name).blocked.is_empty}
+        assert convex == set(maps.CONVEX)
+        assert set(bundled_maps()) - convex - set(maps.NON_CONVEX) == {"campus", "forklifts", "hospital"}
+
+    def test_clustered_starts_are_as_near_as_can_be(self):
+        ring = ((0, 0), (8, 0), (8, 6), (0, 6))
+        pillar = Environment("pillar", ring, (CircleObstacle((4.0, 3.0), 1.0),))
+        starts = maps.with_kinds_of_starts(pillar).starts
+        assert starts["corner"] == DiscStart((0.8, 0.8), 0.8)
+        centre = starts["centre"]
+        assert isinstance(centre, DiscStart)
+        assert np.hypot(centre.center[0] - 4.0, centre.center[1] - 3.0) == pytest.approx(1.8, abs=0.02)
+
+    def test_narrow_maps_get_smaller_discs_and_too_narrow_ones_none(self):
+        for width, radius in ((1.3, 0.6), (1.0, 0.45)):
+            alley = Environment("alley", ((0, 0), (9, 0), (9, width), (0, width)))
+            spec = maps.with_kinds_of_starts(alley).starts["corner"]
+            assert isinstance(spec, DiscStart)
+            assert spec.radius == radius
+        block = PolygonObstacle(((0.5, 0.5), (8.5, 0.5), (8.5, 8.5), (0.5, 8.5)))
+        ring = Environment("ring", ((0, 0), (9, 0), (9, 9), (0, 9)), (block,))
+        with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.45 m radius"):
+            maps.with_kinds_of_starts(ring)
+
+    @pytest.mark.parametrize("seed", range(6))
+    def test_convex_regions_are_convex_large_and_the_same_every_time(self, seed):
+        region = maps.convex_region(seed).environment
+        polygon = region.boundary_polygon
+        assert polygon.is_valid and polygon.equals(polygon.convex_hull)
+        assert polygon.area >= 40.0 and region.blocked.is_empty
+        assert region == maps.convex_region(seed).environment
+        assert region.boundary != maps.convex_region(seed + 1).environment.boundary
+        assert not polygon.buffer(-1.8).is_empty  # no strip
+
+    @pytest.mark.parametrize("seed", [1, 2, 3, pytest.param(101, marks=pytest.mark.slow)])
+    def test_generated_maps_are_as_they_are_described(self, seed):
+        each = maps.generated(seed)
+        environment = each.environment
+        assert environment == maps.generated(seed).environment and each.name == f"generated-{seed}"
+        assert tuple(environment.starts) == maps.KINDS
+        assert 4 <= len(environment.obstacles) <= 8
+        assert 0.155 <= 1.0 - environment.free_area / environment.area <= 0.255
+        assert len(environment.free.geoms) == 1
+        assert environment.region.bounds == (0.0, 0.0, 10.0, 10.0)
+
+    def test_the_same_density_is_drawn_again(self):
+        (first, *_), (again, *_) = studies.density_maps(QUICK), studies.density_maps(QUICK)
+        assert first.environment == again.environment
+        density = first.environment.density
+        assert density is not None and not density.uniform
+        assert (density.lowest, density.highest) == (1.0, 41.0)
+
+    def test_a_share_is_a_square(self):
+        assert maps.side_of_share(load_map("square"), 4) == pytest.approx(5.0)
+
+    @both
+    def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):
+        assert not set(plan.tuning) & set(plan.generated)
+        assert plan.tuning_seed not in plan.seeds
+        tuned, tested = (
+            {each.environment.obstacles for each in of(plan)}
+            for of in (studies.tuning_maps, studies.claim_maps)
+        )
+        assert not tuned & tested
+        # the best gains have something to be chosen from
+        assert len(plan.tuning) >= 5 and len(plan.tuning_starts) >= 2
+
+    @pytest.mark.slow
+    def test_maps_that_nobody_looked_at_are_none_of_the_others(self):
+        unseen = {each.name: each.environment for each in studies.unseen_maps(FULL)}
+        known = [*studies.claim_maps(FULL), *studies.tuning_maps(FULL), *studies.small_maps(FULL)]
+        assert len(unseen) >= LEAST_MAPS
+        assert not set(unseen) & {each.name for each in known}
+        assert not set(unseen.values()) & {each.environment for each in known}
+        contest = studies.unseen_contest(FULL, UNTUNED)
+        assert [law.key for law in contest.contenders] == [OURS[0], "rapf-default", "lloyd"]
+        assert len(contest.study) == len(unseen) * 3 * 3
+        tuned = studies.unseen_contest(FULL, PAPERS)
+        assert [law.key for law in tuned.contenders] == [OURS[0], "rapf-best", "lloyd"]
+        assert studies.unseen_contest(QUICK, PAPERS) is None
+
+
+class TestPaper:
+    @pytest.mark.slow
+    def test_the_full_study_is_as_large_as_it_is_said_to_be(self):
+        assert len(studies.claim_maps(FULL)) == 33 and len(studies.convex_maps(FULL)) == 8
+        study = studies.claims_contest(FULL, PAPERS).study
+        assert study.starts == maps.KINDS
+        assert len(study) == 33 * 3 * 4 * 6
+        assert len(studies.gains_study(FULL)) == 6 * 3 * (20 + 80)
+
+    def test_every_law_moves_under_the_same_limits_from_the_same_places(self):
+        tasks = list(tasks_of(studies.claims_contest(TINY, PAPERS).study))
+        assert len({(task.duration, task.dt, task.lattice, str(task.team)) for task in tasks}) == 1
+        scenarios = {(task.map, task.start, task.seed) for task in tasks}
+        for scenario in scenarios:
+            laws = [task for task in tasks if (task.map, task.start, task.seed) == scenario]
+            assert len(laws) == 6
+            assert len({task.document for task in laws}) == 1
+
+    def test_shared_gains_are_shared_and_the_papers_formula_is_not_limited(self):
+        rapf, rpf = RAPF_SHARED.all_gains, RPF_SHARED.all_gains
+        assert {name: rapf[name] for name in rpf} == rpf
+        assert rapf["attraction_limit"] is None
+        grids = studies.gain_sets(FULL)
+        assert all(gains["attraction_limit"] is None for gains in grids["rapf"])
+        potentials = {(gains["k_rep"], gains["rho_0"]) for gains in grids["rapf"]}
+        assert potentials == {(gains["k_rep"], gains["rho_0"]) for gains in grids["rpf"]}
+        # no sensor cuts a repulsion off
+        assert TEAM["sensing_range"] >= max(*FULL.rho_0, *QUICK.rho_0)
+        assert set(TEAM) <= set(TEAM_PARAMETERS)
+
+    def test_best_gains_that_are_the_shared_ones_are_run_once(self):
+        same = paper_contenders({"rapf": RAPF_SHARED.gains, "rpf": RPF_SHARED.gains})
+        assert len(studies.claims_contest(TINY, same).study) == 2 * 3 * 4
+        assert {name: len(sets) for name, sets in distinct_gains((RAPF_SHARED, LLOYD, same[1])).items()} == {
+            "rapf": 1,
+            "lloyd": 1,
+        }
+
+    def test_figures_4_and_6_begin_in_the_same_places_and_8_elsewhere(self):
+        first, second = load_map("blocks-a"), load_map("blocks-b")
+        assert first.starts["paper"] == second.starts["paper"] != second.starts["other"]
+        found = studies.figure_studies(TINY)
+        assert found["figures-a"].starts == ("paper",)
+        assert found["figures-b"].starts == ("paper", "other")
+        assert {len(study) for study in found.values()} == {2, 4}
+
+    def test_the_quick_study_is_a_small_part(self):
+        size = len(studies.claims_contest(QUICK, PAPERS).study) + len(studies.gains_study(QUICK))
+        assert size < 300
+        beyond = studies.beyond_studies(QUICK, {}, UNTUNED).values()
+        assert sum(study.duration * len(study) for study in beyond) < 4000.0
+
+
+class TestBeyond:
+    @both
+    def test_every_registered_controller_takes_part_once(self, plan):
+        contests = studies.baseline_contests(plan, {}).values()
+        others = [law.key for each in contests for law in each.contenders]
+        assert len(others) == len(set(others))
+        assert {*others, *PAPER} == set(CONTROLLERS)
+
+    @both
+    def test_baselines_begin_where_the_papers_controllers_began(self, plan):
+        papers = list(tasks_of(studies.claims_contest(plan, PAPERS).study))
+        places = {(task.document, task.start, task.seed) for task in papers}
+        limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
+        for each in studies.baseline_contests(plan, {}).values():
+            for task in tasks_of(each.study):
+                assert (task.document, task.start, task.seed) in places
+                assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
+
+    @pytest.mark.slow
+    def test_in_full_ours_is_run_as_often_as_rapf_and_baselines_on_every_map(self):
+        assert FULL.beyond.own_seeds == FULL.seeds
+        assert len(studies.baseline_maps(FULL)) == len(studies.claim_maps(FULL)) == 33
+        for name, each in studies.baseline_contests(FULL, {}).items():
+            seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
+            assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
+
+    def test_who_knows_the_density_begins_where_the_other_does(self):
+        contests = studies.small_contests(QUICK)
+        known, ignored = (tasks_of(contests[name].study) for name in ("density", "density-ignored"))
+        for with_, without in zip(known, ignored, strict=True):
+            assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
+            assert with_.document != without.document
+
+    def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
+        tasks = list(tasks_of(studies.small_contests(QUICK)["teams"].study))
+        by_distance, by_time = (
+            [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
+        )
+        assert len(by_distance) == len(by_time) > 0
+        for one, other in zip(by_distance, by_time, strict=True):
+            assert {**one.gains, "cells": "time"} == other.gains
+            assert (one.team, one.map, one.start) == (other.team, other.map, other.start)
+
+    def test_each_disturbance_stands_alone(self):
+        found = {name: list(tasks_of(study)) for name, study in studies.conditions_studies(TINY).items()}
+        assert set(found) == {"conditions-ideal"} | {
+            f"conditions-{name.replace('_', '-')}" for name in studies.AXES
+        }
+        assert all(task.team["message_rate"] == 2.0 for tasks in found.values() for task in tasks)
+        assert {task.team["communication_range"] for task in found["conditions-communication-range"]} == {4.0}
+        assert {task.team["communication_range"] for task in found["conditions-loss"]} == {None}
+        assert {task.team["loss"] for task in found["conditions-loss"]} == {0.6}
+        assert "loss" not in found["conditions-failure-rate"][0].team
+        assert all(values[0] in (None, 0.0) for values in studies.AXES.values())
+
+    @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {*PAPER, *OURS}))
+    def test_every_baseline_has_a_grid_and_its_defaults_are_in_it(self, name):
+        known, usual = gains_of(CONTROLLERS[name]), gain_values(make_controller(name))
+        sets = [
+            {**usual, **{gain: known[gain].validated(value, "grid") for gain, value in gains.items()}}
+            for gains in GRIDS[name]
+        ]
+        assert usual in sets
+        assert len(sets) > 2 and all(each not in sets[:k] for k, each in enumerate(sets))
+        # what a set does not name would change with the defaults
+        assert len({tuple(gains) for gains in GRIDS[name]}) == 1
+        assert 1 <= len(GRIDS[name][0]) <= 3
+
+    @pytest.mark.slow
+    def test_in_full_they_are_tuned_where_nothing_is_tested(self):
+        study = studies.baseline_gains_study(FULL)
+        assert study is not None
+        assert set(study.controllers) == set(GRIDS) == {law.controller for law in baselines({})}
+        assert len(study) == 4 * 3 * sum(len(grid) for grid in GRIDS.values())
+        tested = {each.environment.obstacles for each in studies.claim_maps(FULL)}
+        assert not tested & {each.environment.obstacles for each in study.maps}
+        assert set(FULL.beyond.tuning) <= set(FULL.tuning)
+        assert (study.seeds, study.starts) == ((FULL.tuning_seed,), maps.KINDS)
+        assert studies.baseline_gains_study(QUICK) is None
+
+    def test_a_baseline_has_its_best_gains(self):
+        tuned = {"range-limited": {"interaction_range": 9.0}}
+        for each in baselines(tuned):
+            assert each.gains == tuned.get(each.controller, {})
+
+    def test_every_built_in_controller_is_accounted_for(self):
+        for name in CONTROLLERS:
+            account = account_of(name)
+            assert account.short != "–" and account.source.endswith(".") and account.does.endswith(".")
+        assert account_of("geodesic-lloyd").information == "whole map"
+        assert account_of("rapf").information == "own"
+        assert "not from its text" in account_of("howard").source
+        assert "not from its text" not in account_of("rapf").source

@@ -1,0 +1,590 @@
+"""A whole study, as small as it can be: done, gone on with, stopped, read, drawn and written."""
+
+import json
+import os
+import pickle
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_paper import TINY, options, shared
+
+from robocov.controllers import CONTROLLERS
+from robocov.cost import CoverageCost
+from robocov.errors import InputError
+from robocov.metrics.results import read_results
+from robocov_app.cli import main
+from robocov_app.replication import beyond_claims, claims, pages, results, running, step_times, studies
+from robocov_app.replication import plan as planned
+from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS, UNTUNED
+from robocov_app.replication.evidence import evidence_rows, gains_text, law_rows, map_rows
+from robocov_app.replication.figures import arrival, describe_figure
+from robocov_app.replication.pages import Image
+from robocov_app.replication.plots import WORDS, beyond_plots, gap_samples
+from robocov_app.replication.running import Interrupted, forecast, open_folder
+from robocov_app.sweep.study import Study, tasks_of
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
+
+FIRST = results.partition_record()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_parts():
+    """Try two sets of each baseline's gains; time few steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(studies, "GRIDS", {name: (grid[0], grid[-1]) for name, grid in GRIDS.items()})
+        patch.setattr(step_times, "BLOCK", 3)
+        yield
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """The folder, what both parts gave, and the pictures of the paper's page."""
+    with shared(tmp_path_factory, "tiny-paper") as root:
+        folder, kept = root / "out", root / "images"
+        open_folder(folder, TINY)
+        paper = results.run_paper(folder, TINY, options())
+        if not kept.exists():
+            images = pages.save_paper_figures(folder, paper.figures, FIRST, paper, quiet=True)
+            found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
+            pages.save_claims(folder, found)
+            pages.save_paper_page(folder, TINY, images, paper.figures, FIRST, paper, found)
+            kept.write_bytes(pickle.dumps(images))
+        beyond = results.run_beyond(folder, TINY, options(), paper)
+    return folder, paper, beyond, pickle.loads(kept.read_bytes())
+
+
+DRAWN = {name: Image(name, 2148, 900, words) for name, words in WORDS.items() if name.startswith("beyond")}
+
+
+@pytest.fixture(scope="module")
+def folder(study):
+    return study[0]
+
+
+@pytest.fixture(scope="module")
+def paper(study):
+    return study[1]
+
+
+@pytest.fixture(scope="module")
+def beyond(study):
+    return study[2]
+
+
+@pytest.fixture(scope="module")
+def content(folder):
+    return (folder / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def more(beyond):
+    return pages.beyond_page(DRAWN, beyond)
+
+
+def text_of(found) -> str:
+    """Return claims as text: one that is not a number equals itself there."""
+    return json.dumps([claim.to_json() for claim in found])
+
+
+class TestRuns:
+    def test_as_many_as_were_forecast(self, folder, paper, beyond, tmp_path):
+        expected = forecast(tmp_path, TINY, 2, claims=True, beyond=True)
+        # none of the tiny grid's gains are the shared ones
+        assert expected.left == expected.runs == paper.runs + beyond.runs
+        assert paper.failed == beyond.failed == 0
+        assert expected.seconds > 0.0 and set(expected.each) == set(CONTROLLERS)
+        again = forecast(folder, TINY, 2, claims=True, beyond=True)
+        assert (again.left, again.seconds) == (0, 0.0)
+        assert forecast(folder, TINY, 2, claims=False, beyond=False).runs == 8
+
+    def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
+        monkeypatch.setattr("robocov_app.sweep.performing.perform", lambda task: None)
+        without = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
+        for task in tasks_of(studies.gains_study(TINY)):
+            (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)
+        # what a former version has done lies there as well
+        (tmp_path / "studies" / "gains" / "runs" / "of-a-former-version").mkdir()
+        expected = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
+        assert expected.runs == expected.left == without.runs + 2 * 3 * 2  # RAPF's and RPF's
+
+    def test_the_same_call_does_nothing_again_and_gives_the_same(self, folder, paper, beyond):
+        rows = sorted((folder / "studies").glob("*/runs/*/row.json"))
+        before = [path.stat().st_mtime_ns for path in rows]
+        again = results.run_paper(folder, TINY, options())
+        alone = results.run_beyond(folder, TINY, options(), None)
+        assert [path.stat().st_mtime_ns for path in rows] == before
+        assert again.contenders == paper.contenders and again.references == paper.references
+        first, second = (claims.paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
+        assert text_of(first) == text_of(second)
+        first, second = (beyond_claims.beyond_claims(of) for of in (beyond, alone))
+        assert text_of(first) == text_of(second)
+
+    def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
+        out = tmp_path / "out"
+        shutil.copytree(folder, out)
+        lost = sorted((out / "studies" / "rivals" / "runs").iterdir())[::5]
+        lost += sorted((out / "studies").glob("conditions-*/runs/*"))[::6]
+        for path in lost:
+            shutil.rmtree(path)
+        (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
+        again = results.run_beyond(out, TINY, options(), paper)
+        assert text_of(beyond_claims.beyond_claims(again)) == text_of(beyond_claims.beyond_claims(beyond))
+        for name in ("rivals", "conditions-loss"):
+            table = f"studies/{name}/results.csv"
+            assert (out / table).read_bytes() == (folder / table).read_bytes()
+
+    def test_best_gains_are_those_with_the_least_mean_excess(self, folder, paper, beyond):
+        of = {each.key: each for each in paper.contenders}
+        for law, grid in paper.gains.items():
+            assert of[f"{law}-best"].gains == grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+        assert set(beyond.gains) == set(GRIDS)
+        table = read_results(folder / "studies" / "rivals").to_table().to_pylist()
+        for name, grid in beyond.gains.items():
+            assert {(each.map, each.seed) for each in grid.scenarios} == {("generated-101", TINY.tuning_seed)}
+            best = grid.gains[int(np.argmin(grid.excess.mean(axis=1)))]
+            for row in table:
+                if row["controller"] == name:
+                    assert {gain: row[gain] for gain in best} == best
+
+    def test_all_contenders_began_in_the_same_places(self, folder):
+        starts: dict = {}
+        for path in folder.glob("studies/claims/runs/*/run.json"):
+            run = json.loads(path.read_text())
+            places = starts.setdefault((run["map"]["name"], run["start"], run["seed"]), set())
+            places.add(json.dumps(run["starts_m"]))
+        assert len(starts) == 6
+        assert all(len(places) == 1 for places in starts.values())
+
+    def test_the_worst_runs_are_rapfs_worst_on_each_map(self, paper):
+        gap = paper.claims.of("rapf-shared", "gap")
+        assert len({scenario.map for scenario, _ in paper.worst}) == len(paper.worst) == 2
+        first, record = paper.worst[0]
+        k = paper.claims.scenarios.index(first)
+        assert gap[k] == gap.max()
+        assert record.positions[-1] == pytest.approx(paper.claims.placements["rapf-shared"][k])
+        assert record.gains["k_att"] == 3.0
+
+    def test_figures_show_their_runs(self, paper):
+        assert set(paper.figures) == {
+            f"{case}/{law}"
+            for case in ("convex", "a", "b", "other")
+            for law in ("rapf", "lloyd" if case == "convex" else "rpf")
+        }
+        other, same = paper.figures["other/rapf"].record, paper.figures["b/rpf"].record
+        assert (other.start, same.start) == ("other", "paper")
+        assert same.positions[0] == pytest.approx(paper.figures["a/rapf"].record.positions[0])
+
+    def test_a_task_of_two_studies_is_done_once(self, tmp_path):
+        common = {"maps": studies.small_maps(TINY), "duration": 0.2, "lattice": 8, "starts": ("corner",)}
+        both = {"one": Study(controllers=("rpf",), **common)}
+        both["two"] = Study(controllers=("rpf", "lloyd"), **common)
+        running.run_together(both, tmp_path, options(), "x")
+        tables = [read_results(tmp_path / "studies" / name).to_table() for name in both]
+        assert [len(table) for table in tables] == [2, 4]
+        finals = [
+            dict(zip(t["run"].to_pylist(), t["mean_distance_m"].to_pylist(), strict=True)) for t in tables
+        ]
+        assert finals[0].items() <= finals[1].items()
+
+
+class TestBeyond:
+    def test_every_registered_controller_has_a_row(self, beyond):
+        rows = evidence_rows(beyond.outcomes, beyond.contenders, beyond.steps)
+        assert {row.controller for row in rows} == set(CONTROLLERS)
+        medians = [row.law.gap.estimate for row in rows]
+        assert medians == sorted(medians)
+        for row in rows:
+            assert row.steps[6] > 0.0 and row.steps[8] > 0.0
+            assert row.law.runs == 2
+        samples = gap_samples(beyond)
+        assert [sample.label for sample in samples] == [row.law.label for row in rows]
+
+    def test_the_papers_runs_count_where_baselines_ran(self, paper):
+        fewer = replace(TINY, beyond=replace(TINY.beyond, generated=()))
+        outcomes = results.among_baselines(paper.claims, fewer)
+        assert set(outcomes.maps) == {"blocks-a"} and set(outcomes.starts) == {"corner"}
+
+    def test_both_runs_are_judged_by_the_density(self, folder, beyond):
+        known, ignored = beyond.density.pictures
+        assert not known.record.environment.density.uniform
+        assert ignored.record.environment.density is None
+        assert known.record.positions[0] == pytest.approx(ignored.record.positions[0])
+        judge = CoverageCost(known.record.environment, TINY.lattice)
+        costs = [judge(each.record.positions[-1]).mean_distance for each in (known, ignored)]
+        assert beyond.density.costs == pytest.approx(tuple(costs))
+        table = read_results(folder / "studies" / "density").to_table().to_pylist()
+        finals = beyond.density.outcomes.of("known", "final")
+        assert finals == pytest.approx([row["mean_distance_m"] for row in table])
+
+    def test_mixed_teams_are_judged_by_time(self, beyond):
+        for law in TEAMS:
+            seconds, metres = (beyond.teams.of(law.key, measure) for measure in ("final", "distance"))
+            assert (seconds > metres).all() and (seconds < 4.0 * metres + 1e-9).all()
+
+    def test_degradations_have_every_value_of_every_axis(self, beyond):
+        axes = studies.axes_of_disturbances(TINY).items()
+        wanted = {(axis, value) for axis, values in axes for value in values}
+        assert {(each.axis, each.value) for each in beyond.degradations} == wanted
+        assert all(each.ratio.estimate == 1.0 for each in beyond.degradations if each.value in (None, 0.0))
+
+    def test_all_figures_are_drawn(self, beyond):
+        drawn = beyond_plots(beyond, "dark")
+        assert set(drawn) == set(DRAWN)
+        (axes,) = drawn["beyond-gaps"]().axes
+        low, high = axes.get_xlim()
+        samples = gap_samples(beyond)
+        assert low < min(sample.values.min() for sample in samples)
+        assert high > max(sample.values.max() for sample in samples)
+        assert len(drawn["beyond-conditions"]().axes) == 6
+        assert len(drawn["beyond-density"]().axes) >= 2
+        labels = drawn["beyond-pairs"]().axes[0].get_yticklabels()
+        assert len(labels) == len(beyond.contenders) - 1
+
+
+TINY_COMMAND = (
+    "import sys; sys.path.insert(0, sys.argv.pop(1))\n"
+    "from tiny_paper import TINY\n"
+    "from robocov_app.replication import plan\n"
+    "plan.QUICK = TINY\n"
+    "from robocov_app.cli import main\n"
+    "sys.exit(main(['paper', '--quick', '--without-beyond', *sys.argv[1:]]))\n"
+)
+
+
+def begun(*words: str) -> subprocess.Popen[str]:
+    """Start the command with the tiny study in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-c", TINY_COMMAND, str(Path(__file__).parents[1]), *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def finished_runs(out: Path) -> int:
+    return len(list(out.glob("studies/*/runs/[!.]*")))
+
+
+def wait_for_runs(out: Path, count: int, process: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + 60.0
+    while finished_runs(out) < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+class TestStopping:
+    def test_a_study_that_was_interrupted_and_killed_ends_as_an_undisturbed_one(
+        self, folder, content, tmp_path
+    ):
+        out = tmp_path / "out"
+        process = begun("--out", str(out), "--workers", "2")
+        wait_for_runs(out, 12, process)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+        said, told = process.communicate(timeout=60)
+        assert process.returncode == 130
+        first = told.splitlines()[0]
+        assert first.startswith("paper (quick): 108 runs, about ")
+        assert "on 2 processes (measured: rapf 0." in first and "Ctrl-C keeps what is done" in first
+        assert f"to go on: robocov paper --out {out} --quick --without-beyond" in said
+        kept = finished_runs(out)
+        assert 12 <= kept < 108
+
+        process = begun("--out", str(out), "--workers", "2")
+        wait_for_runs(out, kept + 12, process)
+        process.kill()
+        process.communicate(timeout=60)
+
+        process = begun("--out", str(out), "--workers", "1", "--json")
+        said, told = process.communicate(timeout=120)
+        assert process.returncode == 0, told
+        answer = json.loads(said)
+        assert (answer["runs"], answer["failed"], answer["interrupted"]) == (108, 0, False)
+        assert (out / "claims.json").read_bytes() == (folder / "claims.json").read_bytes()
+        assert (out / "index.html").read_text(encoding="utf-8") == content
+        for name in ("gains", "convex", "claims"):
+            table = Path("studies") / name / "results.csv"
+            assert (out / table).read_bytes() == (folder / table).read_bytes()
+        for picture in (folder / "figures").iterdir():
+            assert (out / "figures" / picture.name).read_bytes() == picture.read_bytes(), picture.name
+
+    def test_nothing_is_done_after_ctrl_c(self, folder, tmp_path):
+        open_folder(tmp_path / "out", TINY)
+        stopped = options()
+        stopped.stop.requested = True
+        with pytest.raises(Interrupted):
+            results.run_paper(tmp_path / "out", TINY, stopped)
+        with pytest.raises(Interrupted):
+            running.run_together(studies.beyond_studies(TINY, {}, UNTUNED), tmp_path, stopped, "x")
+        assert not list(tmp_path.glob("studies/*/runs/*"))
+        with pytest.raises(Interrupted):
+            results.time_steps(tmp_path, TINY, stopped)
+
+
+class TestTables:
+    def test_a_row_for_each_law(self, paper):
+        rows = law_rows(paper.claims)
+        assert [row.key for row in rows] == list(LABELS)
+        for row in rows:
+            gap = paper.claims.of(row.key, "gap")
+            assert row.gap.estimate == pytest.approx(np.median(gap))
+            assert row.quartiles[0] <= row.gap.estimate <= row.quartiles[1]
+            assert 0.0 <= row.touched <= 1.0
+            assert np.isnan(row.stuck) == row.key.startswith("rpf")
+
+    def test_a_row_for_each_map(self, paper):
+        rows = map_rows(paper.claims, paper.references)
+        assert [row.map for row in rows] == ["blocks-a", "generated-1"]
+        here = [scenario.map == "blocks-a" for scenario in paper.claims.scenarios]
+        assert rows[0].gaps["lloyd"] == pytest.approx(np.median(paper.claims.of("lloyd", "gap")[here]))
+        assert rows[0].reference == paper.references["blocks-a"]
+
+
+class TestWords:
+    def test_what_is_said_of_figures_is_what_they_show(self, paper):
+        def said(number: int) -> str:
+            return describe_figure(number, paper.figures, FIRST)
+
+        for case, number in (("convex", 2), ("a", 4), ("b", 6)):
+            final = paper.figures[f"{case}/rapf"].history.mean_distance[-1]
+            assert f"{final:.3f} m" in said(number)
+            assert re.search(r"RAPF's is the lower one \S+ % of the time", said(number + 1))
+        assert "robots are" in said(8)
+        assert "“Pentagon”" in said(1)
+
+    def test_a_cost_has_arrived_when_it_stays(self, paper):
+        history = paper.figures["a/rapf"].history
+        time = arrival(history)
+        later = history.mean_distance[history.time >= time]
+        assert (np.abs(later / later[-1] - 1.0) <= 0.05).all()
+        assert time in history.time
+
+
+class _Tags(HTMLParser):
+    def __init__(self, content: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(content)
+
+    def handle_starttag(self, tag, attrs):
+        self.found.append((tag, dict(attrs)))
+
+    def of(self, *names):
+        return [attributes for tag, attributes in self.found if tag in names]
+
+
+def plain(content: str) -> str:
+    return content.replace("&#39;", "'").replace("\N{NO-BREAK SPACE}", " ")
+
+
+class TestPages:
+    @pytest.fixture(params=["content", "more"])
+    def either(self, request):
+        return request.getfixturevalue(request.param)
+
+    def test_links_lead_somewhere_and_ids_are_unique(self, either):
+        tags = _Tags(either).found
+        ids = [str(attributes["id"]) for _, attributes in tags if "id" in attributes]
+        assert len(ids) == len(set(ids))
+        for _, attributes in tags:
+            for target in (attributes.get("href"), f"#{attributes.get('aria-labelledby')}"):
+                if target and target.startswith("#") and target != "#None":
+                    assert target[1:] in ids, target
+
+    def test_they_ask_for_no_network(self, either):
+        for _, attributes in _Tags(either).found:
+            for name, value in attributes.items():
+                assert name == "xmlns" or not re.match(r"(?:https?:)?//", str(value)), value
+        assert "@import" not in either and "url(" not in either
+
+    def test_they_have_a_heading_of_each_rank_in_turn(self, either):
+        ranks = [int(tag[1]) for tag, _ in _Tags(either).found if re.fullmatch(r"h\d", tag)]
+        assert ranks[0] == 1 and ranks.count(1) == 1
+        assert all(after - before <= 1 for before, after in pairwise(ranks))
+
+    def test_the_papers_claims_are_listed_as_they_were_promised(self, folder, content, paper):
+        found = json.loads((folder / "claims.json").read_text())
+        assert len(found) == 15
+        for claim in found:
+            assert {"claim", "verdict", "estimate", "interval", "runs"} <= set(claim)
+            assert claim["verdict"] == "undecided"  # on two maps nothing is decided
+            assert claim["claim"] in plain(content)
+        assert {claim["question"] for claim in found} == set(claims.QUESTIONS)
+        ratio = paper.claims.compared("rapf-shared", "rpf-shared").ratio
+        shared = next(claim for claim in found if claim["key"] == "nonconvex-final-shared")
+        assert (shared["estimate"], shared["interval"]) == (ratio.estimate, [ratio.low, ratio.high])
+
+    def test_every_picture_is_there_and_said_in_words(self, folder, content):
+        images = _Tags(content).of("img")
+        assert len(images) == 13
+        for image in images:
+            assert (folder / str(image["src"])).is_file()
+            assert len(str(image["alt"])) > 20
+            assert int(str(image["width"])) in (1050, 2148)
+        for link in _Tags(content).of("a", "source"):
+            target = str(link.get("href") or link.get("srcset"))
+            if not target.startswith("#"):
+                assert (folder / target).is_file(), target
+        for number in range(1, 9):
+            for suffix in ("png", "svg", "pdf"):
+                assert (folder / "figures" / f"figure-{number}.{suffix}").stat().st_size > 1000
+
+    def test_the_protocol_tells_all_that_is_needed_to_do_it_again(self, content, paper):
+        said = plain(content)
+        for words in (
+            f"{paper.runs} runs, 0 of which failed",
+            *(
+                "0.02 s",
+                "6 s each",
+                "(seeds 101, 102)",
+                "generated (seeds 1)",
+                "k_rep 0.3, 3 N m³",
+                "rho_0 2 m",
+            ),
+            *("RAPF (k_rep 1, rho_0 2, k_att 3, no limit); RPF (k_rep 1, rho_0 2)", "attraction_limit 2"),
+            *("the same within 2 %", "(28)", "(18)", "2.0542, 1.6190", "robocov "),
+        ):
+            assert words in said, words
+        assert "all that are not convex but campus" not in said
+
+    def test_every_claim_and_goal_beyond_is_told(self, more, beyond):
+        said = plain(more)
+        ids = {attributes.get("id") for _, attributes in _Tags(more).found}
+        assert {f"controller-{name}" for name in CONTROLLERS} <= ids
+        assert more.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in more
+        found = beyond_claims.beyond_claims(beyond)
+        assert {claim.part for claim in found} == set(beyond_claims.QUESTIONS)
+        for claim in found:
+            assert claim.key in ids and claim.claim in said
+        goals = beyond_claims.beyond_goals(beyond)
+        assert all(goal.words in said for goal in goals) and beyond_claims.goal_counts(goals) in said
+        assert all(gains_text(name, grid) in said for name, grid in beyond.gains.items())
+        assert "on 1 generated maps (seeds 101)" in said
+        quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
+        said = plain(pages.beyond_page({}, quick))
+        assert "default gains: those that the full study" in said and "120 s on 4 generated maps" in said
+
+    def test_it_says_what_ours_reached_on_maps_that_played_no_part(self, more, beyond):
+        assert {scenario.map for scenario in beyond.unseen.scenarios} == {"generated-201"}
+        assert np.isfinite(beyond.unseen.of("atlas", "gap")).all()
+        heading = "On maps that played no part in its development"
+        assert heading in more and "generated maps with seeds 201, on which nothing" in more
+        without = replace(beyond, unseen=None)
+        assert heading not in pages.beyond_page({}, without)
+        assert "goal-unseen" not in text_of(beyond_claims.beyond_claims(without))
+
+    def test_the_same_runs_give_the_same_pages(self, study, content, more):
+        _, paper, beyond, images = study
+        found = claims.paper_claims(paper.convex, paper.claims, paper.gains)
+        assert pages.paper_page(TINY, images, paper.figures, FIRST, paper, found) == content
+        assert pages.beyond_page(DRAWN, beyond) == more
+
+    @pytest.mark.skipif(not (shutil.which("chromium") and shutil.which("chromedriver")), reason="no browser")
+    @pytest.mark.parametrize("width", [390, 1280])
+    def test_in_a_browser_nothing_sticks_out(self, folder, more, width):
+        from selenium import webdriver
+        from selenium.webdriver.chrome.options import Options
+        from selenium.webdriver.chrome.service import Service
+
+        chosen = Options()
+        chosen.binary_location = str(shutil.which("chromium"))
+        for argument in (
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-background-networking",
+        ):
+            chosen.add_argument(argument)
+        metrics = {"width": width, "height": 900, "pixelRatio": 1.0}
+        chosen.add_experimental_option("mobileEmulation", {"deviceMetrics": metrics})
+        chosen.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        browser = webdriver.Chrome(options=chosen, service=Service(shutil.which("chromedriver")))
+        try:
+            browser.get((folder / "index.html").as_uri())
+            assert browser.execute_script("return document.documentElement.scrollWidth") <= width
+            broken = browser.execute_async_script(
+                "const done = arguments[0], images = [...document.images];"
+                "Promise.all(images.map(image => {image.loading = 'eager'; return image.decode()"
+                ".then(() => null, () => image.src)})).then(found => done(found.filter(Boolean)))"
+            )
+            assert broken == []
+            canvases = "return document.querySelectorAll('.robocov-replay canvas').length"
+            assert browser.execute_script(canvases) > 0
+            assert browser.get_log("browser") == []
+            path = folder.parent / f"more-{width}.html"
+            path.write_text(more, encoding="utf-8")
+            browser.get(path.as_uri())
+            # what is wider may be scrolled, each in a frame of its own
+            out = browser.execute_script(
+                "const framed = '.scroll, .large, caption';"
+                "return [...document.querySelectorAll('main *')].filter(e => !e.closest(framed))"
+                ".filter(e => e.getBoundingClientRect().right > arguments[0] + 1)"
+                ".map(e => e.outerHTML.slice(0, 120))",
+                width,
+            )
+            assert out == []
+        finally:
+            browser.quit()
+
+
+class TestCommand:
+    def test_figures_only(self, tmp_path, monkeypatch, capsys):
+        monkeypatch.setattr(planned, "QUICK", TINY)
+        out = tmp_path / "out"
+        assert main(["paper", "--quick", "--figures-only", "--out", str(out), "--json"]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        assert (answer["runs"], answer["claims"]) == (8, [])
+        assert not (out / "claims.json").exists()
+        assert len(list((out / "figures").glob("*.pdf"))) == 8
+        content = (out / "index.html").read_text(encoding="utf-8")
+        assert content.count("<img") == 8 and "Best gains" not in content
+        assert "Verdicts" not in content and "Only the figures were asked for" in content
+
+    def test_beyond_only(self, study, tmp_path, monkeypatch, capsys):
+        """With everything but the drawing of figures, which other tests do."""
+        monkeypatch.setattr(planned, "QUICK", TINY)
+        images = {f"figure-{k}": Image(f"figure-{k}", 2148, 900, "words") for k in range(1, 9)}
+        monkeypatch.setattr(pages, "save_paper_figures", lambda *_, **__: images)
+        monkeypatch.setattr(pages, "save_beyond_figures", lambda *_, **__: DRAWN)
+        out = tmp_path / "out"
+        shutil.copytree(study[0], out)
+        assert main(["paper", "--quick", "--beyond-only", "--out", str(out), "--json"]) == 0
+        answer = json.loads(capsys.readouterr().out)
+        found = json.loads((out / "claims.json").read_text())
+        assert answer["claims"] == found and answer["runs"] == study[2].runs + 8
+        assert [claim["key"] for claim in found] == [
+            claim.key for claim in beyond_claims.beyond_claims(study[2])
+        ]
+        page, front = ((out / name).read_text(encoding="utf-8") for name in ("beyond.html", "index.html"))
+        assert 'href="index.html"' in page and 'href="beyond.html"' in front
+        assert "without --beyond-only the claims are tested too" in front
+        for claim in found:
+            assert f'href="beyond.html#{claim["key"]}"' in front and f'id="{claim["key"]}"' in page
+
+
+def test_other_folders_are_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="not empty, and what is in it is no study of the paper"):
+        open_folder(tmp_path, TINY)
+    (tmp_path / "paper.json").write_text("[]")
+    with pytest.raises(InputError, match="is no study of the paper"):
+        open_folder(tmp_path, TINY)
+
+
+def test_quick_and_full_do_not_mix(tmp_path):
+    open_folder(tmp_path / "out", TINY)
+    open_folder(tmp_path / "out", TINY)
+    with pytest.raises(InputError, match="holds the quick study, but the full one was asked for"):
+        open_folder(tmp_path / "out", replace(TINY, name="full"))
