@@ -90,9 +90,9 @@ class Arguments(PlotOptions):
 
 def command(options: Arguments) -> None:
     """Generate, save, draw and tell."""
-    out, rows, jobs = options.out, [], jobs_of(options)
-    several = bool(options.count or options.study)
+    out, several = options.out, bool(options.count or options.study)
     check_out(out, folder=several, overwrite=options.overwrite)
+    jobs, rows = jobs_of(options), []
     made: list[Environment] = []
     with progress("generating", len(jobs), quiet=options.json or not several) as update:
         for number, (name, make) in enumerate(jobs, start=1):

@@ -197,9 +197,9 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
             )
             for part in content["parts"]
         ]
-    except FileNotFoundError:
+    except OSError:  # no story; if it cannot be read either, who reads it says why
         return [(folder, "")]
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (ValueError, LookupError, TypeError) as error:
         raise InputError(f"{folder / STORY}: cannot be read: {one_line(error)}") from None
 
 
