@@ -213,7 +213,7 @@ _WORD = st.one_of(
 # fmt: on
 
 
-@settings(max_examples=120)
+@settings(max_examples=40)
 @given(
     command=st.sampled_from(["run", "compare", "check", "cost", "import"]), words=st.lists(_WORD, max_size=6)
 )

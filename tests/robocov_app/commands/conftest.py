@@ -1,6 +1,7 @@
 import pytest
 from swept import InProcess
 
+from robocov_app.runs import artifacts
 from robocov_app.runs import cost as run_cost
 from robocov_app.sweep import sweeping
 
@@ -11,3 +12,9 @@ def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr(run_cost, "PICTURE_LATTICE", 32)
         monkeypatch.setattr(sweeping, "LocalPool", InProcess)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs are not drawn, which takes longer than the runs."""
+    monkeypatch.setattr(artifacts, "save_pictures", lambda *_, **__: None)

@@ -52,6 +52,7 @@ def test_it_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert "[5.000, 5.000]" in said
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_how_far_a_run_is_above(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
     assert main(["run", "trap", *SHORT, "--robots", "4", "--out", str(out)]) == 0
@@ -68,6 +69,7 @@ def test_how_far_a_run_is_above(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert f"{run['gap']:.1%} above the best" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_comparison_has_a_gap_for_each_controller(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -79,6 +81,7 @@ def test_a_comparison_has_a_gap_for_each_controller(
     assert all(run["gap"] > 0.0 for run in row["runs"])
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_run_in_other_rooms_has_no_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     halves = Environment(
         "halves",

@@ -60,6 +60,7 @@ def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.Capt
     assert len(Record.load(out)) == 61
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     row = answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     assert {"out", "mean_distance_m", "cost_m3", "settled_at_s", "contacts", "min_clearance_m"} <= set(row)
@@ -100,6 +101,7 @@ def test_compare_gives_every_controller_the_same_starts(
     assert len((out / "comparison.csv").read_text().splitlines()) == 4
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_overwrite_removes_the_old_result_and_nothing_else(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,6 +119,7 @@ def test_overwrite_removes_the_old_result_and_nothing_else(
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links of POSIX")
+@pytest.mark.usefixtures("no_pictures")
 def test_what_is_in_the_way_of_a_result_leaves_the_earlier_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,6 +137,7 @@ def test_what_is_in_the_way_of_a_result_leaves_the_earlier_one(
     assert list(elsewhere.iterdir()) == []
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     answer(capsys, "run", "square", *SHORT, "--out", str(tmp_path / "run"))
     inner = tmp_path / "run" / "inner"
@@ -151,6 +155,7 @@ def test_a_comparison_keeps_to_its_folder(tmp_path: Path, capsys: pytest.Capture
     assert "on: is a link" in complaint(capsys, "metrics", str(inner))
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_controller_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = tmp_path / "mine.py"
     mine.write_text(
@@ -288,6 +293,7 @@ def test_a_controller_that_fails_is_named_with_its_line(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_pictures")
 def test_records_of_large_teams_are_thinned(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

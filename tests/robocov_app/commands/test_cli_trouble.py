@@ -210,6 +210,7 @@ def test_nobody_listening_is_no_error(tmp_path: Path) -> None:
     assert (tmp_path / "run" / "trajectories.png").exists()
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_controller_for_the_whole_team_needs_no_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

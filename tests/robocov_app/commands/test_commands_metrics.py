@@ -7,13 +7,16 @@ from called import SHORT, complaint
 from robocov.metrics.run_metrics import COLUMNS, run_metrics
 from robocov.record import Record
 from robocov_app.cli import main
+from robocov_app.runs import artifacts
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("metrics") / "both"
     words = ["compare", "rooms", "--controllers", "rapf", "rpf", "--robots", "3", *SHORT, "--out", str(out)]
-    assert main(words) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(artifacts, "save_pictures", lambda *_, **__: None)
+        assert main(words) == 0
     return out
 
 

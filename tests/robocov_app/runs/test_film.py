@@ -53,13 +53,13 @@ class TestLayout:
         obstacles_or_boundary = (frame == np.array(LIGHT.boundary)).all(axis=2)
         assert np.nonzero(obstacles_or_boundary.any(axis=0))[0].size > 1800
 
-    @pytest.mark.parametrize("size", [(640, 400), (1280, 720), (1281, 719), (320, 240)])
-    @pytest.mark.parametrize("count", [1, 3, 5])
+    @pytest.mark.parametrize("size", [(1281, 719), (320, 240)])
+    @pytest.mark.parametrize("count", [1, 5])
     def test_frames_have_exactly_the_size_asked_for(self, size, count):
         _, frames = film([run_of(ROOMS, 3)] * count, size=size)
         assert next(frames).shape == (size[1], size[0], 3)
 
-    @pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+    @pytest.mark.parametrize("count", [1, 3, 5])
     @pytest.mark.parametrize("environment", [ROOMS, CORRIDOR, SHAFT], ids=lambda map_: map_.name)
     def test_without_a_size_it_is_what_the_layout_says(self, environment, count):
         layout, frames = film([run_of(environment, 2)] * count, theme="dark")
