@@ -43,7 +43,12 @@ def written(figure):
 
 @pytest.mark.parametrize(
     ("count", "with_curves"),
-    [(1, True), (2, False), pytest.param(3, True, marks=pytest.mark.slow), (5, True)],
+    [
+        (1, True),
+        pytest.param(2, False, marks=pytest.mark.slow),
+        pytest.param(3, True, marks=pytest.mark.slow),
+        (5, True),
+    ],
 )
 @pytest.mark.parametrize(
     "size",
@@ -51,7 +56,7 @@ def written(figure):
 )
 @pytest.mark.parametrize(
     "environment",
-    [ROOMS, *(pytest.param(each, marks=pytest.mark.slow) for each in (HALL, CORRIDOR)), SHAFT],
+    [ROOMS, *(pytest.param(each, marks=pytest.mark.slow) for each in (HALL, CORRIDOR, SHAFT))],
     ids=lambda map_: map_.name,
 )
 def test_nothing_is_cut_or_covered(environment, size, count, with_curves):
@@ -87,10 +92,12 @@ def test_mean_times_stand_beside_or_below_the_mean_distances(size, count):
             assert not overlap(box, other)
 
 
-@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+@pytest.mark.parametrize(
+    "theme", [LIGHT, pytest.param(DARK, marks=pytest.mark.slow)], ids=lambda theme: theme.name
+)
 def test_the_colours_are_those_of_the_scale(theme, tmp_path):
     moment = moment_of(HALL)
-    figure = plot_coverage([], [moment], theme)
+    figure = plot_coverage([], [moment], theme, (800, 640))
     save_figure(figure, tmp_path / "a.png")
     pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB")).astype(int)
     (axes,) = [axes for axes in figure.axes if not axes.axison]

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    saved_run(tmp_path / "one", walk(SQUARE))
+    saved_run(tmp_path / "one", walk(SQUARE, robots=2, seconds=1.0))
     return tmp_path / "one"
 
 
@@ -60,7 +60,7 @@ def test_a_file_of_somebody_else_is_left_alone(run, capsys) -> None:
 
 def test_a_report_goes_with_its_results_and_another_file_of_that_name_stays(run) -> None:
     assert main(["report", str(run)]) == 0
-    saved_run(run / "again", walk(SQUARE))
+    saved_run(run / "again", walk(SQUARE, robots=2, seconds=1.0))
     (run / "again" / "report.html").write_text("mine")
     for folder, left in ((run, ["again", "run.json"]), (run / "again", ["report.html", "run.json"])):
         with results(folder, overwrite=True) as result:
@@ -178,7 +178,10 @@ def test_a_reference_is_searched_for_once_and_then_known(run, tmp_path, monkeypa
 
 def test_a_dimensionless_gain_has_no_unit(run) -> None:
     saved_run(
-        run / "atlas", replace(walk(SQUARE), controller="atlas", gains={"threshold": 0.01, "stake": 0.004})
+        run / "atlas",
+        replace(
+            walk(SQUARE, robots=2, seconds=1.0), controller="atlas", gains={"threshold": 0.01, "stake": 0.004}
+        ),
     )
     assert main(["report", str(run / "atlas")]) == 0
     assert "threshold 0.01, stake 0.004<" in (run / "atlas/report.html").read_text()

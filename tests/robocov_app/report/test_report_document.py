@@ -115,9 +115,9 @@ def test_hostile_names_stay_names() -> None:
     assert "{{7*7}}" in "".join(page.words) and "49" not in re.findall(r"\b49\b", "".join(page.words))
 
 
-def test_the_same_results_give_the_same_bytes(html) -> None:
-    again = report([replace(watched([*SWEEP, entry("mine", error=HOSTILE)]), wanted=40)]).html
-    assert again == html
+def test_the_same_results_give_the_same_bytes() -> None:
+    first, again = (report([watched([*SWEEP[:4], entry("mine", error=HOSTILE)])]).html for _ in range(2))
+    assert again == first
 
 
 @pytest.mark.slow

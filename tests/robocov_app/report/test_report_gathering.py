@@ -40,11 +40,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     study = Study(
         maps=(StudyMap("yard", SQUARE), StudyMap("flat", ROOMS)),
         controllers=("rapf", "failing.py:Failing"),
-        gains={"rapf": {"k_rep": [0.3, 1.0], "attraction_limit": [2.0, None]}},
+        gains={"rapf": {"attraction_limit": [2.0, None]}},
         robots=(3,),
         seeds=(0, 1),
         max_speed=(0.5, 1.0),
-        duration=1.0,
+        duration=0.2,
         lattice=12,
         folder=root,
     )
@@ -81,7 +81,7 @@ def test_a_comparison_is_its_runs_on_one_case(tmp_path) -> None:
 
 def test_a_sweep_is_its_table(folder) -> None:
     result = gathered(folder)
-    assert (result.kind, len(result.entries), result.wanted, result.missing) == ("sweep", 40, 40, 0)
+    assert (result.kind, len(result.entries), result.wanted, result.missing) == ("sweep", 24, 24, 0)
     assert list(result.maps) == ["yard", "flat"] and result.maps["flat"] == ROOMS
     rapf = [each for each in result.entries if each.controller == "rapf"]
     assert [name for name, _ in rapf[0].gains] == list(gains_of(CONTROLLERS["rapf"]))
@@ -98,7 +98,7 @@ def test_a_sweep_is_its_table(folder) -> None:
 @pytest.mark.slow
 def test_failed_runs_have_their_error_and_no_figures(folder) -> None:
     result = gathered(folder)
-    assert result.failed and len(result.fine) + len(result.failed) == 40
+    assert result.failed and len(result.fine) + len(result.failed) == 24
     for each in result.failed:
         assert "</script> too far" in (each.error or "")
         assert each.figures == {} and np.isnan(each.final)
@@ -115,12 +115,12 @@ def test_an_unfinished_sweep_says_what_is_missing(folder, tmp_path) -> None:
     lines = (copy / "results.csv").read_text().splitlines()
     (copy / "results.csv").write_text("\n".join(lines[:8]) + "\n")
     result = gathered(copy)
-    assert (len(result.entries), result.missing) == (7, 33)
+    assert (len(result.entries), result.missing) == (7, 17)
     assert result.entries == tuple(
         each for each, _ in zip(moved(gathered(folder).entries, copy), range(7), strict=False)
     )
     (copy / "results.csv").write_text(lines[0] + "\n")
-    with pytest.raises(InputError, match="not one of the 40 runs of the sweep is done"):
+    with pytest.raises(InputError, match="not one of the 24 runs of the sweep is done"):
         gathered(copy)
 
 
