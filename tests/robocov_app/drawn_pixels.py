@@ -6,7 +6,7 @@ import shapely
 from robocov_app.render.picture import Painter, standard_layers
 from robocov_app.render.theme import LIGHT
 
-SIZE = (640, 480)
+SIZE = (480, 360)
 ONE = np.array([[4.0, 4.0]])
 TWO = np.array([[2.0, 2.0], [6.0, 6.0]])
 

@@ -12,7 +12,7 @@ from robocov_app.render.distance_field import FARTHEST, Field, FieldLattice, Fie
 from robocov_app.render.picture import Painter, checked_layers
 from robocov_app.render.theme import DARK, LIGHT
 
-SIZE = (800, 520)
+SIZE = (560, 364)
 
 
 def scene(environment=ROOMS, n=5, seed=0, limit=8.0):

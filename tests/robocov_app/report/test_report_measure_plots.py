@@ -31,17 +31,17 @@ def plots_of(runs: list[ReplayRun], result=RESULT) -> dict[str, str]:
 
 
 def test_every_metric_has_a_plot_of_all_runs_with_its_end_in_words() -> None:
-    runs = [run_of(), run_of("rpf")]
+    runs = [run_of(seconds=2.0), run_of("rpf", seconds=2.0)]
     plots = plots_of(runs)
     assert list(plots) == ["Sensed", "Seen", "Energy", "Path", "Clearance", "Distance kept"]
-    metrics = run_metrics(runs[0].record, 5.0)
+    metrics = run_metrics(runs[0].record, 15.0)
     assert f"to {metrics.path_length[-1]:.4g} m; RPF" in plots["Path"]
     assert f"to {100.0 * metrics.visible_area[-1] / metrics.free_area:.4g} %" in plots["Seen"]
     assert len({svg.partition('id="')[2].partition('"')[0] for svg in plots.values()}) == len(plots)
 
 
 def test_what_tells_nothing_is_left_out() -> None:
-    assert "Distance kept" not in plots_of([run_of(robots=1)])
+    assert "Distance kept" not in plots_of([run_of(robots=1, seconds=1.0)])
     apart = run_of()
     team = replace(apart.record.team, communication_range=np.full(4, 3.0))
     apart = replace(apart, record=replace(apart.record, team=team))
