@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import ParameterError, checked
-from robocov_app.runs.options import ConditionOptions, WindowOptions, robots_of
+from robocov_app.runs.options import ConditionOptions, LayerOptions, WindowOptions, robots_of
 from robocov_app.terminal.arguments import parsed_gains, window_size
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Arguments(WindowOptions):
+class Arguments(WindowOptions, LayerOptions):
     """The interactive window: watch a team cover a map, touch it, compare controllers, go back in time.
 
     Everything has a key: press F1. Settings of the look are remembered.
@@ -57,10 +57,6 @@ class Arguments(WindowOptions):
     """Play a lesson of your own, see `robocov lesson`."""
     lattice: int = 128
     """The live coverage cost is evaluated on a lattice of N x N sites."""
-    show: tuple[str, ...] = ()
-    """Layers to show besides the usual ones: distances, scan, ..."""
-    hide: tuple[str, ...] = ()
-    """Layers not to show."""
     frames: int | None = None
     """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
     out: Path | None = None
@@ -95,7 +91,6 @@ def command(options: Arguments) -> int:
     """Open the window, or render it without a display."""
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
-    from robocov_app.render.picture import checked_layers
     from robocov_app.toolkit.window import show_compiling
     from robocov_app.viewer.opening import Opening
     from robocov_app.viewer.session.file import SUFFIX, load_session
@@ -111,6 +106,7 @@ def command(options: Arguments) -> int:
         session, name = Session.opened(saved), str(saved.view.get("map") or "")
     else:
         session = session_of(options)
+    also, without = options.layers()
     opening = Opening(
         session,
         name,
@@ -118,8 +114,8 @@ def command(options: Arguments) -> int:
         theme=options.theme,
         size=window_size(options.size),
         scale=options.scale,
-        also=checked_layers("--show", options.show),
-        without=checked_layers("--hide", options.hide),
+        also=also,
+        without=without,
         headless=headless,
         laws=laws,
         lattice=options.lattice,
@@ -152,19 +148,11 @@ def session_of(options: Arguments) -> Session:
     if options.team is not None:
         team = read_team(options.team, {"radius": options.radius})
         robots, limits = robots_of(team, robots, Arguments.robots, options.team), Limits.of(team)
-    laws = tuple(Law(name) for name in options.controllers)
-    laws = (Law(options.controllers[0], parsed_gains(options.gains)), *laws[1:])
-    scenario = Scenario(
-        load_map(options.map),
-        laws,
-        robots,
-        options.start,
-        options.seed,
-        limits,
-        options.dt,
-        conditions=options.conditions.conditions(options.seed, robots),
-    )
-    session = Session(scenario)
+    first, *others = options.controllers
+    laws = (Law(first, parsed_gains(options.gains)), *map(Law, others))
+    conditions, start = options.conditions.conditions(options.seed, robots), (options.start, options.seed)
+    environment = load_map(options.map)
+    session = Session(Scenario(environment, laws, robots, *start, limits, options.dt, conditions=conditions))
     session.clock.speed = options.speed
     session.playing = not options.paused
     return session

@@ -55,21 +55,14 @@ class Arguments(JsonOption):
     def __post_init__(self) -> None:
         if self.workers is not None:
             checked("--workers", self.workers, 1, _MOST_WORKERS)
-        chosen = [option for option, wanted in self._parts().items() if wanted]
-        if len(chosen) > 1:
-            raise InputError(f"{chosen[0]} and {chosen[1]}: one of them was wanted")
-
-    def _parts(self) -> dict[str, bool]:
-        return {
-            "--figures-only": self.figures_only,
-            "--without-beyond": self.without_beyond,
-            "--beyond-only": self.beyond_only,
-        }
+        if len(self.parts) > 1:
+            raise InputError(f"{self.parts[0]} and {self.parts[1]}: one of them was wanted")
 
     @property
-    def part(self) -> str:
-        """The option that says which part is wanted, with a space before it; empty where all is."""
-        return "".join(f" {option}" for option, wanted in self._parts().items() if wanted)
+    def parts(self) -> list[str]:
+        """The options that say which part is wanted: one, or none where all is."""
+        names = ("figures_only", "without_beyond", "beyond_only")
+        return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name)]
 
 
 def command(options: Arguments) -> int:
@@ -112,7 +105,12 @@ def command(options: Arguments) -> int:
                 pages.save_beyond_page(out, pages.save_beyond_figures(out, beyond, quiet=quiet), beyond)
             pages.save_paper_page(out, plan, images, runs, first, paper, found, more)
         except Interrupted:
-            return _stopped(options)
+            if quiet:
+                print(json.dumps({"out": str(out), "interrupted": True}))
+            else:
+                again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
+                print(f"stopped; to go on: robocov paper {again}")
+            return INTERRUPTED
     failed = sum(part.failed for part in (paper, beyond) if part)
     if options.json:
         answer = {
@@ -139,19 +137,11 @@ def print_claims(claims: Sequence[Claim]) -> None:
     """Print the verdicts for people."""
     from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
-    fold = {"overflow": "fold"}
-    print_table(
-        [("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)],
-        (
-            (
-                claim.claim,
-                claim.verdict,
-                f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–",
-                str(claim.runs),
-            )
-            for claim in claims
-        ),
-    )
+    fold, rows = {"overflow": "fold"}, []
+    for claim in claims:
+        measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
+        rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
+    print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
 
 
 def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
@@ -168,14 +158,4 @@ def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
         else:
             long = f"about {duration(forecast.seconds)} on {runner.workers} processes"
         words = f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"
-    sys.stderr.write(f"paper ({name}): {words}\n")
-    sys.stderr.flush()
-
-
-def _stopped(options: Arguments) -> int:
-    if options.json:
-        print(json.dumps({"out": str(options.out), "interrupted": True}))
-    else:
-        quick = " --quick" if options.quick else ""
-        print(f"stopped; to go on: robocov paper --out {options.out}{quick}{options.part}")
-    return INTERRUPTED
+    print(f"paper ({name}): {words}", file=sys.stderr, flush=True)

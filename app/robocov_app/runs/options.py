@@ -49,6 +49,22 @@ class PlotOptions(JsonOption):
 
 
 @dataclass(kw_only=True)
+class LayerOptions:
+    """What pictures show."""
+
+    show: tuple[str, ...] = ()
+    """Layers to show besides the usual ones: distances, geodesic-cells, ..."""
+    hide: tuple[str, ...] = ()
+    """Layers not to show, as in --hide cells centroids."""
+
+    def layers(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Return the layers that are shown besides the usual ones, and hidden; raises ParameterError."""
+        from robocov_app.render.picture import checked_layers
+
+        return checked_layers("--show", self.show), checked_layers("--hide", self.hide)
+
+
+@dataclass(kw_only=True)
 class WindowOptions:
     """How a window looks."""
 
@@ -110,7 +126,7 @@ class ConditionOptions:
 
 
 @dataclass
-class FilmOptions:
+class FilmOptions(LayerOptions):
     """Frames and films, and the look of pictures."""
 
     frames: bool = False
@@ -125,10 +141,6 @@ class FilmOptions:
     """Colours; by default light, in a window as the last time."""
     colours: Literal["paper", "robots"] = "paper"
     """Trajectories in the paper's red, or a colour for each robot; in films too."""
-    show: tuple[str, ...] = ()
-    """Layers to show besides the usual ones: distances, geodesic-cells, ..."""
-    hide: tuple[str, ...] = ()
-    """Layers not to show, as in --hide cells centroids."""
     size: Annotated[str | None, tyro.conf.arg(metavar="WxH")] = None
     """Size in pixels; by default 1280x720 for the film of a run, else what suits the map."""
 
@@ -151,12 +163,6 @@ class FilmOptions:
         from robocov_app.render.theme import theme_named
 
         return theme_named(self.theme or "light")
-
-    def layers(self) -> tuple[frozenset[str], frozenset[str]]:
-        """Return the layers that are shown besides the usual ones, and hidden; raises ParameterError."""
-        from robocov_app.render.picture import checked_layers
-
-        return checked_layers("--show", self.show), checked_layers("--hide", self.hide)
 
 
 @dataclass
