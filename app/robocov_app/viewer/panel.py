@@ -81,8 +81,10 @@ class Panel:
         self._age += seconds
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
-        shows = (self.desk.version, self.tab, self.desk.theme, self.desk.session.playing, id(self.report))
-        if shows != self._drawn or (self._age >= _ASKED_AGAIN and self.desk.session.playing):
+        desk, session = self.desk, self.desk.session
+        shows = (desk.version, self.tab, desk.theme, session.playing, id(self.report))
+        old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
+        if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
 
     def draw(self, screen: pygame.Surface) -> None:

@@ -19,7 +19,7 @@ from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
-from robocov_app.toolkit.window import PAUSE, BaseWindow
+from robocov_app.toolkit.window import FPS, PAUSE, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, grouped, parameter_commands
@@ -36,7 +36,7 @@ from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, facts, suggestion
 
-PAUSE_AT_REST = 0.25  # seconds between two frames while time goes on, but nothing moves any more
+PAUSE_AT_REST = 1.0  # seconds between two frames while time goes on, but nothing moves any more
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
 
@@ -135,7 +135,8 @@ class Window(BaseWindow):
                 self.tour = None
         playing = session.playing
         try:
-            steps = session.advance(seconds)
+            slices = max(round(seconds * FPS), 1) if self.resting else 1  # a long pause is many frames
+            steps = sum(session.advance(seconds / slices) for _ in range(slices))
             for lane in session.lanes:
                 session.snapshot(lane)  # what is decided belongs to the simulation, not to drawing
         except RobocovError as error:

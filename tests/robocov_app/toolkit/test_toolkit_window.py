@@ -107,3 +107,6 @@ def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: P
         assert len(drawn) == 6 and not window.resting
         driver.session.settled = True  # time goes on, and nothing moves
         assert window.look() is not None and window.pause == PAUSE_AT_REST
+        window._calm, before = CALM, driver.session.time
+        window.advance(0.5)
+        assert driver.session.time == pytest.approx(before + 0.5, abs=0.05)

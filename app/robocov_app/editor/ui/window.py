@@ -269,7 +269,6 @@ class EditorWindow(BaseWindow):
     def _play(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen, trial.rate = self.screen, self.rate
         trial.update(seconds)
-        self.pause = trial.pause
         if not (trial.ended or trial.closed):
             return
         leaving = trial.closed and not trial.ended
