@@ -21,7 +21,7 @@ from robocov_app.render.layers import Layer
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.picture import Painter, pane_layers, scale_for, standard_layers
 from robocov_app.render.scene import Scene, record_scene
-from robocov_app.render.theme import Colour
+from robocov_app.render.theme import Colour, Theme
 from robocov_app.runs.cost import FILM_LATTICE, built_cost, cost_for_pictures
 from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import Frame, save_moving_picture
@@ -112,6 +112,15 @@ class PaneLayout(NamedTuple):
     header: Frame
     size: tuple[int, int]
 
+    def page(self, panes: Sequence[Frame], theme: Theme) -> Frame:
+        """Put the frames of panes together below the legend."""
+        page = np.full((self.size[1], self.size[0], 3), theme.background, dtype=np.uint8)
+        page[: len(self.header), : self.header.shape[1]] = self.header
+        body = tiled(panes, self.columns, GAP, theme.grid, theme.background)
+        part = page[len(self.header) :][: body.shape[0], : body.shape[1]]
+        part[:] = body[: part.shape[0], : part.shape[1]]
+        return page
+
 
 def pane_layout(
     records: Sequence[Record],
@@ -171,7 +180,6 @@ def comparison_frames(
     fields: Fields | None = None,
 ) -> Iterator[Frame]:
     """Draw the frames of several saved runs side by side; those that end before others stay as they are."""
-    look, top = film.colour_theme, len(layout.header)
     films = [
         iter_frames(
             record,
@@ -188,12 +196,7 @@ def comparison_frames(
     panes: list[Frame] = []
     for fresh in zip_longest(*films):
         panes = [old if new is None else new for new, old in zip_longest(fresh, panes)]
-        body = tiled(panes, layout.columns, GAP, look.grid, look.background)
-        frame = np.full((layout.size[1], layout.size[0], 3), look.background, dtype=np.uint8)
-        frame[:top, : layout.header.shape[1]] = layout.header
-        part = frame[top : top + body.shape[0], : body.shape[1]]
-        part[:] = body[: part.shape[0], : part.shape[1]]
-        yield frame
+        yield layout.page(panes, film.colour_theme)
 
 
 def tiled(frames: Sequence[Frame], columns: int, gap: int, line: Colour, blank: Colour) -> Frame:

@@ -30,7 +30,7 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
-from robocov_app.runs.film import FILM_HOLD, FILMS, GAP, pane_layout, tiled, write_moving
+from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
 from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
@@ -306,15 +306,9 @@ def story_frames(
                 painter.change(*film.layers())
             painter.environment = environment
             panes.append(painter.frame(_scene(pane, histories, name)))
-        frame = np.full((height, width, 3), theme.background, dtype=np.uint8)
-        top = 0 if layout is None else len(layout.header)
-        if layout is not None:
-            frame[:top, : layout.header.shape[1]] = layout.header
-        body = panes[0] if layout is None else tiled(panes, layout.columns, GAP, theme.grid, theme.background)
-        part = frame[top : top + body.shape[0], : body.shape[1]]
-        part[:] = body[: part.shape[0], : part.shape[1]]
         words = "" if here.scenario is not None else f"{here.at * dt:.1f} s   {here.words}"
-        frame[height - strip :] = _caption(words, (width, strip), theme)
+        page = panes[0] if layout is None else layout.page(panes, theme)
+        frame = np.concatenate([page, _caption(words, (width, strip), theme)])
         yield frame
     if frame is not None:
         for _ in range(round(FILM_HOLD * film.fps)):
