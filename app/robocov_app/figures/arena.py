@@ -103,14 +103,10 @@ def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
     if environment.density is None or environment.density.uniform:
         return
     low_x, low_y, high_x, high_y = environment.region.bounds
-    step = max(high_x - low_x, high_y - low_y) / _DOTS
-    columns, rows = (max(round(side / step), 1) for side in (high_x - low_x, high_y - low_y))
-    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
-    y = low_y + (np.arange(rows) + 0.5) * (high_y - low_y) / rows
     # limits stay as they are, which imshow would change
     extent = low_x, high_x, low_y, high_y
     image = AxesImage(axes, extent=extent, origin="lower", interpolation="bilinear", zorder=1.5)
-    image.set_data(shading(environment.density, environment.region.bounds, x, y, theme))
+    image.set_data(shading(environment, _DOTS, theme))
     axes.add_image(image)
     image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
 

@@ -15,18 +15,29 @@ from robocov.environment import Environment
 from robocov_app.render.theme import Theme
 
 _SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
-
-
 # smallest x, smallest y, largest x, largest y in metres
 Bounds: TypeAlias = tuple[float, float, float, float]
 
 
-def shading(density: Density, bounds: Bounds, x: Array, y: Array, theme: Theme) -> NDArray[np.uint8]:
-    """Return the shading of the places at (w,) x and (h,) y in metres as RGBA, (h, w, 4).
+def shading(environment: Environment, most: int, theme: Theme) -> NDArray[np.uint8]:
+    """Return the shading over the region's box as RGBA, (h, w, 4), the lowest row first.
 
-    No colour is the least that there is within the bounds, the full one the most.
+    No colour is the least that there is, the full one the most. `most` dots are along the longer side.
     """
-    return colours(parts(density, bounds, x, y), theme)
+    assert environment.density is not None
+    x, y = dots(environment, most)
+    return colours(parts(environment.density, environment.region.bounds, x, y), theme)
+
+
+def dots(environment: Environment, most: int) -> tuple[Array, Array]:
+    """Return x and y, ascending, of even places over the region's box, `most` along the longer side."""
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    step = max(high_x - low_x, high_y - low_y) / most
+    axes = []
+    for low, high in ((low_x, high_x), (low_y, high_y)):
+        count = max(round((high - low) / step), 1)
+        axes.append(low + (np.arange(count) + 0.5) * (high - low) / count)
+    return axes[0], axes[1]
 
 
 def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:

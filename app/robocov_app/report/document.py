@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from jinja2 import DictLoader, Environment, StrictUndefined, Template
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from robocov import __version__
@@ -52,7 +52,7 @@ def report(results: Sequence[Result], *, title: str | None = None, theme: str = 
     sections = [_section(result, f"r{number}", budget) for number, result in enumerate(results, start=1)]
     default = sections[0]["title"] if len(results) == 1 else f"{len(results)} results"
     code = script(replay_js() + asset("report.js") + "startReport(startReplays());")
-    html = _template().render(
+    html = template("report.html.jinja").render(
         title=title or default,
         sections=sections,
         single=len(results) == 1,
@@ -108,7 +108,8 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "pairs": tables.pairs_table(pairs, looks) if pairs else None,
         "pairs_plots": list(plots.paired_plots(pairs, looks, f"{key}p")),
         "map_pairs": tables.map_pairs_tables(pairs),
-        "pairs_method": grouped.pairs_method(pairs, compared.words),
+        "compared": pairs,
+        "chosen_gains": compared.words,
         "dependences": list(plots.dependence_plots(result, f"{key}d")),
         "failures": tables.failures_table(result, looks),
         "settings": len(every),
@@ -132,12 +133,14 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
 
 
 @cache
-def _template() -> Template:
-    source = DictLoader({"report.html": asset("report.html.jinja")})
+def template(name: str) -> Template:
+    """Return a template of pages."""
+    loader = FunctionLoader(asset)
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
-    environment = Environment(loader=source, autoescape=True, undefined=StrictUndefined, **tight)
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)
     environment.filters["short"] = _shortened
-    return environment.get_template("report.html")
+    environment.globals |= {"few_maps": grouped.FEW_MAPS, "negligible": grouped.NEGLIGIBLE}
+    return environment.get_template(name)
 
 
 def _shortened(text: str) -> Markup:

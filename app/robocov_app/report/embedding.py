@@ -18,7 +18,7 @@ from robocov.environment import Environment, Obstacle
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.figures.styles import MARKS, CurveStyle
-from robocov_app.render.density import shading
+from robocov_app.render.density import dots, shading
 from robocov_app.render.theme import DARK, LIGHT, mix
 from robocov_app.runs.saved import roster_of
 
@@ -33,21 +33,16 @@ def density_picture(environment: Environment) -> str:
     """
     from PIL import Image
 
-    density = environment.density
-    if density is None or density.uniform:
+    if environment.density is None or environment.density.uniform:
         return ""
-    low_x, low_y, high_x, high_y = bounds = environment.region.bounds
-    step = max(high_x - low_x, high_y - low_y) / _DOTS
-    columns, rows = (max(round(side / step), 1) for side in (high_x - low_x, high_y - low_y))
-    x = low_x + (np.arange(columns) + 0.5) * (high_x - low_x) / columns
-    y = high_y - (np.arange(rows) + 0.5) * (high_y - low_y) / rows
-    dots = shading(density, bounds, x, y, LIGHT)
+    picture = shading(environment, _DOTS, LIGHT)
     # one colour for light and dark: it is between the two
-    dots[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
-    places = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
-    dots[~environment.region.contains(places).reshape(rows, columns), 3] = 0
+    picture[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
+    x, y = np.meshgrid(*dots(environment, _DOTS))
+    places = np.column_stack([x.ravel(), y.ravel()])
+    picture[~environment.region.contains(places).reshape(x.shape), 3] = 0
     file = io.BytesIO()
-    Image.fromarray(dots).save(file, "PNG", optimize=True)
+    Image.fromarray(picture[::-1]).save(file, "PNG", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 

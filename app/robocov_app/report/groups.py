@@ -12,7 +12,6 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
-from robocov.errors import counted
 from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Result
@@ -311,7 +310,7 @@ def compared_groups(result: Result) -> Compared:
     for group in apart:
         by.setdefault(group.controller, []).append(group)
     if len(by) < 2 or len(by) == len(apart):
-        words = "Every set of gains is compared by itself; none was chosen. " if len(by) < len(apart) else ""
+        words = "Every set of gains is compared by itself; none was chosen." if len(by) < len(apart) else ""
         return Compared(apart, words)
     several_maps = len({entry.map for entry in result.fine}) > 1
 
@@ -320,7 +319,7 @@ def compared_groups(result: Result) -> Compared:
 
     parts = list(dict.fromkeys(part_of(entry) for entry in result.fine))
     if len(parts) < 2:
-        words = "There is one case only, too few to choose gains fairly: the first of each take part. "
+        words = "There is one case only, too few to choose gains fairly: the first of each take part."
         return Compared([groups[0] for groups in by.values()], words)
     scales, groups, chosen_gains = medians(result), [], []
     costs: dict[object, list[tuple[object, float]]] = {}
@@ -347,35 +346,9 @@ def compared_groups(result: Result) -> Compared:
         f"Tuned: of a controller with several sets of gains, those for a "
         f"{'map' if several_maps else 'start and seed'} are those with the lowest {other}, so that no run is "
         f"compared on which its gains were chosen; a failed run counts as the worst. "
-        f"Chosen: {'; '.join(chosen_gains)}. "
+        f"Chosen: {'; '.join(chosen_gains)}."
     )
     return Compared(groups, words)
-
-
-def pairs_method(found: Sequence[Comparison], chosen: str) -> str:
-    """Return how the pairs were made, how gains were chosen, and what the intervals mean."""
-    words = f"A pair is two runs on the same map, with the same team, start and seed. {chosen}"
-    if not found or max(each.pairs for each in found) < 2:
-        return words + "There is one pair only: nothing can be said of others."
-    words += (
-        "Ratios of final mean distances below 1 are in favour of the first. Those of a map are geometric "
-        "means with 95 % intervals over its seeds (Student's t of the logarithms), and hold for this map; "
-        f"better and worse are told where all of the interval is beyond {100 * NEGLIGIBLE:g} % from 1. "
-    )
-    most = max(len(each.maps) for each in found)
-    if most > 1:
-        words += (
-            "Over maps each map counts the same, and the 95 % interval is a bootstrap that draws whole maps: "
-            "it speaks of maps like these"
-        )
-        few = f", of which {counted(most, 'map')} are too few to say much" if most < FEW_MAPS else ""
-        words += f"{few}. "
-    if len(found) > 1:
-        words += "No interval is corrected for how many comparisons there are. "
-    alone = max(each.alone for each in found)
-    if alone:
-        words += f"Left out of a comparison, at most: {counted(alone, 'run')} without a counterpart. "
-    return words.strip()
 
 
 def _by_case(group: Group) -> dict[tuple[object, ...], Entry]:

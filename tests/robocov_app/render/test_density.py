@@ -6,7 +6,14 @@ from density_cases import GAUSSIANS, POLYGONS
 
 from robocov.density import Gaussian, Gaussians, Raster, Uniform
 from robocov.environment import Environment
-from robocov_app.render.density import colours, density_label, density_range, mean_label, shading, value_range
+from robocov_app.render.density import (
+    colours,
+    density_label,
+    density_range,
+    mean_label,
+    parts,
+    value_range,
+)
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 BOUNDS = (0.0, 0.0, 8.0, 8.0)
@@ -30,14 +37,14 @@ def test_the_range_finds_narrow_hot_spots():
 
 def test_the_more_the_stronger():
     x = np.linspace(0.1, 7.9, 60)
-    picture = shading(GAUSSIANS["one"], BOUNDS, x, x, LIGHT)
+    picture = colours(parts(GAUSSIANS["one"], BOUNDS, x, x), LIGHT)
     assert picture.shape == (60, 60, 4) and (picture[..., :3] == LIGHT.density).all()
     values = GAUSSIANS["one"].value(np.column_stack([np.tile(x, 60), np.repeat(x, 60)])).reshape(60, 60)
     order = np.argsort(values.ravel())
     assert (np.diff(picture[..., 3].ravel()[order].astype(int)) >= 0).all()
     assert picture[..., 3].min() == 0
     assert picture[..., 3].max() == pytest.approx(255 * LIGHT.density_strength, abs=3)
-    flat = shading(Uniform(), BOUNDS, x, x, LIGHT)
+    flat = colours(parts(Uniform(), BOUNDS, x, x), LIGHT)
     assert not flat[..., 3].any()
 
 

@@ -5,7 +5,12 @@ import pytest
 from reported_results import entry, result_of
 
 from robocov_app.figures.statistics import bootstrap, mean_with_t_interval
-from robocov_app.report.groups import compared_groups, comparisons, pairs_method
+from robocov_app.report.document import template
+from robocov_app.report.groups import compared_groups, comparisons
+
+
+def method(comparisons, chosen):
+    return template("pairs.jinja").module.method(comparisons, chosen)
 
 
 def found(entries):
@@ -44,7 +49,7 @@ def test_pairs_share_map_team_start_and_seed() -> None:
         ("museum", [3.0], [2.0]),
     ]
     assert comparison.pairs == 2 and comparison.alone == 7
-    assert "7 runs without a counterpart" in pairs_method([comparison], "")
+    assert "7 runs without a counterpart" in method([comparison], "")
 
 
 def test_there_is_no_comparison_without_pairs() -> None:
@@ -65,7 +70,7 @@ def test_the_headline_does_not_hide_that_maps_disagree() -> None:
     over = bootstrap(logs, "mean")
     assert [comparison.ratio.low, comparison.ratio.high] == pytest.approx(np.exp([over.low, over.high]))
     two = found(maps_of({"a": 0.8, "b": 1.3}))[0]
-    assert two.headline().endswith("over 2 maps only.") and "2 maps are too few" in pairs_method([two], "")
+    assert two.headline().endswith("over 2 maps only.") and "2 maps are too few" in method([two], "")
 
 
 def test_on_one_map_the_interval_is_over_its_seeds() -> None:
