@@ -106,9 +106,9 @@ def _guarded(name: str, rest: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except OSError as error:
-        where = "the answer cannot be written" if error.filename is None else os.fsdecode(error.filename)
-        cannot = "" if error.filename is None else ": cannot be used"
-        return _complain(f"{where}{cannot}: {error.strerror or error}")
+        file = error.filename
+        what = "the answer cannot be written" if file is None else f"{os.fsdecode(file)}: cannot be used"
+        return _complain(f"{what}: {error.strerror or error}")
     except SystemExit as ending:
         return ending.code if isinstance(ending.code, int) else BAD_INPUT
     except Exception as error:

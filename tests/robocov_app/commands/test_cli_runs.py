@@ -11,40 +11,18 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs import options
 
+FILES = "run.json record.npz cost.csv trajectories.png trajectories.svg cost.png cost.svg".split()
+
 
 def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "run"
-    words = (
-        "run",
-        "rooms",
-        *SHORT,
-        "--frames",
-        "--video",
-        "--fps",
-        "10",
-        "--film-speed",
-        "1",
-        "--out",
-        str(out),
-    )
-    assert main(list(words)) == 0
+    words = "--frames --video --fps 10 --film-speed 1 --out".split()
+    assert main(["run", "rooms", *SHORT, *words, str(out)]) == 0
     said = capsys.readouterr()
     assert str(out) in said.out
     assert "mean distance" in said.out
     names = sorted(path.name for path in out.glob("[!.]*"))
-    assert names == sorted(
-        [
-            "run.json",
-            "record.npz",
-            "cost.csv",
-            "trajectories.png",
-            "trajectories.svg",
-            "cost.png",
-            "cost.svg",
-            "frames",
-            "run.mp4",
-        ]
-    )
+    assert names == sorted([*FILES, "frames", "run.mp4"])
     frames = sorted(path.name for path in (out / "frames").iterdir())
     assert frames == [f"{k:06d}.png" for k in range(len(frames))]
     assert len(frames) == 11 + 10, "one second at ten frames, and one second on the last"
@@ -53,10 +31,8 @@ def test_run_saves_everything_and_says_where(tmp_path: Path, capsys: pytest.Capt
     assert len(rows) == 11
     run = json.loads((out / "run.json").read_text())
     assert run["summary"]["mean_distance_m"] == float(rows[-1].split(",")[1])
-    assert run["controller"] == {
-        "name": "rapf",
-        "gains": {g.name: g.default for g in gains_of(CONTROLLERS["rapf"]).values()},
-    }
+    gains = {gain.name: gain.default for gain in gains_of(CONTROLLERS["rapf"]).values()}
+    assert run["controller"] == {"name": "rapf", "gains": gains}
     assert len(Record.load(out)) == 61
 
 
@@ -72,15 +48,7 @@ def test_run_answers_in_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture
 def test_the_same_words_give_the_same_bytes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("one", "two"):
         answer(capsys, "run", "rooms", *SHORT, "--seed", "5", "--out", str(tmp_path / name))
-    for file in (
-        "record.npz",
-        "run.json",
-        "cost.csv",
-        "trajectories.png",
-        "trajectories.svg",
-        "cost.png",
-        "cost.svg",
-    ):
+    for file in FILES:
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 
 

@@ -154,18 +154,7 @@ def test_ctrl_c_during_a_film_keeps_the_film_so_far(tmp_path: Path) -> None:
     import imageio_ffmpeg
 
     out = tmp_path / "run"
-    words = [
-        "run",
-        "square",
-        "--duration",
-        "20",
-        "--lattice",
-        "16",
-        "--film-speed",
-        "0.01",
-        "--size",
-        "480x320",
-    ]
+    words = "run square --duration 20 --lattice 16 --film-speed 0.01 --size 480x320".split()
     process = subprocess.Popen(
         [*COMMAND, *words, "--video", "--out", str(out)],
         stdout=subprocess.PIPE,
@@ -242,17 +231,8 @@ def test_names_with_brackets_are_words(tmp_path: Path, capsys: pytest.CaptureFix
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
-    words = (
-        "compare",
-        "square",
-        *SHORT,
-        "--controllers",
-        "rapf",
-        f"{mine}:Mine",
-        "--out",
-        str(tmp_path / "out"),
-    )
-    assert main(list(words)) == 0
+    words = ["compare", "square", *SHORT, "--controllers", "rapf", f"{mine}:Mine"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
     assert "[bold]R[/] [/] $x" in capsys.readouterr().out
 
 
