@@ -36,7 +36,7 @@ from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, facts, suggestion
 
-PAUSE_AT_REST = 1.0  # seconds between two frames while time goes on, but nothing moves any more
+PAUSE_AT_REST = 0.1  # seconds between two frames while time goes on, but nothing moves any more
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
 
@@ -113,7 +113,7 @@ class Window(BaseWindow):
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
         desk, session, tour = self.desk, self.desk.session, self.tour
-        at_rest = session.settled and session.live
+        at_rest = session.settled and session.live and not session.environment.moves
         self.pause = PAUSE_AT_REST if session.playing else PAUSE
         if (session.playing and not at_rest) or self.film is not None:
             return None
