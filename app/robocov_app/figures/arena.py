@@ -55,10 +55,7 @@ def _path_style(theme: Theme) -> dict[str, Any]:
 def draw_map(
     axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
 ) -> None:
-    """Draw the obstacles at a time, s, what of the region is outside the boundary, and its outline.
-
-    Where places do not count all the same, how much they count is a shading below; without `density` not.
-    """
+    """Draw density, obstacles at a time, s, what of the region is outside the boundary, and its outline."""
     if density:
         _draw_density(axes, environment, theme)
     for part in environment.at(time).blocked.geoms:
@@ -164,10 +161,7 @@ def draw_robots(
     theme: Theme,
     numbers: Sequence[int] | None = None,
 ) -> list[float]:
-    """Draw robots at (n, 2) m with radii (n,) m as discs with numbers; return the drawn radii in points.
-
-    The numbers are 1, 2, 3, ... where others are not given.
-    """
+    """Draw robots at (n, 2) m as discs with numbers, 1, 2, 3 by default; return their radii in points."""
     drawn = _disc_points(axes, places, radius)
     axes.scatter(
         places[:, 0],

@@ -63,10 +63,7 @@ class Moment:
         counted: IntArray | None = None,
         mean_time: float | None = None,
     ) -> Moment:
-        """Return the last moment of a run, with the mean distance, m, and time, s, that its curves end with.
-
-        `counted` are the rows of the robots that count, all by default.
-        """
+        """Return the last moment of a run, its mean distance, m, and time, s, of `counted` rows."""
         cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
         cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room
         time = float(record.time[-1])
@@ -136,11 +133,7 @@ def plot_coverage(
 
 @plain_style()
 def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> None:
-    """Plot the distance to the nearest robot on axes that somebody else laid out.
-
-    They get ticks in metres, and the scale of colours to the right of them. `moment`: its title and facts are
-    not written.
-    """
+    """Plot distances on axes of somebody else, which get ticks in metres and a scale of colours."""
     theme = theme_named(theme)
     limit = _limit([moment])
     ticks_in_metres(axes, moment.environment, theme)

@@ -22,10 +22,7 @@ WEIGHED = "mean distance to the nearest robot, weighed by φ (m)"
 
 
 def end_label(curve: Curve, unit: str = "m") -> str:
-    """Return what stands at a curve's end: its name and its last finite value.
-
-    Lengths have millimetres, as in captions; what is measured in other units, and is large, four digits.
-    """
+    """Return a curve's name with its last finite value: millimetres, or four digits of what is large."""
     label, _, _, values = curve
     last = float(values[np.isfinite(values)][-1])
     number = f"{last:.3f}"

@@ -76,11 +76,7 @@ def _write(figure: Figure, file: Path | IO[bytes], kind: str) -> None:
 
 
 def check_figure_path(path: Path) -> None:
-    """Make sure, before any work is done, that a figure can be written there.
-
-    Raises OutputError when there is no such folder, or something else than a file in its place;
-    ParameterError when the suffix is neither PNG, SVG nor PDF.
-    """
+    """Raise OutputError or ParameterError, before any work is done, where no figure can be written."""
     figure_kind(path)
     if not writable(path).parent.is_dir():
         raise OutputError(f"{path}: cannot be written: there is no folder {path.parent}")

@@ -42,10 +42,7 @@ class AtHeight(NamedTuple):
 
 
 def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[float]) -> list[AtHeight]:
-    """Return the best places over a convex cell, the limits h → 0 and h → ∞ first and last.
-
-    `vertices` in m. `heights`, m: ascending.
-    """
+    """Return the best places over a convex cell, m, at ascending heights, m, and in the limits 0, inf."""
     cell = _cell_of(vertices)
     size = float(np.sqrt(cell.mass[0]))
     rows = []

@@ -26,12 +26,7 @@ def plot_maps(
     size: tuple[int, int] | None = None,
     title: str = "",
 ) -> Figure:
-    """Plot maps side by side at one scale, each under its name.
-
-    `environments`: the first `MOST` are drawn; where there are more, the title says so. `size`, (width,
-    height) or None: of the page; by default what suits the shapes of the maps. Raises ParameterError when
-    there are no maps.
-    """
+    """Plot the first `MOST` maps side by side at one scale, each under its name; the page has `size` px."""
     if not environments:
         raise ParameterError("maps: none were given, but at least one was wanted")
     theme = theme_named(theme)

@@ -46,10 +46,7 @@ def plot_metrics(
     size: tuple[int, int] = (1200, 800),
     title: str = "Metrics",
 ) -> Figure:
-    """Plot the metrics of runs against time, each curve named with its value at the end.
-
-    `size` in (width, height). Raises ParameterError when there is no run.
-    """
+    """Plot the metrics of runs against time, each curve named with its value at the end."""
     if not runs:
         raise ParameterError("runs: none were given, but at least one was wanted")
     theme = theme_named(theme)

@@ -77,10 +77,7 @@ class PageAxes(Axes):
 
 
 class Page:
-    """A figure with titles and a legend that keep clear of what is plotted.
-
-    Texts and lines are `scale` times those of a page of 100 dots an inch; None is what suits the size.
-    """
+    """A figure laid out in pixels; texts and lines are `scale` times those at 100 dots an inch."""
 
     def __init__(self, size: tuple[int, int], theme: Theme, scale: float | None = None) -> None:
         self.size = size

@@ -53,10 +53,7 @@ class Sample(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Ratios (m,) of two controllers in pairs of runs, named as "RAPF / RPF", with the typical ratio.
-
-    `controller` is the first one's name, for the colour.
-    """
+    """Ratios (m,) of two controllers in pairs of runs, and the typical one; the colour is the first one's."""
 
     label: str
     controller: str
@@ -76,12 +73,7 @@ def plot_cost_bands(
     label: str = DISTANCE,
     unit: str = "m",
 ) -> Figure:
-    """Plot values against time: of several runs their median and quartiles, of one run its line.
-
-    The page has `size` px. `styles`: one for each band. `label`
-    and `unit` tell the values. Raises ParameterError when there are no bands, or one has no finite value or
-    not one column for each time.
-    """
+    """Plot values against time: of several runs their median and quartiles, of one run its line."""
     if not bands:
         raise ParameterError("bands: none were given, but at least one was wanted")
     for band in bands:
@@ -173,11 +165,7 @@ def plot_paired(
     label: str = "ratio of final mean distances",
     styles: Sequence[CurveStyle] | None = None,
 ) -> Figure:
-    """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis.
-
-    Raises ParameterError when there are no pairs, or a ratio is
-    not above 0.
-    """
+    """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis."""
     _check_samples([Sample(each.label, each.controller, each.ratios) for each in pairs])
     for each in pairs:
         if not (each.ratios > 0).all():
@@ -206,10 +194,7 @@ def plot_paired(
 
 
 def quartiles(values: Array) -> tuple[Array, Array, Array]:
-    """Return the first quartile, the median and the third over the rows of (m, T) values, (T,) each.
-
-    What is not finite does not count; where nothing is, they are nan.
-    """
+    """Return quartiles and the median between, (T,), over finite rows of (m, T); nan for none."""
     kept = np.where(np.isfinite(values), values, np.nan)
     result = np.full((3, values.shape[1]), np.nan)
     some = ~np.isnan(kept).all(axis=0)

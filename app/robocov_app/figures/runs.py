@@ -30,10 +30,7 @@ def plot_environment(
     theme: Theme | str = LIGHT,
     size: tuple[int, int] | None = None,
 ) -> Figure:
-    """Plot a map: its free space, its obstacles and the convex region that the robots know.
-
-    `axes`: where to draw; None makes a page of `size` px with a title.
-    """
+    """Plot a map on `axes`, or on a page of `size` px: free space, obstacles, the region that robots know."""
     theme = theme_named(theme)
     if axes is None:
         facts = f"{environment.area:.4g} m² inside the boundary, {environment.free_area:.4g} m² free"
@@ -83,11 +80,7 @@ def plot_comparison(
     mean_distances: Sequence[float | None] | None = None,
     mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
-    """Plot several runs side by side at one scale.
-
-    `mean_distances`, m, and `mean_times`, s (where robots are not equally fast), are those of the final
-    positions, for the titles. Raises ParameterError when there are no records, or not one value for each.
-    """
+    """Plot runs side by side at one scale, with final mean distances, m, and times, s, in the titles."""
     _check_colours(colours)
     costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
     if not records or len(costs) != len(records):

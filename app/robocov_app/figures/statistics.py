@@ -1,7 +1,7 @@
 """Bootstrap intervals over runs, clustered by map, and paired comparisons.
 
 Runs on one map are alike: resampling them one by one would make the intervals too narrow. Where `clusters`
-are given, `scipy.stats.bootstrap` draws whole clusters (Field and Welsh, 2007); intervals are percentiles.
+are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
 """
 
 from __future__ import annotations
@@ -41,10 +41,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Paired:
-    """A comparison of a with b over pairs: medians of a/b and of a - b, and the share in which a is below b.
-
-    Ties count half in `wins`; `pairs` is how many there are.
-    """
+    """Medians of a/b and of a - b over `pairs`, and the share in which a is lower; ties count half."""
 
     ratio: Interval
     difference: Interval
@@ -62,10 +59,7 @@ def bootstrap(
     *,
     resamples: int = RESAMPLES,
 ) -> Interval:
-    """Return the median or mean of (m,) finite values; values of one of the m `clusters` are drawn together.
-
-    Raises ParameterError when there is no value, or one that is not finite, or not one label for each.
-    """
+    """Return the median or mean of (m,) finite values; those of one of m `clusters` are drawn together."""
     sample = _checked("values", values)
     labels = range(len(sample)) if clusters is None else clusters
     if len(labels) != len(sample):
@@ -79,10 +73,7 @@ def bootstrap(
 def bootstrap_by(
     statistic: Callable[[IntArray], float], clusters: Sequence[object], *, resamples: int = 1000
 ) -> Interval:
-    """Return any statistic of row numbers, some of them drawn several times, one label of `clusters` a row.
-
-    Raises ParameterError when there is no row.
-    """
+    """Return any statistic of row numbers, some drawn several times, one label of `clusters` a row."""
     return _interval(lambda drawn: [statistic(rows) for rows in drawn], clusters, resamples)
 
 
@@ -115,10 +106,7 @@ def _interval(
 
 
 def paired(a: ArrayLike, b: ArrayLike, clusters: Sequence[object] | None = None) -> Paired:
-    """Compare two samples (m,) pair by pair: row k of both was got under the same circumstances.
-
-    Raises ParameterError when they differ in length, are not finite, or `b` is not above 0.
-    """
+    """Compare two samples (m,), b above 0, pair by pair: row k of both is of the same case."""
     first, second = _checked("a", a), _checked("b", b)
     if len(first) != len(second):
         raise ParameterError(f"pairs: {len(first)} and {len(second)} values, but as many of both were wanted")
@@ -134,11 +122,7 @@ def paired(a: ArrayLike, b: ArrayLike, clusters: Sequence[object] | None = None)
 
 
 def mean_with_t_interval(values: ArrayLike) -> Interval:
-    """Return the mean of (m,) values with Student's t interval, which is honest of few of them, too.
-
-    Equal values say no more than one: they have no interval. Raises ParameterError when there is no value, or
-    one that is not finite.
-    """
+    """Return the mean of (m,) values with Student's t interval; equal values say no more than one."""
     sample = _checked("values", values)
     mean = float(sample.mean())
     if len(np.unique(sample)) < 2:
@@ -151,10 +135,7 @@ def mean_with_t_interval(values: ArrayLike) -> Interval:
 
 
 def spread(values: ArrayLike) -> float:
-    """Return the coefficient of variation: the standard deviation (of a sample) by the mean.
-
-    Raises ParameterError when there are fewer than two values, or their mean is not above 0.
-    """
+    """Return the coefficient of variation, the deviation (of a sample) by the mean, of two or more values."""
     sample = _checked("values", values)
     if len(sample) < 2:
         raise ParameterError(f"values: {len(sample)}, but at least two were wanted")

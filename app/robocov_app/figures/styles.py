@@ -39,11 +39,7 @@ MARKS = {
 
 
 class CurveStyle(NamedTuple):
-    """How a controller's curves are told from others: never by a colour alone.
-
-    `name` is that of the colour: the controller's own, or ``other-0``, ``other-1``, ... for those of
-    `Theme.others`.
-    """
+    """Colour, dashes and mark; `name` is a controller's own colour, or ``other-k`` of `Theme.others`."""
 
     name: str
     dashes: Any

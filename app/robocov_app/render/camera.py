@@ -14,11 +14,7 @@ SMALLEST, LARGEST = 1e-4, 1e7
 
 @dataclass(frozen=True)
 class Camera:
-    """What part of the world is shown where; immutable, so that a picture can be kept for it.
-
-    Immutable, so that a picture can be kept for it. `center` is the point of the world, m, in the middle of
-    `view` (left, top, width, height), px; `zoom` is in px/m.
-    """
+    """A view of the world: `center`, m, in the middle of `view` (left, top, width, height), `zoom` px/m."""
 
     center: tuple[float, float]
     zoom: float
@@ -31,10 +27,7 @@ class Camera:
         view: tuple[float, float, float, float],
         margin: float = 0.0,
     ) -> Camera:
-        """Return the camera that shows `bounds` as large as possible.
-
-        `bounds` are smallest x and y, largest x and y, m; `margin` px are left free on each side of the view.
-        """
+        """Return the camera that shows `bounds`, m, as large as possible, `margin` px from the sides."""
         low_x, low_y, high_x, high_y = bounds
         width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
         room_x, room_y = max(view[2] - 2 * margin, 1.0), max(view[3] - 2 * margin, 1.0)

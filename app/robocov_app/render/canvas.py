@@ -124,10 +124,7 @@ class Canvas:
     def polygons(
         self, corners: Array, ends: Sequence[int], fills: Sequence[Colour | None], edge: Colour | None = None
     ) -> None:
-        """Fill many polygons, one after the other in (k, 2) px corners, each up to one of the `ends`.
-
-        With an `edge`, they get thin outlines that are not smooth either.
-        """
+        """Fill polygons, one after the other in (k, 2) px corners up to each of the `ends`."""
         begin = 0
         if len(corners) and np.abs(corners).max() > FAR:
             for end, fill in zip(ends, fills, strict=True):
@@ -234,10 +231,7 @@ class Canvas:
         self.stamps([sprite], np.array([center], dtype=float))
 
     def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:
-        """Put a sprite at each of (n, 2) px, to a quarter of a pixel, one after the other.
-
-        `which` of them belongs where, (n,); the first everywhere where it is None.
-        """
+        """Put sprites at (n, 2) px, to a quarter of a pixel: number `which`, (n,), or all the first."""
         self.surface.fblits(self.placed(some, centers, which), pygame.BLEND_PREMULTIPLIED)
 
     def placed(
@@ -273,10 +267,7 @@ class Canvas:
         bold: bool = False,
         anchor: str = "left",
     ) -> int:
-        """Write one line, its middle at the height of `at`; return its width in pixels.
-
-        `anchor` is ``left``, ``right`` or ``middle``: which part of the text is at `at`.
-        """
+        """Write one line with its left, middle or right (`anchor`) at a pixel; return its width in pixels."""
         pixels = self.text_size(self.theme.text if size is None else size)
         picture = label(text, pixels, colour or self.theme.ink, bold)
         width, height = picture.get_size()

@@ -84,10 +84,7 @@ class _Rivals(NamedTuple):
 
 
 class Field:
-    """The distance to the nearest robot, and who that is, for one set of positions.
-
-    `result`: of the same `CoverageCost`.
-    """
+    """The distance to the nearest robot, and who that is, for one set of positions."""
 
     def __init__(self, lattice: FieldLattice, result: CoverageResult) -> None:
         self.lattice = lattice
@@ -127,10 +124,7 @@ class Field:
         return float(reached.max()) if len(reached) else float("nan")
 
     def distances(self, x: Array, y: Array) -> Array:
-        """Return the distances at (w,) x and (h,) y, m, as (h, w) m; inf where no robot can come.
-
-        Within obstacles they are those of places beside them, so that pictures can be cut there.
-        """
+        """Return distances at (w,) x and (h,) y as (h, w) m; inf where no robot can come beside obstacles."""
         column, row = self.lattice.squares(x, y)
         site = self.lattice.around[..., 0][row[:, None], column]
         distance = self._distance(site, np.broadcast_to(x, site.shape), y[:, None])
@@ -149,11 +143,7 @@ class Field:
         return owner, pixels.within(within)
 
     def borders(self, x: Array, y: Array, within: float) -> Borders:
-        """Return the places of a picture near which the owner changes.
-
-        `x` (w,) and `y` (h,) are the middles of the pixels, m, evenly spaced; borders are at most `within` m
-        away.
-        """
+        """Return the places at even (w,) x and (h,) y, at most `within` m from a change of owner."""
         _, pixels = self._coarse_and_fine(x, y, within)
         return pixels.within(within)
 
@@ -232,10 +222,7 @@ class Field:
 
 
 class Fields:
-    """The fields of one map, whatever the positions and the time, and one scale of colours for all of them.
-
-    `limit`, m: where the scale of colours ends.
-    """
+    """The fields of one map at any positions and time; their scale of colours ends at `limit`, m."""
 
     def __init__(self, cost: CoverageCost, limit: float) -> None:
         self.limit = limit
@@ -338,11 +325,7 @@ def palette(theme: Theme) -> NDArray[np.uint8]:
 
 
 def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArray[np.uint8]:
-    """Return distances as a picture of numbers of colours in the `palette`.
-
-    `x` (w,) and `y` (h,) are the middles of the pixels, m; from `limit`, m, on all is of the farthest colour;
-    where no robot can come there are slanted lines, `hatch` pixels apart.
-    """
+    """Return distances at (w,) x and (h,) y as numbers in the `palette`; unreachable places are hatched."""
     distance = field.distances(x, y)
     reached = np.isfinite(distance)
     np.multiply(distance, FARTHEST / limit, out=distance)

@@ -14,10 +14,7 @@ from robocov_app.render.theme import Colour
 
 @lru_cache(maxsize=2)
 def font_path(bold: bool = False) -> Path | None:
-    """Return the font's file, or None where matplotlib came without it: pygame's own font is used then.
-
-    matplotlib is located, not imported: importing it would take longer than everything else here.
-    """
+    """Return the font's file; matplotlib, which has it, is located, not imported: that takes long."""
     spec = importlib.util.find_spec("matplotlib")
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     for folder in (spec.submodule_search_locations or []) if spec else []:
@@ -34,10 +31,7 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
 
 @kept(8_000_000)
 def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
-    """Return `text` as a transparent picture; kept, since rendering costs far more than blitting.
-
-    `text`: one line. `size`, px: height of the letters' box.
-    """
+    """Return a line of text as a picture, `size` px high; kept, rendering costs more than blitting."""
     return _living(size, bold).render(text, True, colour)
 
 

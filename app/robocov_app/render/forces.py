@@ -125,10 +125,7 @@ def range_layer(kind: str, title: str) -> Layer:
 
 
 def draw_links(canvas: Canvas, scene: Scene) -> None:
-    """Draw lines between neighbours.
-
-    Where everybody hears everybody, those are drawn whose cells share an edge: the others change nothing.
-    """
+    """Draw lines between neighbours; of a complete graph those whose cells share an edge."""
     neighbours = scene.now.seen.neighbours
     if neighbours.complete:
         pairs = scene.adjacency

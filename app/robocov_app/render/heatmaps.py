@@ -55,10 +55,7 @@ def density_entry(words: str) -> LegendEntry:
 
 
 def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
-    """Draw the shading within a ring, (k, 2) m, over what is there, premultiplied or opaque.
-
-    Where it is drawn in parts, as the clip says, these are parts of the same picture.
-    """
+    """Draw the density within a ring, (k, 2) m; drawn in parts, as the clip says, it is the same picture."""
     (low_x, low_y), (high_x, high_y) = ring.min(axis=0).tolist(), ring.max(axis=0).tolist()
     ends = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     (left, top), (right, bottom) = np.clip(ends, -30000, 30000).astype(int).tolist()
@@ -115,10 +112,7 @@ _HATCH = 5  # pixels of the coarse picture from one slanted line to the next
 
 
 class FieldPicture:
-    """A picture of a field that is kept until the field or the view changes.
-
-    `draw_picture` gives the picture of the pixels at (w,) x and (h,) y, m.
-    """
+    """A picture of a field, by `draw_picture` at (w,) x and (h,) y m; kept until field or view change."""
 
     def __init__(self, draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface]) -> None:
         self.draw_picture = draw_picture

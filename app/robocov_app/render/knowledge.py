@@ -38,10 +38,7 @@ def discovered_map(scene: Scene) -> DiscoveredMap | None:
 
 
 def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
-    """Draw what is in view of a discovered map: unknown cells veiled, walls as what is sensed of them.
-
-    Cells outside the region are left clear.
-    """
+    """Draw what is in view of a discovered map: unknown cells veiled, walls as sensed, outside nothing."""
     raster = known.raster
     view = canvas.surface.get_clip()
     corners = np.array([view.topleft, view.bottomright], dtype=float)
@@ -147,10 +144,7 @@ scans_legend = says("ray scan", _scan_glyph)
 
 
 class SensedObstacles:
-    """What the robots know of the obstacles, beside the truth: points that were sensed; the rest pales.
-
-    Of the robot that is asked about, where there is one, else of all; its discovered map if it makes one.
-    """
+    """Sensed points, of the selected robot or of all, over a paler map; and its discovered map."""
 
     def __init__(self) -> None:
         self._page: pygame.Surface | None = None

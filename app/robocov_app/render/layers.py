@@ -95,10 +95,7 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def _forward(edges: Array) -> Array:
-    """Return those of (m, 4) px edges that run to the right, or straight down.
-
-    Two cells run along the edge between them in opposite directions: each is returned once.
-    """
+    """Return the (m, 4) px edges that run right or straight down: one of the two cells beside has it so."""
     x1, y1, x2, y2 = np.rint(edges * 16.0).T
     return np.asarray(edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))])
 

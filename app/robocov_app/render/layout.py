@@ -90,10 +90,7 @@ T = TypeVar("T")
 
 
 def united(legends: Iterable[Sequence[T]], key: Callable[[T], Hashable]) -> list[T]:
-    """Return the entries of all legends, each once.
-
-    They stand in the first one's order; what only a later one has follows what precedes it there.
-    """
+    """Return the entries of all legends once, in the first one's order; others follow what precedes them."""
     found: list[T] = []
     for legend in legends:
         keys = [key(entry) for entry in found]

@@ -43,10 +43,7 @@ _strip = partial(Layer, in_world=False)
 
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
-    """Return one of each layer, from the lowest to the topmost; they keep pages of their own.
-
-    `trails`: colours of the trajectories, see `Trajectories`.
-    """
+    """Return one of each layer, from the lowest to the topmost; `trails` are colours of `Trajectories`."""
     distances, geodesic = FieldPicture(heatmaps.draw_distances), FieldPicture(heatmaps.draw_geodesic_cells)
     trajectories, snapshot = Trajectories(trails), ("snapshot",)
     return [
@@ -91,10 +88,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
 
 
 def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
-    """Return names of layers, a dash as good as an underscore.
-
-    Raises ParameterError when there is no layer of that name; the message names the option.
-    """
+    """Return names of layers, dashes as underscores; ParameterError names the option of an unknown one."""
     known = [layer.name for layer in standard_layers()]
     wanted = [name.replace("-", "_") for name in names]
     for name in wanted:
@@ -113,10 +107,7 @@ def pane_layers(trails: str = "robots") -> list[Layer]:
 
 
 def scale_for(size: tuple[int, int]) -> float:
-    """Return the scale at which text and lines suit a picture of `size` pixels: 1.25 for 1280 x 720.
-
-    Films are watched from the last row of a lecture hall: their text is a little larger than a window's.
-    """
+    """Return the scale of text and lines of films, larger than a window's: 1.25 for 1280 x 720."""
     fitting = min(size[0] / 1024, size[1] / 576)
     return min(max(round(fitting * 8) / 8, 0.875), 6.0)
 
@@ -130,12 +121,7 @@ def _hues(scene: Scene, previous: IntArray) -> IntArray:
 
 
 class Painter:
-    """Draws scenes of one environment.
-
-    It keeps what does not change from one frame to the next. It works on any surface of its `size`, px: a
-    window, a part of one, or one in memory. `visible` are the names of the layers that are shown; it may be
-    changed.
-    """
+    """Draws scenes of one environment on surfaces of its `size`, px; shows the layers in `visible`."""
 
     def __init__(
         self,
@@ -258,11 +244,7 @@ class Painter:
             self._camera = self._camera.within(view)
 
     def _steady(self, rows: int, beside: float) -> tuple[int, float]:
-        """Return the most room that legend and scale of colours have needed as long as the same is shown.
-
-        What they tell of comes and goes, a path with the cursor, distances with every new wall; the map is
-        not to jump each time.
-        """
+        """Return the most room that legend and colour bar needed for these layers: maps do not jump."""
         key = self.size, self.scale, frozenset(self.visible)
         if self._room[0] == key:
             rows, beside = max(rows, self._room[1]), max(beside, self._room[2])

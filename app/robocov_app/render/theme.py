@@ -282,12 +282,7 @@ def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
 
 
 def _dsatur(neighbours: list[list[int]]) -> list[int]:
-    """Colour a graph: always the vertex whose neighbours show most colours, then of most neighbours.
-
-    Among the allowed colours the one used least so far is taken, so that all are used alike.
-    A vertex whose neighbours show every colour (which planar graphs of cells practically never
-    have) takes the colour that fewest of them show.
-    """
+    """Colour a graph by DSATUR, all colours used alike; where neighbours show all, the rarest of them."""
     n = len(neighbours)
     hues = [-1] * n
     uses = [0] * MAP_COLOURS

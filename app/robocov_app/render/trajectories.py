@@ -24,10 +24,7 @@ _FADE_FINE = 2  # they are drawn so many times larger, and shrunk
 
 
 class Trajectories:
-    """Where the robots went; nothing where a row has nan.
-
-    `colours`: each in its robot's colour (large teams: all in a quiet red), or all red ("paper").
-    """
+    """Where the robots went, nan for nowhere; each in its robot's colour, or all red (`colours` "paper")."""
 
     def __init__(self, colours: str = "robots") -> None:
         self.colours = colours

@@ -39,11 +39,7 @@ class Report:
 
 
 def report(results: Sequence[Result], *, title: str | None = None, theme: str = "auto") -> Report:
-    """Return results as a page, a section each; the same results give the same page.
-
-    The theme is "auto", which follows the reader, "light" or "dark". Raises ParameterError when there are no
-    results, or no such theme.
-    """
+    """Return results as a page, a section each; theme "auto" follows the reader. Same results, same page."""
     if not results:
         raise ParameterError("report: no results were given, but at least one was wanted")
     if theme != "auto":

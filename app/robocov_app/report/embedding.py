@@ -26,11 +26,7 @@ _DOTS = 80  # dots along the longer side of a map
 
 
 def density_picture(environment: Environment) -> str:
-    """Return the address, ``data:image/png;...``, of a picture of the density over the region's box.
-
-    The more a place counts, the less is seen through; outside the region all is. Empty where every place
-    counts the same.
-    """
+    """Return a ``data:image/png`` of the density over the region's box, clear outside; empty without one."""
     from PIL import Image
 
     if environment.density is None or environment.density.uniform:
@@ -56,11 +52,7 @@ _VERTICES = 4000  # vertices of a map's obstacles above which they are simplifie
 
 @dataclass(frozen=True, eq=False)
 class ReplayRun:
-    """A run to be replayed, with what it is called, what else is said of it, and how its curve looks.
-
-    Without a history the replay shows no curve; without a label and a style it has the record's label and a
-    style of its own.
-    """
+    """A run to be replayed with its words and look; by default the record's label and an own style."""
 
     record: Record
     history: CostHistory | None
@@ -84,10 +76,7 @@ def even_times(end: float, rate: float) -> Array:
 
 
 def quantised(values: Array, low: float, high: float) -> str:
-    """Return numbers as base64 of 16 bits each (little-endian), from 0 at `low` to 65534 at `high`.
-
-    What is not finite becomes `NONE`.
-    """
+    """Return numbers as base64 of 16 bits, 0 at `low`, 65534 at `high`, `NONE` if not finite."""
     span = high - low if high > low else 1.0
     with np.errstate(invalid="ignore"):
         steps = np.rint(np.clip((values - low) / span, 0.0, 1.0) * (NONE - 1))
@@ -146,10 +135,7 @@ def _mover(shape: Obstacle, unit: float) -> dict[str, Any]:
 
 
 def lives(record: Record) -> list[tuple[float, float | None]]:
-    """Return of each robot when it is there first and when it fails, s from the begin; None for never.
-
-    A robot that never joins is there after the end.
-    """
+    """Return when each robot is first there (never: after the end) and fails (never: None), s."""
     since = record.time - record.time[0]
     found: list[tuple[float, float | None]] = []
     for present, working in zip(record.present.T, record.working.T, strict=True):
@@ -195,10 +181,7 @@ def embedded_run(
 def embedded(
     runs: Sequence[ReplayRun], styles: Sequence[CurveStyle], panes: Sequence[int], budget: int = BUDGET
 ) -> dict[str, Any]:
-    """Return all that a replay needs, at the highest rate (up to `RATE`) at which it fits `budget` bytes.
-
-    Where even one moment a second is too much, goals are left out. `panes` are the runs to be shown at first.
-    """
+    """Return all that a replay needs, at the rate up to `RATE`, and with goals, that fits the `budget`."""
     rate, goals = _affordable(runs, budget)
     maps: list[dict[str, Any]] = []
     places: dict[Environment, int] = {}

@@ -51,10 +51,7 @@ class Group:
 
 
 def variants(result: Result) -> list[Group]:
-    """Return the runs that did not fail by controller and gains.
-
-    Of a controller with several sets of gains, each is called by the one gain that differs, else by a letter.
-    """
+    """Return runs that did not fail by controller and gains, named by the differing gain or a letter."""
     found: dict[str, dict[Gains, list[Entry]]] = {}
     for entry in result.fine:
         found.setdefault(entry.controller, {}).setdefault(entry.gains, []).append(entry)
@@ -79,10 +76,7 @@ def _suffixes(sets: Sequence[Gains]) -> list[str]:
 
 
 def styles(result: Result) -> dict[str, CurveStyle]:
-    """Return the style of each label: the same for a group in everything that is drawn of a result.
-
-    Groups that are shown apart have a style each; what else there is of a controller has the controller's.
-    """
+    """Return the style of each label, the same in all drawings: that of its group or controller."""
     shown = shown_groups(result)
     there = {group.controller for group in shown}
     lost = dict.fromkeys(each.controller for each in result.entries if each.controller not in there)
@@ -209,10 +203,7 @@ class MapPairs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two groups on the maps that both were run on, and their ratio over maps (of one map over its seeds).
-
-    `alone` counts cases that only one of them has a result of.
-    """
+    """Two groups, their ratio over maps (of one map: over seeds), and how many cases are of one `alone`."""
 
     first: Group
     second: Group

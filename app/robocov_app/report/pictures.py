@@ -63,11 +63,7 @@ def run_picture(
     numbers: bool = False,
     hidden: bool = False,
 ) -> str:
-    """Return a picture of a whole run as an SVG element: cells, trajectories, starts, final positions.
-
-    With `numbers`, robots that are large enough carry theirs; `hidden` from screen readers is what stands in
-    something that says it all.
-    """
+    """Return a run as an SVG element; with `numbers` on robots, or `hidden` from screen readers."""
     frame = Frame(record.environment, width, height)
     n = len(record.team)
     last = record.positions[-1]

@@ -59,10 +59,7 @@ def replay_html(
 
 
 def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, budget: int = BUDGET) -> str:
-    """Return a replay without style and script, for a page that has `replay_css` and `replay_js` once.
-
-    Raises ParameterError when there are no runs.
-    """
+    """Return a replay without style and script, for a page that has `replay_css` and `replay_js` once."""
     if not runs:
         raise ParameterError("replay: no runs were given, but at least one was wanted")
     shown = list(range(len(runs)))[:MOST_PANES] if panes is None else list(panes)

@@ -38,11 +38,7 @@ class Reference(NamedTuple):
 
 
 def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
-    """Return the result with the references in the user's cache; `search` for others takes some seconds each.
-
-    There are none where obstacles move or robots fail or join: the best places are of one moment. `tell` is
-    called with the number of maps and teams that are done.
-    """
+    """Return the result with centralised references, cached or by `search`; none where things change."""
     lattice = result.facts.get("lattice")
     first = {entry.setting: entry for entry in reversed(result.fine)}
     found = {}
@@ -178,10 +174,7 @@ class Result:
         return max(self.wanted - len(self.entries) - len(self.damaged), 0)
 
     def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:
-        """Return the result with every run that cannot be read among the damaged ones.
-
-        `tell` is called with the number of runs that are read.
-        """
+        """Return the result with runs that cannot be read as damaged ones; `tell` gets how many are read."""
         kept, damaged, done = [], list(self.damaged), 0
         for entry in self.entries:
             if entry.error is None:
@@ -215,10 +208,7 @@ class Result:
         return record
 
     def history(self, entry: Entry) -> CostHistory | None:
-        """Return the cost along a run, None where there is no file of it.
-
-        Raises InputError when it cannot be read.
-        """
+        """Return the cost along a run, None without a file; raises InputError when it cannot be read."""
         if entry.folder in self.loaded:
             return self.loaded[entry.folder].history
         path = entry.folder / "cost.csv"
@@ -226,11 +216,7 @@ class Result:
 
 
 def gathered(folder: Path) -> Result:
-    """Return what is in the folder of a run, a comparison or a sweep.
-
-    Raises InputError when it is none, or something of it cannot be read, or no run is there; the message
-    names the file.
-    """
+    """Return what is in the folder of a run, comparison or sweep; raises InputError that names the file."""
     if not folder.is_dir():
         raise InputError(f"{folder}: there is no such folder; that of a run, comparison or sweep was wanted")
     if (folder / "study.json").is_file():

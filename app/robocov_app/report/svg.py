@@ -36,10 +36,7 @@ _PLOTTED = (
 
 
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:
-    """Return a figure, drawn in the colours of the light theme, as an SVG element.
-
-    Ids begin with `key`, which no other figure of the page has; `sentence` tells what it shows in words.
-    """
+    """Return a figure in light colours as SVG; ids begin with `key`, `sentence` tells what it shows."""
     import matplotlib
 
     figure.patch.set_visible(False)
