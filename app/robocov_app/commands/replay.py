@@ -20,11 +20,6 @@ if TYPE_CHECKING:
     from robocov_app.viewer.session.session import Session
 
 
-_NO_DISPLAY = (
-    "no display: the window needs one (over ssh, try ssh -X); --video --out DIR makes a film without"
-)
-
-
 @dataclass
 class Arguments(JsonOption):
     """A saved run or comparison again: in the window, or headlessly as frames and a film.
@@ -70,12 +65,12 @@ def command(options: Arguments) -> int:
     options.film.layers()
     story = options.run / "session.robocov" if (options.run / "story.json").is_file() else options.run
     if story.suffix == ".robocov":
-        return told(options, story)
+        return play_story(options, story)
     saved = load_saved(options.run)
-    return filmed(options, saved) if options.headless else watched(options, saved)
+    return make_film(options, saved) if options.headless else play_runs(options, saved)
 
 
-def told(options: Arguments, path: Path) -> int:
+def play_story(options: Arguments, path: Path) -> int:
     """Show a session of the window from its beginning."""
     from robocov_app.viewer.session.file import load_session
     from robocov_app.viewer.session.session import Session
@@ -86,10 +81,10 @@ def told(options: Arguments, path: Path) -> int:
     session.recorded_until = session.end
     session.look_at(0.0)
     session.playing = True
-    return shown(options, session, path)
+    return open_window(options, session, path)
 
 
-def watched(options: Arguments, saved: list[Saved]) -> int:
+def play_runs(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
     from robocov.controllers import controller_kind
     from robocov_app.viewer.session.replayed import replayed_session
@@ -107,40 +102,26 @@ def watched(options: Arguments, saved: list[Saved]) -> int:
     except InputError as error:
         where = str(options.run)
         raise InputError(str(error) if where in str(error) else f"{where}: {error}") from error
-    return shown(options, session)
+    return open_window(options, session)
 
 
-def shown(options: Arguments, session: Session, file: Path | None = None) -> int:
+def open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
     """Open the window with a session, and the file that it is from."""
     from robocov.mapfile import bundled_maps, load_map
-    from robocov_app.viewer.opening import NO_DISPLAY, Opening
+    from robocov_app.viewer.opening import Opening
 
-    same = (key for key in bundled_maps() if load_map(key) == session.environment)
+    laws, same = options.controller, (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
-    film = options.film
-    also, without = film.layers()
+    (also, without), theme, size = options.film.layers(), options.film.theme, window_size(options.film.size)
     opening = Opening(
-        session,
-        name,
-        Path(),
-        theme=film.theme,
-        size=window_size(film.size),
-        also=also,
-        without=without,
-        laws=options.controller,
-        file=file,
+        session, name, Path(), theme=theme, size=size, also=also, without=without, laws=laws, file=file
     )
-    try:
-        with opening.window() as window:
-            window.run()
-    except InputError as error:
-        if str(error) == NO_DISPLAY:  # what helps there does not help here
-            raise InputError(_NO_DISPLAY) from error
-        raise
+    with opening.window() as window:
+        window.run()
     return 0
 
 
-def filmed(options: Arguments, saved: list[Saved]) -> int:
+def make_film(options: Arguments, saved: list[Saved]) -> int:
     """Make frames and a film of saved runs."""
     import numpy as np
 

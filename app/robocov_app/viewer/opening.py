@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from robocov_app.viewer.window import Window
 
 NO_DISPLAY = (
-    "no display: the window needs one (over ssh, try ssh -X); "
-    "--frames N --out DIR renders it without, and robocov run needs none"
+    "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
+    "(of a saved run, with --video) renders without, and robocov run needs none"
 )
 
 HEADLESS_FPS = 30
