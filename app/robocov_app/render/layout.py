@@ -66,11 +66,13 @@ def line_crowding(count: int) -> float:
     return float(np.clip(np.sqrt(20 / max(count, 1)), 0.5, 1.0))
 
 
-def columns_for(count: int, aspect: float, size: tuple[float, float], around: float = 0.0) -> int:
+def columns_for(
+    count: int, aspect: float, size: tuple[float, float], around: float = 0.0, beside: float = 0.0
+) -> int:
     """Return the number of columns that lets `count` panels of one aspect be largest on a page.
 
-    `aspect`: width by height of each panel. `size` in (width, height). `around`, px: height that each row
-    needs above and below its panels.
+    `aspect`: width by height of each panel. `size` in (width, height). `around`, `beside`, px: height
+    that each row needs above and below its panels, width that each column needs beside them.
 
     Examples
     --------
@@ -80,7 +82,7 @@ def columns_for(count: int, aspect: float, size: tuple[float, float], around: fl
 
     def worth(columns: int) -> float:
         rows = -(-count // columns)
-        width = min(size[0] / columns, (size[1] / rows - around) * aspect)
+        width = min(size[0] / columns - beside, (size[1] / rows - around) * aspect)
         return width * count / (rows * columns)  # a gap in the last row looks like something missing
 
     return max(range(1, count + 1), key=lambda columns: (round(worth(columns), 6), columns))

@@ -90,8 +90,8 @@ def laid_out(
     chart = min(round(CHART * scale), height // 3) if plot else 0
     arena: Box = (0, 0, left, max(height - status - track - chart, 1))
     legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
-    around = 68 * scale
-    columns = columns_for(panes, aspect, (left, max(arena[3] - legend, 1)), around)
+    free = left, max(arena[3] - legend, 1)
+    columns = columns_for(panes, aspect, free, around=68 * scale, beside=31 * scale)
     rows = -(-panes // columns)
     pane_width = (left - GAP * (columns - 1)) // columns
     pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows

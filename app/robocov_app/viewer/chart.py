@@ -13,6 +13,7 @@ from robocov_app.render import sprites
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.density import density_label
+from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
@@ -20,7 +21,7 @@ from robocov_app.viewer.presenter import Desk
 from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared, curve_of
 from robocov_app.viewer.session.pane import Lane
 
-LEFT, RIGHT, RIGHT_OF_SEVERAL, TOP, BOTTOM = 52, 70, 158, 26, 20
+LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20
 """Pixels at scale 1 round the plot."""
 
 SHORTEST = 10.0  # seconds that the axis shows at least
@@ -115,11 +116,14 @@ class Chart:
     def _span(self) -> tuple[float, float, float]:
         """Left and right of the axis in pixels of the window, and the time at its end."""
         left, _, width, _ = self.layout.chart
-        scale = self.layout.scale
-        beside = RIGHT if len(self.desk.session.lanes) == 1 else RIGHT_OF_SEVERAL
+        scale, lanes, beside = self.layout.scale, self.desk.session.lanes, RIGHT * self.layout.scale
+        if len(lanes) > 1:  # their names stand there, too
+            size = round(self.theme.small_text * scale)
+            names = (text_width(f"{lane.law.label}  8.888  +88.8 %", size, True) for lane in lanes)
+            beside = min(max(names) + 20 * scale, 0.4 * width)
         ghosts = max((float(ghost.time[-1]) for ghost in self.desk.session.ghosts), default=0.0)
         end = time_axis(max(self.desk.session.end, ghosts))
-        return left + LEFT * scale, left + width - beside * scale, end
+        return left + LEFT * scale, left + width - beside, end
 
     def time_at(self, x: float) -> float:
         """Return the time at a pixel's column, s, within the run."""
@@ -255,9 +259,9 @@ class Chart:
 
         They are those of the captions, which are newer than a page that is drawn ten times a second.
         """
-        session, scale = self.desk.session, self.layout.scale
+        session, theme, scale = self.desk.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
-        canvas = flat_canvas(chart, self.theme, scale)
+        canvas = flat_canvas(chart, theme, scale)
         _, right, _ = self._span
         time, known = compared(session, self.plotted)
         if not known:
@@ -272,8 +276,11 @@ class Chart:
             words = f"{value:.3f}"
             if len(known) > 1:
                 gap = f"  +{100 * (value / best - 1):.1f} %" if value > best else "  best"
-                words = f"{lane.law.label}  {words}{gap}"
-            colour = curve_colour(self.desk, self.theme, lane)
+                room = chart.get_width() - right - 15 * scale
+                room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
+                name = shortened(lane.law.label, canvas.text_size(theme.small_text), room, True)
+                words = f"{name}  {words}{gap}"
+            colour = curve_colour(self.desk, theme, lane)
             self._note(canvas, words, (right + 9 * scale, y), colour=colour, bold=True)
 
     def _track(self, canvas: Canvas) -> None:

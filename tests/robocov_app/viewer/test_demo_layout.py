@@ -81,3 +81,9 @@ def test_every_pixel_is_in_one_box(layout: Layout, x: int, y: int) -> None:
     x, y = x % layout.size[0], y % layout.size[1]
     boxes = (layout.arena, layout.panel, layout.chart, layout.track, layout.status)
     assert sum(inside(box, (x, y)) for box in boxes) == 1
+
+
+@pytest.mark.parametrize(("size", "rows"), [((1280, 720), 1), ((900, 600), 2), ((2560, 1440), 1)])
+def test_four_panes_stand_two_by_two_where_their_maps_are_larger_so(size: tuple[int, int], rows: int) -> None:
+    layout = laid_out(size, 1.0, 4, 4 / 3, legend_rows=rows)
+    assert len({left for left, *_ in layout.panes}) == 2

@@ -12,6 +12,7 @@ from touched_run import HALL, RAPF, begun
 
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
+from robocov_app.render.fonts import text_width
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
@@ -85,6 +86,12 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
             assert any(value in each for each in words), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
+        (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
+        room = left + width - driver.window.chart._span[1] - 9 * scale
+        name = max((lane.law.label for lane in driver.session.lanes), key=len)
+        assert (
+            text_width(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True) <= room
+        )
 
 
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
