@@ -22,21 +22,21 @@ def peak() -> float:
     return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
 
 
-def main(files: list[str]) -> None:
+def main(paths: list[str]) -> None:
     from robocov.errors import RobocovError
     from robocov_app.formats import IMPORTERS, ReadOptions, detect, files
 
     importlib.import_module("pyproj")  # what imports need is the fault of no file
     importlib.import_module("ezdxf")
     for suffix in ("svg", "wkt"):
-        warm = Path(files[0]).with_name(f"warm.{suffix}")
+        warm = Path(paths[0]).with_name(f"warm.{suffix}")
         warm.write_text(
             "POLYGON((0 0,9 0,9 9,0 9,0 0))" if suffix == "wkt" else "<svg><path d='M0 0h9v9z'/></svg>"
         )
         detect(warm).read(warm, ReadOptions(scale=1.0))
     before = peak()
     answer = {}
-    for name in files:
+    for name in paths:
         path = Path(name)
         begin = time.process_time()
         try:
