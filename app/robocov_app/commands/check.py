@@ -91,15 +91,16 @@ def command(options: Arguments) -> int:
     if options.watch:
         watch(options)
         return 0
-    outcomes = [Outcome.of(name) for name in options.files]
+    outcomes = []
+    for name in options.files:
+        outcome = Outcome.of(name)
+        outcomes.append(outcome)
+        if outcome.report is not None and not options.json:
+            print(f"{name}: valid", *report_lines(outcome.report), sep="\n")
+        for line in () if outcome.report or options.json else outcome.complaints():
+            print(f"robocov: error: {line}", file=sys.stderr)
     if options.json:
         print(json.dumps({"maps": [outcome.to_dict() for outcome in outcomes]}, indent=1))
-    for outcome in () if options.json else outcomes:
-        if outcome.report is not None:
-            print(f"{outcome.name}: valid", *report_lines(outcome.report), sep="\n")
-        else:
-            for line in outcome.complaints():
-                print(f"robocov: error: {line}", file=sys.stderr)
     return 0 if all(outcome.report for outcome in outcomes) else 2
 
 
@@ -110,21 +111,21 @@ def watch(options: Arguments) -> None:
     outcomes: dict[str, Outcome] = {}
     valid: dict[str, MapReport] = {}
     for changed in changes(list(names)):
-        if output.is_terminal and not options.json:
-            output.clear()
-        fresh = [names[path] for path in changed]
-        for name in fresh:
-            outcome = outcomes[name] = Outcome.of(name)
-            if options.json:
+        former = dict(valid)
+        fresh = {names[path]: Outcome.of(names[path]) for path in changed}
+        outcomes |= fresh
+        valid |= {name: each.report for name, each in fresh.items() if each.report is not None}
+        if options.json:
+            for outcome in fresh.values():
                 print(json.dumps(outcome.to_dict()), flush=True)
-            else:
-                _show(output, f"{time.strftime('%H:%M:%S')}  {name}", outcome, valid.get(name))
-            if outcome.report is not None:
-                valid[name] = outcome.report
-        if output.is_terminal and not options.json:
-            for name, outcome in outcomes.items():
-                if name not in fresh:
-                    _show(output, name, outcome, outcome.report)
+            continue
+        if output.is_terminal:
+            output.clear()
+        for name, outcome in fresh.items():
+            _show(output, f"{time.strftime('%H:%M:%S')}  {name}", outcome, former.get(name))
+        if output.is_terminal:
+            for name in (name for name in outcomes if name not in fresh):
+                _show(output, name, outcomes[name], outcomes[name].report)
             output.print("watching; Ctrl-C ends", style="dim")
         output.file.flush()
 
