@@ -23,7 +23,7 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 TRACEBACK = "ROBOCOV_TRACEBACK"  # environment variable; where it is set, errors come with their traceback
 # commands that call kernels, see `robocov.compiled`
-_COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "bench", "replay", "cost", "optimum"}
+_COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "replay", "cost", "optimum"}
 _LONGEST = 1000  # characters of an error that are told
 
 COMMANDS = {

@@ -58,10 +58,11 @@ class Arguments(PlotOptions):
 
 def command(options: Arguments) -> None:
     """Measure, then print and draw; what was measured until Ctrl-C as well."""
-    from robocov_app.terminal.progress import progress
+    from robocov_app.terminal.progress import progress, tell_of_compiling
 
-    for name in THREADS:
+    for name in THREADS:  # read when numpy is loaded, which telling of compiling does
         os.environ.setdefault(name, "1")
+    tell_of_compiling()
     parts = list(PARTS) if options.part == "all" else [options.part]
     if options.part == "all" and importlib.util.find_spec("gymnasium") is None:
         parts.remove("learning")

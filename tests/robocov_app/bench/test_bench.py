@@ -3,6 +3,7 @@ from __future__ import annotations
 import gc
 import json
 import re
+import subprocess
 import sys
 from functools import partial
 
@@ -85,6 +86,14 @@ def test_without_a_yardstick_there_is_no_ratio_to_want():
     assert (row.ratio, row.met) == (None, None)
     assert bench.goals(row) == ""
     assert row.case == "128 x 128, 6 robots"
+
+
+def test_one_thread_is_wanted_before_there_are_any():
+    """The variables that say how many are read when numpy is loaded."""
+    script = "import sys\nfrom robocov_app.cli import main\nfrom robocov_app.commands import bench\n"
+    script += "bench.command = lambda options: print('numpy' in sys.modules)\nmain(['bench', 'start'])"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert said.stdout == "False\n"
 
 
 def small(monkeypatch):
