@@ -17,7 +17,7 @@ from robocov.mapfile import load_map
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Law, Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
@@ -39,7 +39,7 @@ def main(minutes: int, robots: int) -> None:
     layers = {layer.name for layer in standard_layers() if layer.default}
     with tempfile.TemporaryDirectory() as folder, display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
-        desk = Desk(session, Costs(16, direct=True), layers, Path(folder), "rooms")
+        desk = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
         window = Window(desk, (1280, 720), 1.0)
         warm = resident()
         for minute in range(1, minutes + 1):
@@ -55,7 +55,7 @@ def main(minutes: int, robots: int) -> None:
         print(f"grown by {resident() - warm:.1f} MB since minute {WARM}")
 
 
-def touch(desk: Desk, rng: np.random.Generator) -> None:
+def touch(desk: Presenter, rng: np.random.Generator) -> None:
     """Do something that people do, and which leaves the run as long as it is."""
     numbers = desk.session.numbers
     number = int(rng.choice(numbers))

@@ -19,7 +19,7 @@ from robocov_app.toolkit.window import display
 from robocov_app.viewer.commands import desk_commands, parameter_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.session.session import Session
@@ -62,7 +62,9 @@ def opened(
     with display(headless=True):
         session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
         usual = {layer.name for layer in standard_layers() if layer.default}
-        desk = Desk(session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name)
+        desk = Presenter(
+            session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name
+        )
         driver = Driver(Window(desk, size, scale, patient=True))
         driver.settle()
         driver.settle()  # now it knows how high the legend is
@@ -80,17 +82,17 @@ def key_event(name: str) -> dict[str, Any]:
     return {"key": KEYS.get(last) or pygame.key.key_code(last), "mod": mod, "unicode": text, "scancode": 0}
 
 
-def listed(desk: Desk) -> Commands:
-    """Return a desk's commands without a window."""
+def listed(desk: Presenter) -> Commands:
+    """Return the commands without a window."""
     titles = {layer.name: layer.title for layer in standard_layers()}
     return Commands(desk_commands(desk, titles), desk.attempt, lambda: parameter_commands(desk))
 
 
-def do(desk: Desk, name: str) -> None:
+def do(desk: Presenter, name: str) -> None:
     listed(desk).do(name)
 
 
-def typed(desk: Desk, text: str) -> None:
+def typed(desk: Presenter, text: str) -> None:
     listed(desk).typed(text)
 
 
@@ -160,7 +162,7 @@ class Driver:
     # places in the arena
 
     def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
-        return self.window.arena.to_pixel(point, pane)
+        return self.window.canvas.to_pixel(point, pane)
 
     def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
         """Return the pixel where a robot is."""

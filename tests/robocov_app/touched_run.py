@@ -8,7 +8,7 @@ import shapely
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Law, Scenario
 from robocov_app.viewer.session.session import Session
 
@@ -81,9 +81,9 @@ def with_pillar(environment=HALL, pillar=PILLAR) -> Environment:
     return replace(environment, obstacles=(*environment.obstacles, pillar))
 
 
-def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Desk:
+def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Presenter:
     """Return a desk in the hall, paused at its beginning."""
-    return Desk(begun(*laws, **changes), Costs(8, direct=True), {"cells", "robots"}, folder, "hall")
+    return Presenter(begun(*laws, **changes), Costs(8, direct=True), {"cells", "robots"}, folder, "hall")
 
 
 def positions_of(session) -> list[np.ndarray]:

@@ -15,7 +15,7 @@ from robocov_app.bench.measure import Case, Row
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Law, Limits, Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
@@ -41,7 +41,7 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
     session = Session(Scenario(load_map("rooms"), (Law("rapf"),), n, start, limits=limits))
     with display(headless=True):
         shown = {layer.name for layer in standard_layers() if layer.default}
-        desk = Desk(session, Costs(LATTICE), shown, Path(), "rooms")
+        desk = Presenter(session, Costs(LATTICE), shown, Path(), "rooms")
         window = Window(desk, SIZE, 1.0)
         try:
             with undisturbed():

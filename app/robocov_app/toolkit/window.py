@@ -43,7 +43,6 @@ class BaseWindow(ABC):
         self.windowed: tuple[int, int] | None = None  # the size before full screen
         self.closed = False
         self.rate = float(FPS)
-        self.pause = PAUSE
         self._calm = 0.0
         self._touched = False
         self._drawn: object = None
@@ -79,7 +78,7 @@ class BaseWindow(ABC):
                     before = now
                     clock.tick(FPS)
                     # SDL's own way to wait for events looks for them a thousand times a second
-                    while self.resting and perf_counter() - now < self.pause and not pygame.event.peek():
+                    while self.resting and perf_counter() - now < PAUSE and not pygame.event.peek():
                         clock.tick(FPS)
         finally:
             self.close()

@@ -24,7 +24,7 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
-from robocov_app.viewer.presenter import FADE, Desk
+from robocov_app.viewer.presenter import FADE, Presenter
 from robocov_app.viewer.session.curves import TIME, compared
 from robocov_app.viewer.session.pane import Lane
 from robocov_app.viewer.tools import Point, Preview
@@ -36,9 +36,9 @@ _REACH = 12.0  # pixels at scale 1 that a finger is wide
 
 
 class ViewerCanvas:
-    """Draws the panes of a desk, and finds what is under the cursor."""
+    """Draws the panes of a session, and finds what is under the cursor."""
 
-    def __init__(self, desk: Desk, theme: Theme) -> None:
+    def __init__(self, desk: Presenter, theme: Theme) -> None:
         self.desk = desk
         self.theme = theme
         self._painters: list[Painter] = []

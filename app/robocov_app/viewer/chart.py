@@ -17,7 +17,7 @@ from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared, curve_of
 from robocov_app.viewer.session.pane import Lane
 
@@ -64,9 +64,9 @@ def value_axis(low: float, high: float) -> tuple[float, float, float]:
 
 
 class Chart:
-    """Draws the plot and the time line of a desk; keeps what changes seldom."""
+    """Draws the plot and the time line of a session; keeps what changes seldom."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Presenter) -> None:
         self.desk = desk
         self._page: pygame.Surface | None = None
         self._place: Callable[[Array, Array], Array]
@@ -355,7 +355,7 @@ class Chart:
         tag(screen, words, at, theme, scale)
 
 
-def curve_colour(desk: Desk, theme: Theme, lane: Lane) -> Colour:
+def curve_colour(desk: Presenter, theme: Theme, lane: Lane) -> Colour:
     """Return the colour of a pane's curve: its controller's, another one where that is taken."""
     taken: list[Colour] = []
     for other in desk.session.lanes:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, speed_words
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.tools import Tool
@@ -58,7 +58,7 @@ def grouped(group: str, *rows: Row) -> list[Command]:
     ]
 
 
-def desk_commands(desk: Desk, titles: dict[str, str]) -> list[Command]:
+def desk_commands(desk: Presenter, titles: dict[str, str]) -> list[Command]:
     """Return the commands that need no window; `titles` are the layers', by their names."""
 
     def robot_numbers() -> list[str]:
@@ -183,7 +183,7 @@ def desk_commands(desk: Desk, titles: dict[str, str]) -> list[Command]:
     ]
 
 
-def parameter_commands(desk: Desk) -> Iterator[Command]:
+def parameter_commands(desk: Presenter) -> Iterator[Command]:
     """Return a command for each gain of the chosen controller and each limit of the team: ``k_rep 0.5``."""
     for each in desk.parameters():
         run = partial(desk.set_parameter, each.name)

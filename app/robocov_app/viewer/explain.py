@@ -18,7 +18,7 @@ from robocov.environment import Environment, WallObstacle
 from robocov.metrics import SETTLED_DISTANCE, TOUCHING
 from robocov.observation import Decision, Snapshot
 from robocov.robots import Team
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 
 SLOW = 0.05  # m/s; who is slower seems to be at rest
 FAR = 0.3  # m; who rests farther from its goal has not arrived
@@ -55,7 +55,7 @@ class Report:
     lines: tuple[Line, ...]
 
 
-def report_on(desk: Desk, number: int) -> Report:
+def report_on(desk: Presenter, number: int) -> Report:
     """Return what the inspector says of a robot of the chosen pane."""
     session, lane = desk.session, desk.lane
     circumstances = session.circumstances(lane)

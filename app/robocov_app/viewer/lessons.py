@@ -28,7 +28,7 @@ from robocov_app.viewer.session.workspace import Workspace
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.viewer.presenter import Desk
+    from robocov_app.viewer.presenter import Presenter
 
 FIRST = "lesson-1.robocov"
 """The lesson that comes with robocov."""
@@ -85,14 +85,19 @@ def holds(condition: ConditionModel, session: Session) -> bool:
 
 
 class LessonPlayer:
-    """Plays the chapters of a lesson on a desk, and gives it its own session back.
+    """Plays the chapters of a lesson, and then gives the session from before back.
 
     `number`: which chapter is played, from 0. `state`: ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
     `answer`: what was answered, from 1. `alone`: nobody is there to answer or to do tasks, as in a film.
     """
 
     def __init__(
-        self, desk: Desk, fit: Callable[[], None], saved: SavedSession | None = None, *, alone: bool = False
+        self,
+        desk: Presenter,
+        fit: Callable[[], None],
+        saved: SavedSession | None = None,
+        *,
+        alone: bool = False,
     ) -> None:
         saved = saved or first_lesson()
         assert saved.lesson is not None

@@ -12,7 +12,7 @@ from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings
 
@@ -131,7 +131,9 @@ class Opening:
         costs: Costs = Costs(self.lattice, direct=True) if self.headless else Costs(self.lattice)
         try:
             kept_in = None if self.headless else autosave_folder()
-            desk = Desk(self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file)
+            desk = Presenter(
+                self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file
+            )
             desk.theme = self.theme or settings.theme
             desk.fade, desk.suggests, desk.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(desk, size, scale, patient=self.headless)

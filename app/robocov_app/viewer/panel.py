@@ -19,7 +19,7 @@ from robocov_app.toolkit.overlay import flat_canvas
 from robocov_app.toolkit.ui import SMALL, Ui
 from robocov_app.viewer.explain import NOTHING, Line, Report
 from robocov_app.viewer.parameters import Parameter, Pick
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.scenario import MOST_PANES
 
@@ -44,14 +44,14 @@ _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does n
 
 
 class Panel:
-    """Shows the desk, and lets it be edited.
+    """Shows what there is, and lets it be edited.
 
     `titles`: of layers, by their names. `do`: does a command by its name. `tab`: the page that is open.
     `covered`: something else is drawn in its place. `report`: on the robot that is asked about.
     """
 
     def __init__(
-        self, desk: Desk, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
+        self, desk: Presenter, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
     ) -> None:
         self.desk, self.titles, self._commands, self._do = desk, titles, commands, do
         self.tab = TABS[0]

@@ -12,7 +12,7 @@ from robocov_app.toolkit.layout import inside
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.panel import Panel
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools import Brush
 
 _TAKES_ROBOTS = ("hand", "eraser", "failure")
@@ -22,14 +22,14 @@ _TAKES_ROBOTS = ("hand", "eraser", "failure")
 class Pointer:
     """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first.
 
-    `interrupt` is called when something is pressed on the canvas: a lesson waits.
+    `touched` is called when something is pressed on the canvas: a lesson waits.
     """
 
     def __init__(
-        self, desk: Desk, arena: ViewerCanvas, chart: Chart, panel: Panel, interrupt: Callable[[], object]
+        self, desk: Presenter, canvas: ViewerCanvas, chart: Chart, panel: Panel, touched: Callable[[], object]
     ) -> None:
-        self._desk, self._arena, self._chart, self._panel = desk, arena, chart, panel
-        self._interrupt = interrupt
+        self._desk, self._canvas, self._chart, self._panel = desk, canvas, chart, panel
+        self._interrupt = touched
         self.at = (0, 0)
         self._drag = ""
         self._held = self._button = 0
@@ -60,23 +60,23 @@ class Pointer:
             self._turned(WHEEL ** wheel_notches(event))
 
     def _turned(self, factor: float) -> None:
-        if self._arena.pane_at(self.at) is None:
+        if self._canvas.pane_at(self.at) is None:
             return
         if isinstance(self._desk.tool, Brush):
             self._desk.widen(factor)
         else:
-            self._arena.zoom(factor, self.at)
+            self._canvas.zoom(factor, self.at)
 
     def show(self) -> None:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
-        desk, arena, layout = self._desk, self._arena, self._arena.layout
-        pane = arena.pane_at(self.at) if desk.cursor is not None else None
+        desk, canvas, layout = self._desk, self._canvas, self._canvas.layout
+        pane = canvas.pane_at(self.at) if desk.cursor is not None else None
         if pane is not None:  # the cameras may have moved below it
-            desk.cursor, desk.cursor_pane = arena.to_world(self.at, pane), pane
+            desk.cursor, desk.cursor_pane = canvas.to_world(self.at, pane), pane
         number = None
         if pane is not None and desk.tool.name in _TAKES_ROBOTS:
-            number = arena.robot_at(self.at, pane)
-        arena.hovered = (-1, -1) if pane is None or number is None else (pane, number)
+            number = canvas.robot_at(self.at, pane)
+        canvas.hovered = (-1, -1) if pane is None or number is None else (pane, number)
         if inside(layout.panel, self.at):
             self._shape = -1  # the panel has set its own
             return
@@ -98,10 +98,10 @@ class Pointer:
         self._chart.hover = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
-        desk, layout = self._desk, self._arena.layout
+        desk, layout = self._desk, self._canvas.layout
         if self._drag:  # a second button while the first is held
             return
-        pane = self._arena.pane_at(event.pos)
+        pane = self._canvas.pane_at(event.pos)
         self._pressed_at, self._button = event.pos, event.button
         if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
             if event.button == 1:
@@ -126,8 +126,8 @@ class Pointer:
         if double and desk.tool.name in ("polygon", "wall"):
             desk.attempt(lambda: desk.tool.finish(desk.session))
             return
-        point = self._arena.to_world(event.pos, pane)
-        number, reach = self._arena.robot_at(event.pos, pane), self._arena.reach(pane)
+        point = self._canvas.to_world(event.pos, pane)
+        number, reach = self._canvas.robot_at(event.pos, pane), self._canvas.reach(pane)
         desk.attempt(lambda: desk.tool.press(desk.session, point, reach, number))
         if desk.tool is desk.hand and number is not None:
             self._panel.show_tab("robot")
@@ -148,16 +148,16 @@ class Pointer:
 
     def _moved(self, event: pygame.event.Event) -> None:
         desk = self._desk
-        pane, desk.cursor = self._arena.pane_at(event.pos), None
-        if pane is not None and not inside(self._arena.layout.panel, event.pos):
-            desk.cursor, desk.cursor_pane = self._arena.to_world(event.pos, pane), pane
+        pane, desk.cursor = self._canvas.pane_at(event.pos), None
+        if pane is not None and not inside(self._canvas.layout.panel, event.pos):
+            desk.cursor, desk.cursor_pane = self._canvas.to_world(event.pos, pane), pane
         self._chart.hover = event.pos if not self._drag else None
         if self._drag == "time":
             desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
         elif self._drag == "pan":
-            self._arena.pan(*event.rel)
+            self._canvas.pan(*event.rel)
         elif self._drag == "tool":
-            point = self._arena.to_world(event.pos, self._pane())
+            point = self._canvas.to_world(event.pos, self._pane())
             desk.attempt(lambda: desk.tool.move(desk.session, point))
         elif desk.cursor is not None:
             desk.tool.move(desk.session, desk.cursor)
@@ -169,7 +169,7 @@ class Pointer:
         self._drag = ""
         clicked = _far(event.pos, self._pressed_at) < SLIP
         if drag == "tool":
-            point = self._arena.to_world(event.pos, self._pane())
+            point = self._canvas.to_world(event.pos, self._pane())
             desk.attempt(lambda: desk.tool.release(desk.session, point))
         elif drag == "pan" and clicked and event.button == 3:
             desk.attempt(lambda: desk.tool.finish(desk.session))
@@ -178,7 +178,7 @@ class Pointer:
             desk.version += 1
 
     def _pane(self) -> int:
-        return min(self._held, len(self._arena.layout.panes) - 1)
+        return min(self._held, len(self._canvas.layout.panes) - 1)
 
 
 def _far(a: tuple[int, int], b: tuple[int, int]) -> float:

@@ -29,7 +29,7 @@ _RECENT = 9  # sessions that are offered again
 FADE = 12.0  # seconds of path that trajectories show where they fade
 
 
-class Desk:
+class Presenter:
     """What the user does, in terms of the session, and what of it is shown.
 
     `shown`: names of layers. `folder`: where things are saved. `map_name`: a bundled name or a path. `laws`:

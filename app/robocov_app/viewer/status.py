@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import speed_words
 
 HINT = "Space pause · F1 keys"
@@ -22,7 +22,7 @@ _OFFERED = (
 _AT_ONCE = 3
 
 
-def facts(desk: Desk, frames: float, steps: float, filmed: float | None) -> list[str]:
+def facts(desk: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
     """Return what the line says, the most important first; `frames` and `steps` a second, `filmed` s."""
     session = desk.session
     known = desk.costs.known.get(desk.lane.number)
@@ -42,7 +42,7 @@ def facts(desk: Desk, frames: float, steps: float, filmed: float | None) -> list
     return [each for each in said if each]
 
 
-def cursor_words(desk: Desk) -> str:
+def cursor_words(desk: Presenter) -> str:
     """Return where the cursor is, and what the place adds to the cost."""
     if desk.cursor is None:
         return ""
@@ -66,7 +66,7 @@ def cursor_words(desk: Desk) -> str:
     return f"{words}: {distance:.2f} m to robot {numbers[owner]}, {share:.1f} × the mean"
 
 
-def suggestion(desk: Desk) -> str:
+def suggestion(desk: Presenter) -> str:
     """Return what this session has not tried yet, if the present is shown and has settled; else nothing."""
     session = desk.session
     if not (desk.suggests and session.settled and session.live) or session.hand is not None:

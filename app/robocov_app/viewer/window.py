@@ -1,4 +1,4 @@
-"""The window: events in, frames out. What happens between is the desk's and the session's."""
+"""The window: events in, frames out. What happens between is the presenter's and the session's."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
-from robocov_app.toolkit.window import FPS, PAUSE, BaseWindow
+from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
 from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, grouped, parameter_commands
@@ -30,13 +30,12 @@ from robocov_app.viewer.lessons import LessonPlayer, load_lesson
 from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
-from robocov_app.viewer.presenter import Desk, plain
+from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, facts, suggestion
 
-PAUSE_AT_REST = 0.1  # seconds between two frames while time goes on, but nothing moves any more
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
 
@@ -50,7 +49,7 @@ _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan ·
 
 
 class Window(BaseWindow):
-    """Shows a desk and lets it be touched.
+    """Shows a session and lets it be touched.
 
     `scale`: of text and lines. `patient`: nobody watches: films wait for their encoder instead of leaving
     frames out. `screen`: of a window that is there already.
@@ -60,7 +59,7 @@ class Window(BaseWindow):
 
     def __init__(
         self,
-        desk: Desk,
+        desk: Presenter,
         size: tuple[int, int],
         scale: float,
         *,
@@ -75,13 +74,13 @@ class Window(BaseWindow):
         self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
-        self.arena = ViewerCanvas(desk, theme_named(desk.theme))
+        self.canvas = ViewerCanvas(desk, theme_named(desk.theme))
         self.chart = Chart(desk)
         self.dialogs = Dialogs()
         listed = [*desk_commands(desk, self.titles), *self._own_commands()]
         self.commands = Commands(listed, desk.attempt, lambda: parameter_commands(desk))
         self.panel = Panel(desk, self.titles, self.commands, self.do)
-        self.pointer = Pointer(desk, self.arena, self.chart, self.panel, self._leave_lesson)
+        self.pointer = Pointer(desk, self.canvas, self.chart, self.panel, self._leave_lesson)
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._reported: tuple[object, float] = None, 0.0
@@ -114,7 +113,6 @@ class Window(BaseWindow):
         """Return all that changes the picture without an event; None while something moves."""
         desk, session, tour = self.desk, self.desk.session, self.tour
         at_rest = session.settled and session.live and not session.environment.moves
-        self.pause = PAUSE_AT_REST if session.playing else PAUSE
         if (session.playing and not at_rest) or self.film is not None:
             return None
         return (
@@ -177,7 +175,7 @@ class Window(BaseWindow):
         desk, session = self.desk, self.desk.session
         size = self.screen.get_size()
         panes = len(session.lanes)
-        rows = self.arena.shared_rows() if panes > 1 and self._arranged else 1
+        rows = self.canvas.shared_rows() if panes > 1 and self._arranged else 1
         low_x, low_y, high_x, high_y = session.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
         outer = (size, self.scale, desk.panel, desk.theme)
@@ -188,7 +186,7 @@ class Window(BaseWindow):
         theme = theme_named(desk.theme)
         layout = laid_out(size, self.scale, panes, aspect, panel=desk.panel, legend_rows=max(rows, 1))
         self.layout, self.theme = layout, theme
-        self.arena.arrange(layout, theme)
+        self.canvas.arrange(layout, theme)
         self.chart.arrange(layout, theme)
         if before is None or outer != before[0]:
             self.panel.arrange(layout, theme)
@@ -198,7 +196,7 @@ class Window(BaseWindow):
         layout, theme, desk = self.layout, self.theme, self.desk
         if len(layout.panes) > 1:
             self.screen.fill(theme.background, pygame.Rect(layout.arena))
-        self.arena.draw(self.screen)
+        self.canvas.draw(self.screen)
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(desk, self.rate, self._steps_rate, filmed)
@@ -256,15 +254,15 @@ class Window(BaseWindow):
 
     def _own_commands(self) -> list[Command]:
         def panned(x: int, y: int) -> Callable[[], None]:
-            return lambda: self.arena.pan(_PAN * x, _PAN * y)
+            return lambda: self.canvas.pan(_PAN * x, _PAN * y)
 
         def zoomed(factor: float) -> Callable[[], None]:
-            return lambda: self.arena.zoom(factor, self._middle())
+            return lambda: self.canvas.zoom(factor, self._middle())
 
         return [
             *grouped(
                 "View",
-                Row("fit", "Show the whole map", self.arena.fit, "f"),
+                Row("fit", "Show the whole map", self.canvas.fit, "f"),
                 Row("zoom:in", "Zoom in", zoomed(1.25), "ctrl+=, ctrl++", REPEATS),
                 Row("zoom:out", "Zoom out", zoomed(0.8), "ctrl+-", REPEATS),
                 Row("pan:left", "Pan left", panned(1, 0), "ctrl+left", REPEATS),
@@ -301,7 +299,7 @@ class Window(BaseWindow):
         return True
 
     def _middle(self) -> tuple[float, float]:
-        if self.arena.pane_at(self.pointer.at) is not None:
+        if self.canvas.pane_at(self.pointer.at) is not None:
             return self.pointer.at
         left, top, width, height = self.layout.panes[0]
         return left + width / 2, top + height / 2
@@ -355,7 +353,7 @@ class Window(BaseWindow):
 
     def _start_tour(self) -> None:
         if self.tour is None:
-            self.tour = LessonPlayer(self.desk, self.arena.fit, alone=self._patient)
+            self.tour = LessonPlayer(self.desk, self.canvas.fit, alone=self._patient)
         elif self.tour.state == "left":
             self.tour.come_back()
         else:
@@ -363,7 +361,7 @@ class Window(BaseWindow):
 
     def start_lesson(self, path: Path) -> None:
         """Play a lesson of a file; MapError as `load_lesson`."""
-        self.tour = LessonPlayer(self.desk, self.arena.fit, load_lesson(path), alone=self._patient)
+        self.tour = LessonPlayer(self.desk, self.canvas.fit, load_lesson(path), alone=self._patient)
 
     @property
     def _lesson_shown(self) -> bool:

@@ -82,8 +82,8 @@ def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> N
         hands.desk.change(properties.noted(hands.sketch, Selection.of(0), "old oak"))
         trial = tried(hands)
         hands.key("c")
-        x, y = trial.arena.to_pixel((3.0, 3.0))
-        to_x, _ = trial.arena.to_pixel((3.5, 3.0))
+        x, y = trial.canvas.to_pixel((3.0, 3.0))
+        to_x, _ = trial.canvas.to_pixel((3.5, 3.0))
         hands.drag((x, y), (x + 3, y), (to_x, y))
         hands.key("f5")
         assert len(hands.shapes) == 2 and hands.sketch.obstacles[0].note == "old oak"

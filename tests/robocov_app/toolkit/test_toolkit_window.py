@@ -10,7 +10,6 @@ from driven_window import opened
 from PIL import Image
 
 from robocov_app.toolkit.window import CALM, BaseWindow, display
-from robocov_app.viewer.window import PAUSE_AT_REST
 
 
 class Counting(BaseWindow):
@@ -106,7 +105,7 @@ def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: P
         driver.frames(5)
         assert len(drawn) == 6 and not window.resting
         driver.session.settled = True  # time goes on, and nothing moves
-        assert window.look() is not None and window.pause == PAUSE_AT_REST
+        assert window.look() is not None
         window._calm, before = CALM, driver.session.time
         window.advance(0.5)
         assert driver.session.time == pytest.approx(before + 0.5, abs=0.05)

@@ -122,7 +122,7 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
 def state_of(driver: Driver) -> list[object]:
     """Return whatever an action might change."""
     desk, session, its = driver.desk, driver.session, driver.window
-    camera = its.arena._painters[0].camera
+    camera = its.canvas._painters[0].camera
     told: list[object] = [desk.shown.copy(), desk.theme, desk.fade, desk.panel, desk.tool, desk.active]
     told += [desk.hand.selected, desk.message, desk.map_name, session.playing, session.time, session.end]
     told += [session.serial, session.clock.speed, session.stop_when_settled, session.environment]
@@ -191,9 +191,9 @@ def prepared(driver: Driver) -> Driver:
     desk.tool.move(session, (6.5, 7.5))
     session.step()
     session.look_at(0.7)
-    its.arena.fit()
-    its.arena.zoom(1.4, (200, 200))
-    its.arena.pan(20, 20)
+    its.canvas.fit()
+    its.canvas.zoom(1.4, (200, 200))
+    its.canvas.pan(20, 20)
     desk.message = ""
     return driver
 

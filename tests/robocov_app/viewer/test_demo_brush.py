@@ -187,10 +187,10 @@ def test_in_the_window(tmp_path):
         assert load_map(driver.desk.map_name) == driver.session.environment
         driver.key("ctrl+z", 2)
         assert driver.session.environment.density is None
-        assert "φ" not in driver.window.arena._scenes[0].cost
+        assert "φ" not in driver.window.canvas._scenes[0].cost
         driver.key("ctrl+y")
         driver.frames(3)
-        assert "mean distance by φ" in driver.window.arena._scenes[0].cost
+        assert "mean distance by φ" in driver.window.canvas._scenes[0].cost
 
 
 def test_a_density_alone_needs_no_preparation_of_the_map():

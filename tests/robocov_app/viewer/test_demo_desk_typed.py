@@ -14,7 +14,7 @@ from touched_run import RAPF, RPF, all_told, begun, desk_of
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov_app.terminal.output import free_name
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.presenter import SAID_FOR, Desk, plain
+from robocov_app.viewer.presenter import SAID_FOR, Presenter, plain
 from robocov_app.viewer.session.scenario import MOST_ROBOTS
 
 # what is shown
@@ -207,7 +207,7 @@ def test_a_slip_of_the_finger_is_answered_with_what_was_meant() -> None:
 
 @given(st.text(max_size=12))
 def test_no_text_is_too_odd(text: str) -> None:
-    desk = Desk(begun(robots=1), Costs(2, direct=True), set(), Path(), "hall")
+    desk = Presenter(begun(robots=1), Costs(2, direct=True), set(), Path(), "hall")
     try:
         typed(desk, text)
     except RobocovError as error:

@@ -166,7 +166,7 @@ class Monkey:
             return rng.randint(box.left, box.right), rng.randint(box.top, box.bottom)
         layout = window.layout
         boxes = [*layout.panes, layout.track, layout.chart, layout.panel, layout.panel]
-        if what > 0.7 and window._arranged and window.arena._scenes:
+        if what > 0.7 and window._arranged and window.canvas._scenes:
             session = self.driver.session
             lane = rng.randrange(min(len(session.lanes), len(layout.panes)))
             x, y = rng.choice(session.positions(session.lanes[lane]).tolist())

@@ -9,35 +9,35 @@ import pytest
 
 from robocov.mapfile import load_map
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.status import cursor_words, facts
 
 
 @pytest.fixture
-def desk() -> Desk:
+def desk() -> Presenter:
     session = Session(Scenario(load_map("rooms")))
-    desk = Desk(session, Costs(32, direct=True), set(), Path(), "rooms")
+    desk = Presenter(session, Costs(32, direct=True), set(), Path(), "rooms")
     desk.costs.ask(0, 0.0, session.lanes[0].simulation.positions)
     desk.costs.poll()
     return desk
 
 
-def test_it_tells_time_cost_and_speed(desk: Desk) -> None:
+def test_it_tells_time_cost_and_speed(desk: Presenter) -> None:
     said = facts(desk, 60.0, 60.0, None)
     assert said[0] == "t = 0.00 s"
     assert said[1].startswith("J = ") and said[1].endswith(" m³")
     assert said[-3:] == ["1×", "60 steps/s", "60 fps"]
 
 
-def test_an_old_cost_tells_its_time(desk: Desk) -> None:
+def test_an_old_cost_tells_its_time(desk: Presenter) -> None:
     for _ in range(60):
         desk.session.step()
     assert facts(desk, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
 
 
-def test_it_tells_of_pausing_filming_and_being_behind(desk: Desk) -> None:
+def test_it_tells_of_pausing_filming_and_being_behind(desk: Presenter) -> None:
     desk.session.playing = False
     said = facts(desk, 60.0, 0.0, 12.4)
     assert said[0].startswith("paused · ")
@@ -47,7 +47,7 @@ def test_it_tells_of_pausing_filming_and_being_behind(desk: Desk) -> None:
     assert "1×, really 0.5×" in facts(desk, 60.0, 30.0, None)
 
 
-def test_the_cursor_tells_distance_robot_and_share(desk: Desk) -> None:
+def test_the_cursor_tells_distance_robot_and_share(desk: Presenter) -> None:
     place = desk.session.lanes[0].simulation.positions[3] + np.array([0.1, 0.05])
     desk.cursor = float(place[0]), float(place[1])
     words = cursor_words(desk)
@@ -55,7 +55,7 @@ def test_the_cursor_tells_distance_robot_and_share(desk: Desk) -> None:
     assert "robot 4" in words and words.endswith("× the mean")
 
 
-def test_the_cursor_in_a_wall_or_outside_says_so(desk: Desk) -> None:
+def test_the_cursor_in_a_wall_or_outside_says_so(desk: Presenter) -> None:
     desk.cursor = 1.0, 8.5  # in the block of the upper left corner
     assert cursor_words(desk).endswith(": not free")
     desk.cursor = -3.0, -3.0
@@ -69,7 +69,7 @@ def test_a_closed_room_is_told() -> None:
 
     closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))
     session = Session(Scenario(closed, robots=1, given=np.array([[1.0, 1.0]])))
-    desk = Desk(session, Costs(32, direct=True), set(), Path(), "two")
+    desk = Presenter(session, Costs(32, direct=True), set(), Path(), "two")
     desk.costs.ask(0, 0.0, session.lanes[0].simulation.positions)
     desk.costs.poll()
     desk.cursor = 3.0, 1.0

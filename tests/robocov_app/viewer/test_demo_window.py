@@ -251,9 +251,9 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
     bar = driver.widget("bar", "parameters:rapf").rect
     driver.drag(bar.center, (bar.centerx, bar.centery - 200))
     assert driver.widget("entry", "team.radius").rect.height == 0
-    camera = driver.window.arena._painters[0].camera
+    camera = driver.window.canvas._painters[0].camera
     driver.wheel(740, 500, -3)
-    assert driver.window.arena._painters[0].camera == camera
+    assert driver.window.canvas._painters[0].camera == camera
 
 
 # tour

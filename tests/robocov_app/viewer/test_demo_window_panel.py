@@ -72,11 +72,11 @@ def test_a_start_that_an_obstacle_covers_stays_in_the_menu_until_another_is_chos
 def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(driver: Driver) -> None:
     driver.click(*driver.widget("menu", "map").rect.center)
     assert driver.window.panel.unfolded
-    camera = driver.window.arena._painters[0].camera
+    camera = driver.window.canvas._painters[0].camera
     driver.click_at(MIDDLE)
     driver.settle()
     assert not driver.window.panel.unfolded
-    assert driver.window.arena._painters[0].camera == camera and driver.desk.map_name == "hall"
+    assert driver.window.canvas._painters[0].camera == camera and driver.desk.map_name == "hall"
 
 
 def test_escape_closes_a_menu_and_nothing_else(driver: Driver) -> None:

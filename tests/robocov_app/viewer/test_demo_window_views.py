@@ -86,16 +86,16 @@ def test_home_end_and_arrows_go_through_time(driver: Driver) -> None:
 
 
 def world(driver: Driver, pane: int = 0) -> np.ndarray:
-    return np.array(driver.window.arena.to_world(driver.at, pane))
+    return np.array(driver.window.canvas.to_world(driver.at, pane))
 
 
 @pytest.mark.parametrize("amount", [3, -1])
 def test_zooming_keeps_the_place_under_the_cursor(amount: int, driver: Driver) -> None:
     driver.wheel(200, 150, 2)
-    before, zoom = world(driver), driver.window.arena._painters[0].camera.zoom
+    before, zoom = world(driver), driver.window.canvas._painters[0].camera.zoom
     driver.wheel(200, 150, amount)
     assert np.allclose(world(driver), before, atol=1e-9)
-    assert (driver.window.arena._painters[0].camera.zoom > zoom) == (amount > 0)
+    assert (driver.window.canvas._painters[0].camera.zoom > zoom) == (amount > 0)
 
 
 @pytest.mark.parametrize("button", [2, 3])
@@ -108,19 +108,19 @@ def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Drive
 
 
 def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:
-    camera = driver.window.arena._painters[0].camera
+    camera = driver.window.canvas._painters[0].camera
     for key in ("ctrl+=", "ctrl+=", "ctrl+left", "ctrl+up", "ctrl+-", "ctrl+right", "ctrl+down"):
-        before = driver.window.arena._painters[0].camera
+        before = driver.window.canvas._painters[0].camera
         driver.key(key)
-        assert driver.window.arena._painters[0].camera != before, key
+        assert driver.window.canvas._painters[0].camera != before, key
     driver.key("f")
-    assert driver.window.arena._painters[0].camera == camera
+    assert driver.window.canvas._painters[0].camera == camera
 
 
 def test_one_camera_for_all_panes(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
         x, y = driver.pixel(MIDDLE, 1)
         driver.wheel(x, y, 3)
-        first, second = driver.window.arena._painters
+        first, second = driver.window.canvas._painters
         assert first.camera.zoom == second.camera.zoom and first.camera.center == second.camera.center
-        assert np.allclose(driver.window.arena.to_world(driver.at, 1), MIDDLE, atol=0.02)
+        assert np.allclose(driver.window.canvas.to_world(driver.at, 1), MIDDLE, atol=0.02)

@@ -71,7 +71,7 @@ def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path:
         driver.desk.open_map("square")
         driver.frames(2)
         assert driver.desk.cursor != before  # the same pixel is another place there
-        assert driver.desk.cursor == driver.window.arena.to_world(driver.at, 1)
+        assert driver.desk.cursor == driver.window.canvas.to_world(driver.at, 1)
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])

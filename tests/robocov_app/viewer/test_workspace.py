@@ -9,7 +9,7 @@ from driven_window import opened
 from touched_run import begun, desk_of, positions_of, stepped
 
 from robocov.errors import MapError
-from robocov_app.viewer.presenter import Desk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.workspace import Workspace, recoverable, recovered
 
 
@@ -85,7 +85,7 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
 
 
 def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
-    desk: Desk = desk_of(folder=tmp_path)
+    desk: Presenter = desk_of(folder=tmp_path)
     (tmp_path / "no.robocov").write_text("{}")
     before = desk.session
     with pytest.raises(MapError, match="format: missing"):

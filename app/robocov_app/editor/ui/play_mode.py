@@ -14,7 +14,7 @@ from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import LATTICE, Costs
-from robocov_app.viewer.presenter import Desk as DemoDesk
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Limits, Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 BACK = ("f5",)
 
 
-class PlayPresenter(DemoDesk):
+class PlayPresenter(Presenter):
     """The demo's desk, which knows whether the map is still the one that is tried.
 
     `elsewhere`: another map was opened meanwhile.
