@@ -63,7 +63,7 @@ def test_one_line_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None
 
 def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "x"
-    words = "run forklifts --robots 2 --duration 1 --lattice 16 --frames --fps 2 --size 320x240"
+    words = "run forklifts --robots 2 --duration 0.4 --lattice 12 --frames --fps 3 --size 320x240"
     said = answer(capsys, *words.split(), "--film-speed", "1", "--show", "distances", "--out", str(out))
     assert said["mean_distance_m"] > 0.0
     assert len(list((out / "frames").iterdir())) > 2
