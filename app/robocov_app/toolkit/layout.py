@@ -10,12 +10,7 @@ from robocov_app.render.layout import columns_for
 Box: TypeAlias = tuple[int, int, int, int]
 """Left, top, width and height in pixels."""
 
-PANEL = 320
-CHART = 150
-TRACK = 26
-STATUS = 26
-GAP = 2
-LEGEND_ROW = 22
+PANEL, CHART, TRACK, STATUS, GAP, LEGEND_ROW = 320, 150, 26, 26, 2, 22
 SMALLEST = (900, 600)
 """Width and height at scale 1 that everything has room in."""
 
@@ -23,18 +18,8 @@ SMALLEST = (900, 600)
 class Layout(NamedTuple):
     """Boxes of a window of some size.
 
-    Attributes
-    ----------
-    size : (width, height)
-    scale : float
-        As it was asked for, or what of it the window has room for.
-    arena, chart, track, status : Box
-    panel : Box
-        Of no width while it is hidden.
-    panes : tuple of Box
-        In the arena.
-    legend : Box
-        Above several panes, which share it; of no height above a single one.
+    `scale`: as it was asked for, or what of it the window has room for. `panel`: of no width while it is
+    hidden. `legend`: above several panes, which share it; of no height above a single one.
     """
 
     size: tuple[int, int]
@@ -58,22 +43,9 @@ def laid_out(
     legend_rows: int = 1,
     plot: bool = True,
 ) -> Layout:
-    """Lay a window out.
+    """Lay a window out, for panes of a map whose width by height is `aspect`, at a scale of text and lines.
 
-    Parameters
-    ----------
-    size : (width, height), px
-    scale : float
-        Of text and lines.
-    panes : int
-    aspect : float
-        Width by height of the map.
-    panel : bool
-        Whether the panel is shown.
-    legend_rows : int
-        Of the legend that several panes share.
-    plot : bool
-        Whether there are a plot and a time line.
+    `panel`, `plot`: whether they are shown. `legend_rows`: of the legend that several panes share.
 
     Examples
     --------

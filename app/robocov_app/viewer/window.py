@@ -26,8 +26,8 @@ from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, gro
 from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
+from robocov_app.viewer.lesson_page import draw_caption, draw_tour
 from robocov_app.viewer.lessons import LessonPlayer, load_lesson
-from robocov_app.viewer.overlays import draw_caption, draw_tour
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import Presenter, plain
