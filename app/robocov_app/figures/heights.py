@@ -1,4 +1,4 @@
-"""Where a sensor over a cell is best placed, by its height: equation (14), and what is said after it."""
+"""The best place for a sensor over a cell, by its height: the optimum of equation (14)."""
 
 from __future__ import annotations
 

@@ -6,18 +6,15 @@ are given, whole clusters are drawn (Field and Welsh, 2007); intervals are perce
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robocov.arrays import Array, IntArray
 from robocov.errors import ParameterError, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
 
 Statistic: TypeAlias = Literal["median", "mean"]
 

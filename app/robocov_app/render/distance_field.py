@@ -113,9 +113,9 @@ class Field:
         number[squares] = np.arange(len(site))
         corner = self.lattice.around[squares]
         points = self.result.points[corner]
-        said = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
+        length = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
         known = self.result.distances[corner][..., None]
-        return _Rivals(number, site, said >= known - 1e-9 * self.lattice.spacing)
+        return _Rivals(number, site, length >= known - 1e-9 * self.lattice.spacing)
 
     @property
     def largest(self) -> float:

@@ -140,7 +140,7 @@ class Painter:
         self._camera: Camera | None = None
         self._follows = True
         self._hues = robot_hues(0)
-        self._pages: dict[tuple[str, ...], tuple[object, pygame.Surface, Environment]] = {}
+        self._static: tuple[object, Environment, pygame.Surface] | None = None
         self._own: pygame.Surface | None = None
         self._room: tuple[object, int, float] = (None, 0, 0.0)
 
@@ -257,19 +257,16 @@ class Painter:
 
     def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer]) -> pygame.Surface:
         """Return the page of neighbouring static layers, drawn anew only when something changed."""
-        names = tuple(layer.name for layer in layers)
         # distances, in colours too, hide the density
         coloured = scene.field is not None and "distances" in canvas.shown
-        key = (canvas.camera, self.theme.name, self.scale, self.size, id(scene.environment), coloured)
-        kept = self._pages.get(names)
-        # the map is kept as well: another one may be given its place in the memory
-        if kept is None or kept[0] != key or kept[2] is not scene.environment:
+        names = [layer.name for layer in layers]
+        key = names, canvas.camera, self.theme.name, self.scale, self.size, coloured
+        if self._static is None or self._static[0] != key or self._static[1] is not scene.environment:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(self._clip())
             own = replace(canvas, surface=page)
             for layer in layers:
                 if layer.has(scene):
                     layer.draw(own, scene)
-            self._pages = {names: (key, page, scene.environment)}
-            return page
-        return kept[1]
+            self._static = key, scene.environment, page
+        return self._static[2]

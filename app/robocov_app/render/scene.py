@@ -196,8 +196,8 @@ class Scene:
 def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
     """Return the scene of the moment number `row` of a record, with the trail up to there.
 
-    Robots that have failed are marked as such, those that have not joined yet are left out. `cost`: what is
-    said of the cost. `fields`: what is known of the distances to the nearest robot, where they are shown.
+    Robots that have failed are marked as such, those that have not joined yet are left out; `fields` give
+    the distances to the nearest robot, where they are shown.
     """
     environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team

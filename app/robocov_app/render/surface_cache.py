@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, ParamSpec
+from typing import ParamSpec
 
 import pygame
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Arguments = ParamSpec("Arguments")
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robocov.arrays import IntArray
 from robocov.errors import ParameterError, unknown_name
-
-if TYPE_CHECKING:
-    from robocov.arrays import IntArray
 
 Colour: TypeAlias = tuple[int, int, int]  # red, green, blue, 0 to 255
 ONE_HUE_EACH = 9  # up to so many robots each have a hue of their own; no eye tells more hues apart

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from PIL import Image
 
 from robocov.arrays import Array
 from robocov.environment import Environment, Obstacle
@@ -27,8 +28,6 @@ _DOTS = 80  # dots along the longer side of a map
 
 def density_picture(environment: Environment) -> str:
     """Return a ``data:image/png`` of the density over the region's box, clear outside; empty without one."""
-    from PIL import Image
-
     if environment.density is None or environment.density.uniform:
         return ""
     picture = shading(environment, _DOTS, LIGHT)

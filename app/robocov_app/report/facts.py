@@ -99,7 +99,7 @@ def weighed_text(result: Result) -> str:
 
 
 def gaps(result: Result) -> list[str]:
-    """Return sentences on runs that failed, cannot be read, or are missing: the first that is told."""
+    """Return sentences on runs that failed, cannot be read, or are missing."""
     words = []
     if result.failed:
         total = Counter(entry.label for entry in result.entries)

@@ -5,26 +5,22 @@ Colours are CSS variables (`robocov_app.report.theme_css`): one picture suits li
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
 
+from robocov.arrays import Array
+from robocov.environment import Environment
+from robocov.metrics import CostHistory
+from robocov.record import Record
 from robocov_app.render.density import density_label
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import MovingObstacle, moving_obstacles
 from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
 from robocov_app.report.embedding import density_picture, has_path, lives
 from robocov_app.runs.saved import roster_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from robocov.arrays import Array
-    from robocov.environment import Environment
-    from robocov.metrics import CostHistory
-    from robocov.record import Record
 
 _MARGIN = 3.0  # pixels round the region
 _FINE = 0.2  # pixels by which a line may be simplified
@@ -122,7 +118,7 @@ def changes_sentence(record: Record) -> str:
             words.append((begin, f"robot {number} joins at {begin:.1f} s"))
         if failed is not None:
             words.append((failed, f"robot {number} fails at {failed:.1f} s"))
-    text = ", ".join(said for _, said in sorted(words))
+    text = ", ".join(change for _, change in sorted(words))
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
 from robocov.errors import ParameterError
 from robocov_app.figures.styles import styles_of
 from robocov_app.report.embedding import BUDGET, ReplayRun, embedded, script_json
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.theme_css import theme_rules
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-__all__ = [
-    "MOST_PANES",
-    "ReplayRun",
-    "asset",
-    "replay_css",
-    "replay_html",
-    "replay_js",
-    "replay_part",
-    "script",
-]
 
 MOST_PANES = 4  # runs side by side
 

@@ -240,7 +240,7 @@ def printable(text: str) -> str:
 
 
 def _damaged(folder: Path, error: InputError) -> Damaged:
-    """Return what is said of a damaged run, without the way to its folder."""
+    """Return a damaged run with the reason, without the path of its folder."""
     reason = str(error).removeprefix(f"{folder}: ").replace(f"{folder}/", "")
     return Damaged(printable(folder.name), printable(reason))
 
@@ -354,17 +354,12 @@ def _of_sweep(folder: Path) -> Result:
     if teams:
         facts["team"] = {name: value for name, value in teams[0].items() if name not in swept}
     facts["versions"] = _versions(entries)
-    told: dict[str, tuple[str, str]] = {}
+    documented: dict[str, tuple[str, str]] = {}
     for column in results.dataset.schema:
         about = column.metadata or {}
-        told[column.name] = (about.get(b"unit", b"").decode(), about.get(b"meaning", b"").decode())
-    known = {
-        name: told[gain_column(name)]
-        for names in gains.values()
-        for name in names
-        if gain_column(name) in told
-    }
-    units, meanings = _known_gains(entries, known)
+        documented[column.name] = (about.get(b"unit", b"").decode(), about.get(b"meaning", b"").decode())
+    names = [name for own in gains.values() for name in own if gain_column(name) in documented]
+    units, meanings = _known_gains(entries, {name: documented[gain_column(name)] for name in names})
     return Result(
         kind="sweep",
         folder=folder,
@@ -385,10 +380,7 @@ def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
         if entry.controller not in labels:
             number = 1 + sum(label.partition(" #")[0] == entry.label for label in labels.values())
             labels[entry.controller] = entry.label if number == 1 else f"{entry.label} #{number}"
-    return tuple(
-        entry if entry.label == labels[entry.controller] else replace(entry, label=labels[entry.controller])
-        for entry in entries
-    )
+    return tuple(replace(entry, label=labels[entry.controller]) for entry in entries)
 
 
 def _label(controller: str) -> str:
@@ -397,15 +389,14 @@ def _label(controller: str) -> str:
 
 
 def _gains(gains: Mapping[str, Value]) -> tuple[tuple[str, Value], ...]:
-    return tuple((printable(str(name)), _printable(value)) for name, value in gains.items())
-
-
-def _printable(value: Value) -> Value:
-    return printable(value) if isinstance(value, str) else value
+    return tuple(
+        (printable(str(name)), printable(value) if isinstance(value, str) else value)
+        for name, value in gains.items()
+    )
 
 
 def _known_gains(
-    entries: list[Entry], told: Mapping[str, tuple[str, str]]
+    entries: list[Entry], documented: Mapping[str, tuple[str, str]]
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
     units: dict[str, str] = {}
@@ -414,7 +405,7 @@ def _known_gains(
         if controller in CONTROLLERS:
             for name, gain in gains_of(CONTROLLERS[controller]).items():
                 units[name], meanings[name] = gain.unit, gain.meaning
-    for name, (unit, meaning) in told.items():
+    for name, (unit, meaning) in documented.items():
         if unit or meaning:
             units.setdefault(name, "" if unit == "1" else printable(unit))
             meanings.setdefault(name, printable(meaning))

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
+
+import matplotlib
+from matplotlib.figure import Figure
 
 from robocov_app.figures.files import plain_style
 from robocov_app.render.theme import LIGHT
 from robocov_app.report.theme_css import hex_code, named_colours
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
 
@@ -37,8 +37,6 @@ _PLOTTED = (
 
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:
     """Return a figure in light colours as SVG; ids begin with `key`, `sentence` tells what it shows."""
-    import matplotlib
-
     figure.patch.set_visible(False)
     for axes in figure.axes:
         axes.patch.set_visible(False)
