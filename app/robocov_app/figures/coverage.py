@@ -32,9 +32,8 @@ from robocov_app.figures.page import SMALL, TEXT, Box, Page, tone
 from robocov_app.figures.runs import plot_cost
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
-from robocov_app.render.heatmaps import border_colour
 from robocov_app.render.layout import united
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.render.theme import LIGHT, Theme, border_colour, theme_named
 
 _FINE = 2  # dots of a map's picture for each pixel of the page
 _LEAST = 720, 400  # smallest page for curves and maps

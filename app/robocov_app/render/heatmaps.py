@@ -19,7 +19,7 @@ from robocov_app.render.density import colours, density_label, parts
 from robocov_app.render.distance_field import Field, levels, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.render.theme import border_colour
 
 # on a surface the density is looked at in at most about so many places; between them it is interpolated
 _DOTS = 60_000
@@ -263,11 +263,6 @@ def _thinned(places: Array) -> Array:
     """Return the middles of pairs of pixels; the last pair may stick out."""
     step = places[1] - places[0] if len(places) > 1 else 0.0
     return np.asarray(places[::2] + 0.5 * step)
-
-
-def border_colour(theme: Theme) -> Colour:
-    """Return the colour of the borders of geodesic cells."""
-    return mix(theme.ink, theme.background, 0.1)
 
 
 def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:

@@ -301,3 +301,8 @@ def _dsatur(neighbours: list[list[int]]) -> list[int]:
                 seen[other].add(hue)
                 heappush(waiting, (-len(seen[other]), -len(neighbours[other]), other))
     return hues
+
+
+def border_colour(theme: Theme) -> Colour:
+    """Return the colour of the borders of geodesic cells."""
+    return mix(theme.ink, theme.background, 0.1)
