@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from robocov.cost import CoverageResult
@@ -22,8 +20,6 @@ from robocov.errors import ParameterError, RobocovError, counted, shown
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.robots import Team
-from robocov_app.figures import runs as figures
-from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
@@ -34,6 +30,10 @@ from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import asset, replay_html
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
+
+if TYPE_CHECKING:  # pages of HTML need no matplotlib
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COST_LATTICE = 64  # lattice of the cost that is shown with a run in a notebook
 COST_SAMPLES = 120  # at so many moments of the run it is evaluated, at the most
@@ -65,6 +65,8 @@ def plot_environment(
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
+    from robocov_app.figures import runs as figures
+
     return _map_axes(figures.plot_environment(environment, _checked(axes), theme, size), axes)
 
 
@@ -79,6 +81,8 @@ def plot_record(
     mean_time: float | None = None,
 ) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
+    from robocov_app.figures import runs as figures
+
     look = (theme, colours, size, mean_distance, mean_time)
     return _map_axes(figures.plot_trajectories(record, _checked(axes), *look), axes)
 
@@ -94,6 +98,8 @@ def plot_history(
     title: str = "Coverage cost over time",
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
+    from robocov_app.figures import runs as figures
+
     curve = (label, controller, history.time, history.mean_distance)
     return _map_axes(figures.plot_cost([curve], _checked(axes), theme, size, title), axes)
 
@@ -111,6 +117,8 @@ def plot_result(
     A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one. Raises
     ParameterError when the result does not know its map.
     """
+    from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
+
     _checked(axes)
     environment, sites, n = result.environment, result.sites, len(result.positions)
     if environment is None or sites is None:
@@ -154,6 +162,8 @@ def environment_html(environment: Environment) -> str:
 
 def environment_png(environment: Environment) -> bytes:
     """Return a map's page."""
+    from robocov_app.figures import runs as figures
+
     return figure_png(figures.plot_environment(environment))
 
 
@@ -180,6 +190,8 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
+    from robocov_app.figures import runs as figures
+
     return figure_png(figures.plot_trajectories(record))
 
 
@@ -188,6 +200,8 @@ def _checked(axes: Any) -> Any:
 
     Raises ParameterError when they are none, or several, or have other than two straight axes.
     """
+    from matplotlib.axes import Axes
+
     flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")
     if axes is not None and not flat:
         raise ParameterError(f"axes: {shown(axes)}, but one matplotlib Axes with straight x and y was wanted")
