@@ -20,7 +20,7 @@ from robocov_app.render.canvas import (
     clipped_segment,
     premultiplied,
 )
-from robocov_app.render.layers import draw_blocked, draw_boundary, says
+from robocov_app.render.layers import draw_blocked, draw_boundary, draw_motion, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
@@ -195,6 +195,8 @@ class SensedObstacles:
 def _draw_pale(canvas: Canvas, scene: Scene) -> None:
     """Draw all obstacles once more, as hardly more than their outlines."""
     draw_blocked(canvas, scene.environment, *_pale_colours(canvas))
+    for obstacle in scene.moving:
+        draw_motion(canvas, scene, obstacle, *_pale_colours(canvas))
     if "boundary" in canvas.shown:  # what of it was covered
         draw_boundary(canvas, scene)
 

@@ -168,20 +168,20 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
     own = replace(canvas, surface=page)
     draw_blocked(own, scene.environment, canvas.theme.obstacle, canvas.theme.obstacle_edge)
     for obstacle in scene.moving:
-        _draw_motion(own, scene.environment.region.polygon, obstacle)
+        draw_motion(own, scene, obstacle, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
     canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _draw_motion(canvas: Canvas, region: shapely.Polygon, obstacle: MovingObstacle) -> None:
+def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Colour, edge: Colour) -> None:
     """Draw the path of a moving obstacle, its shape, and an arrow where it heads."""
     theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
-    for part in shapely.get_parts(shapely.intersection(obstacle.polygon, region)):
+    for part in shapely.get_parts(shapely.intersection(obstacle.polygon, scene.environment.region.polygon)):
         if not isinstance(part, shapely.Polygon):
             continue
         corners = camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
         if not part.interiors:
-            canvas.polygon(corners, (*theme.moving_obstacle, 255))
-        canvas.outline(corners, theme.obstacle_edge, 2 * width)
+            canvas.polygon(corners, (*fill, 255))
+        canvas.outline(corners, edge, 2 * width)
     for start, end in pairwise(camera.to_pixels(obstacle.path).tolist()):
         canvas.dashes(start, end, theme.ink, width)
     middle = camera.to_pixels(obstacle.middle)

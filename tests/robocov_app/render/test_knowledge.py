@@ -8,11 +8,11 @@ from drawn_pixels import ONE, SIZE, TWO, changed, distance, drawn, inside, layer
 from drawn_run import HALL, ROOMS, SQUARE, explained, run_of, scene_of
 from written_words import check_glyph, glyphs, places
 
-from robocov.environment import Environment, PolygonObstacle, UniformStart
+from robocov.environment import CircleObstacle, Environment, ObstaclePath, PolygonObstacle, UniformStart
 from robocov_app.render import knowledge
 from robocov_app.render.camera import Camera
 from robocov_app.render.picture import Painter
-from robocov_app.render.scene import Sensed
+from robocov_app.render.scene import Sensed, moving_obstacles
 from robocov_app.render.theme import DARK, LIGHT, contrast, mix
 
 THEMES = pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
@@ -232,6 +232,19 @@ class TestSensedObstacles:
             pages.add(id(layer.draw.__self__._page))
         assert counts == [2, 2]
         assert len(pages) == 1
+
+    @THEMES
+    def test_it_does_not_hide_where_obstacles_head(self, theme):
+        cart = CircleObstacle(
+            (12.0, 7.0), 0.8, "cart", ObstaclePath(((12, 7), (15, 7)), 1.0, "back-and-forth")
+        )
+        carts = replace(ROOMS, obstacles=(*ROOMS.obstacles, cart))
+        scene = replace(knowing(), environment=carts.at(1.0), moving=moving_obstacles(carts, 1.0))
+        frame, painter = drawn(scene, "sensed", "obstacles", theme=theme)
+        middle = painter.camera.to_pixels(np.array([13.0, 7.0]))
+        assert nearest(frame, middle, theme.ink) < 30
+        pale = mix(theme.background, theme.obstacle, 0.3)
+        assert nearest(frame, painter.camera.to_pixels(np.array([13.0, 7.5])), pale) < 5
 
     def test_without_knowledge_there_is_nothing(self):
         scene = scene_of(run_of(ROOMS, 4))
