@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -112,17 +113,30 @@ class ConditionOptions:
             return None
         from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 
-        option = "--fail"
+        limits, where = {name: getattr(self, name) for name in LIMITS}, "--fail: "
         try:
             failures = tuple(parsed_entry(Failure, text) for text in self.fail)
-            option = "--join"
+            where = "--join: "
             joins = tuple(parsed_entry(Join, text) for text in self.join)
+            where = ""
+            conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
+            conditions.check_team(robots)
         except ParameterError as error:
-            raise ParameterError(f"{option}: {error}") from None
-        limits = {name: getattr(self, name) for name in LIMITS}
-        conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
-        conditions.check_team(robots)
+            raise ParameterError(_by_option(f"{where}{error}")) from None
         return None if conditions.ideal else conditions
+
+
+def _by_option(message: str) -> str:
+    """Return a message on conditions with the option in the place of the value's path.
+
+    >>> _by_option("conditions.failures[0]: robot 9, but one of 1 to 6 was wanted")
+    '--fail: robot 9, but one of 1 to 6 was wanted'
+    """
+    names = {"failures": "fail", "joins": "join"}
+    option = re.match(r"conditions\.(\w+)(\[\d+\])?", message)
+    if option is None:
+        return message
+    return f"--{names.get(option[1], option[1]).replace('_', '-')}{message[option.end() :]}"
 
 
 @dataclass

@@ -26,6 +26,10 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
         lambda match: f"{match[1]}: {match[3]}, but a {'whole ' * (match[2] == 'INT')}number was wanted",
     ),
     (
+        r"^Error parsing (\S+): no type matching \{None\}\|\{FLOAT FLOAT\} could be .* from \[(.*?)\]\. .*$",
+        r"\1: \2, but two numbers were wanted",
+    ),
+    (
         r"^invalid choice (.*) for argument '(\S+)'\. Expected one of \((.*?),? ?\) ?\.$",
         lambda match: f"{match[2]}: {match[1]}, but one of {_choices(match[3])} was wanted",
     ),

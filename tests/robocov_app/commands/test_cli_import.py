@@ -91,6 +91,8 @@ def test_the_file_that_is_read_is_never_written(tmp_path: Path, capsys: pytest.C
         ("plan.pgm", "--cell nan", "cell: nan, but a number from 1e-06 to 10000 m"),
         ("plan.pgm", "--cell 1 --threshold 3", "threshold: 3.0, but a number from 0 to 1"),
         ("plan.pgm", "--cell 0.001", "no place is wide enough for a robot of radius 0.1 m"),
+        ("plan.yaml", "--inside 1", "--inside: '1', but two numbers were wanted"),
+        ("plan.yaml", "--inside 1 x", "--inside: '1', 'x', but two numbers were wanted"),
         ("plan.yaml", "--radius 1", "no place is wide enough for a robot of radius 1 m"),
         ("plan.yaml", "--simplify -1", "simplify: -1.0, but a number from 0 to 10"),
         ("plan.yaml", "--keep some", "--keep: 'some', but one of 'largest', 'all'"),
