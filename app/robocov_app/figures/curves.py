@@ -119,12 +119,8 @@ def _frame(
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:
-    """Return heights at least `gap` apart, in the same order, as near to the given ones as a sweep gets.
+    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit.
 
-    `heights` in (m,). `low`, `high`: they stay within, as far as there is room.
-
-    Examples
-    --------
     >>> spread(np.array([5.0, 5.0, 20.0]), 4.0, 0.0, 30.0).tolist()
     [3.0, 7.0, 20.0]
     """

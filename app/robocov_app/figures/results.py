@@ -126,11 +126,9 @@ def plot_final_costs(
 ) -> Figure:
     """Plot samples as boxes on their side, every value as a point, in groups such as maps.
 
-    A box spans the quartiles, with the median across; whiskers reach the farthest values within 1.5 times its
-    length. A sample of fewer than five values has its points and its median alone. `rows` are groups from top
-    to bottom; a single one with an empty name has none written. The page has `size` px; a height of None is
-    what the rows need. The axis begins at `origin` unless all values are far from it. Raises ParameterError
-    when there are no samples, or one has no finite value.
+    Boxes span the quartiles, whiskers 1.5 times as much; a sample of fewer than `FEW` values has points and
+    median alone. `rows` are groups from top to bottom. A height of None is what they need. The axis begins at
+    `origin` unless all values are far from it.
     """
     samples = [sample for _, group in rows for sample in group]
     _check_samples(samples)

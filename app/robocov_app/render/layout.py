@@ -14,9 +14,7 @@ _FEW = 120  # up to so many points all pairs are looked at faster than a tree is
 
 
 def nearest_distance(points: Array, step: int = 1) -> Array:
-    """Return how far each of (n, 2) points is from the nearest other: (n,), infinite for a single one.
-
-    Of many points, only of each `step`-th.
+    """Return how far each of (n, 2) points is from the nearest other; of many, only each `step`-th.
 
     >>> nearest_distance(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])).tolist()
     [3.0, 1.0, 1.0]
@@ -33,14 +31,10 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
 
 
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
-    """Return radii for discs that stay readable where there is room and keep apart where there is none.
+    """Return radii, (n,), for discs: `most`, but in a crowd half of the way to the nearest neighbour.
 
-    Each disc wants the radius `most`. It shrinks to half of the way to its nearest neighbour, so that no two
-    overlap, but neither below its `true` size nor below `least`. `centers` in (n, 2). `true`, (n,): radii
-    true to scale. Returns: `(n,)`.
+    They are not below the `true` radii, (n,), nor below `least`.
 
-    Examples
-    --------
     >>> fitted_radii(np.array([[0.0, 0.0], [8.0, 0.0], [99.0, 0.0]]), np.ones(3), 2.0, 9.0).tolist()
     [4.0, 4.0, 9.0]
     """

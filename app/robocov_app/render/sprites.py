@@ -25,8 +25,7 @@ Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface
 class Sketch:
     """A part of a surface, drawn `STROKE_FINE` times larger and shrunk onto it.
 
-    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do. `box`:
-    the part of the surface, in its pixels.
+    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do.
     """
 
     def __init__(self, box: pygame.Rect) -> None:
@@ -95,9 +94,8 @@ def disc(
 ) -> pygame.Surface:
     """Return a disc with a ring around it, a hair line around that, and a number in it.
 
-    `radius`, px: of the disc with its ring. `edge`: colour of the hair line, which parts the ring from what
-    is behind. `text`: drawn in the middle when it is not empty. `shift`: quarters of a pixel to the right and
-    down; what is `LARGE` keeps to whole pixels.
+    `radius`, px: of the disc with its ring. `shift`: quarters of a pixel to the right and down; what is
+    `LARGE` keeps to whole pixels.
     """
     return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
 

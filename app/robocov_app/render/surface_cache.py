@@ -15,13 +15,10 @@ Arguments = ParamSpec("Arguments")
 def kept(
     most_bytes: int,
 ) -> Callable[[Callable[Arguments, pygame.Surface]], Callable[Arguments, pygame.Surface]]:
-    """Let a function draw each picture once, and forget those that were not asked for for longest.
+    """Let a function draw each picture once, and forget the least recently used beyond `most_bytes`.
 
-    A count of pictures would not do: at a high magnification a single disc takes megabytes. `most_bytes`: all
-    pictures together; a single larger one is handed out but not kept.
+    A count of pictures would not do: at a high magnification a single disc takes megabytes.
 
-    Examples
-    --------
     >>> @kept(1000)
     ... def page(side):
     ...     return pygame.Surface((side, side), 0, 32)

@@ -68,14 +68,10 @@ TRAIL_CONTRAST = 2.4  # least contrast of a robot's trajectory with its own cell
 class Theme:
     """One look. Widths and text sizes are pixels at scale 1.
 
-    `background`, `ink`, `faint`: the page, its text, and text or marks of lesser weight. `start`, `final`,
-    `trajectory`: the paper's green, blue and red. `controllers`: colours of cost curves: the paper's blue for
-    RAPF and red for RPF. `others`: curves of controllers that have no colour of their own, in turn. `robots`:
-    one for each robot of a small team; the first `MAP_COLOURS` for the cells of a large one. `heat`: from
-    near to far, evenly spaced, ever darker or ever brighter; see `heat_table`. `unreached`: where no robot
-    can come. `density`: of the shading where the density is highest, and. `density_strength`: how much of it
-    there is then. `tint`, `paper_tint`: how much of a robot's colour its cell takes on; less in plots in the
-    paper's colours.
+    `faint`: text or marks of lesser weight. `start`, `final`, `trajectory`: the paper's green, blue and red.
+    `others`: curves of controllers that have no colour of their own, in turn. `robots`: one for each robot of
+    a small team; the first `MAP_COLOURS` for the cells of a large one. `heat`: from near to far. `density`,
+    `density_strength`: where it is highest. `tint`, `paper_tint`: how much of a robot's colour its cell has.
     """
 
     name: str
@@ -236,10 +232,8 @@ def theme_named(name: str | Theme) -> Theme:
 def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | None = None) -> IntArray:
     """Return for each robot the index of its colour in `Theme.robots`.
 
-    Up to `ONE_HUE_EACH` robots have one each. In larger teams hue identifies nobody; then cells that share an
-    edge differ, and the robots carry numbers. `adjacency`, (m, 2) int or None: pairs of robots whose cells
-    share an edge; None when not known: hues then repeat in turn. `previous`, (n,) int or None: the colours of
-    the frame before. They stay, but for cells that now conflict. Returns: `(n,) int`.
+    Up to `ONE_HUE_EACH` robots have one each; in larger teams cells that share an edge, (m, 2) `adjacency`,
+    differ, or hues repeat in turn where that is not known. Those of the frame before stay where they can.
     """
     if n <= ONE_HUE_EACH:
         return np.arange(n, dtype=np.intp)

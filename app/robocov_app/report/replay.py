@@ -24,11 +24,9 @@ def replay_html(
     """Return runs as HTML in which they can be watched side by side.
 
     It asks for no network, defines no global name and has no ids: several may stand on one page. Where
-    scripts do not run (and on paper) it shows pictures of the last moments. `runs`: at least one.
-    `standalone`: whether it is a whole page, for a file; else it is a fragment with its own style and script,
-    as in the output of a notebook's cell. `panes`: the runs to be shown at first; None shows the first
-    `MOST_PANES`. `budget`: bytes that the runs may take; beyond, they hold fewer moments a second. Raises
-    ParameterError when there are no runs.
+    scripts do not run (and on paper) it shows pictures of the last moments. `standalone`: a whole page; else
+    a fragment with its own style and script, for a notebook. `panes`: the runs to be shown at first.
+    `budget`: bytes that the runs may take; beyond, they hold fewer moments a second.
     """
     content = replay_part(runs, panes, budget)
     style = theme_rules(".robocov-replay") + replay_css()
