@@ -63,13 +63,8 @@ def line_crowding(count: int) -> float:
 def columns_for(
     count: int, aspect: float, size: tuple[float, float], around: float = 0.0, beside: float = 0.0
 ) -> int:
-    """Return the number of columns that lets `count` panels of one aspect be largest on a page.
+    """Return the columns that let `count` panels of one aspect be largest; rows need `around` px besides.
 
-    `aspect`: width by height of each panel. `size` in (width, height). `around`, `beside`, px: height
-    that each row needs above and below its panels, width that each column needs beside them.
-
-    Examples
-    --------
     >>> columns_for(3, 1.4, (1920, 1080)), columns_for(3, 10.0, (1920, 1080))
     (3, 1)
     """

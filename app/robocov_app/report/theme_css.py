@@ -21,32 +21,23 @@ def hex_code(colour: Colour) -> str:
 
 def named_colours(theme: Theme) -> dict[str, Colour]:
     """Return the colours that pages use, by the names that they have there."""
+
+    def own(*names: str) -> dict[str, Colour]:
+        return {name: getattr(theme, name.replace("-", "_")) for name in names}
+
     return {
-        "background": theme.background,
-        "panel": theme.panel,
-        "ink": theme.ink,
-        "faint": theme.faint,
-        "grid": theme.grid,
+        **own("background", "panel", "ink", "faint", "grid"),
         "line": mix(theme.grid, theme.background, 0.45),
         "accent": theme.controller("rapf"),
         "warning": theme.controller("rpf"),
-        "boundary": theme.boundary,
-        "obstacle": theme.obstacle,
-        "obstacle-edge": theme.obstacle_edge,
-        "moving-obstacle": theme.moving_obstacle,
-        "cell-edge": theme.cell_edge,
-        "start": theme.start,
-        "final": theme.final,
+        **own("boundary", "obstacle", "obstacle-edge", "moving-obstacle", "cell-edge", "start", "final"),
         "on-final": readable_on(theme.final),
         "on-accent": readable_on(theme.controller("rapf")),
         "trajectory": theme.trajectory,
         "ring": theme.robot_ring,
         **{name: theme.controller(name) for name in theme.controllers},
         **{f"other-{k}": colour for k, colour in enumerate(theme.others)},
-        **{
-            f"cell-{k}": mix(theme.background, colour, theme.paper_tint)
-            for k, colour in enumerate(theme.robots)
-        },
+        **{f"cell-{k}": mix(theme.background, hue, theme.paper_tint) for k, hue in enumerate(theme.robots)},
         **{f"heat-{k}": colour for k, colour in enumerate(theme.quiet_heat)},
     }
 
