@@ -154,6 +154,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --size big", "--size: 'big', but WIDTHxHEIGHT"),
         ("run rooms --size 10x10", "--size: 10"),
         ("run rooms --theme blue", "--theme: 'blue', but one of 'dark', 'light'"),
+        ("run rooms --dt 0", "--dt: 0.0 s, but a number from 0.0001 to 1 s"),
         ("run rooms --vidoe", "unknown option --vidoe: did you mean --video?"),
         ("run rooms --seed", "--seed: a value was wanted"),
         ("run rooms --seed -1", "--seed: -1"),

@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 import tyro
@@ -62,6 +63,16 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
         if not ending.code:
             raise
         raise InputError(f"{one_line(complaint.getvalue())} (robocov {command} -h explains)") from None
+    except ParameterError as error:
+        raise ParameterError(_of_option(kind, str(error))) from None
+
+
+def _of_option(kind: Any, message: str) -> str:
+    """Return a message on an option that groups of options share with callers from Python, with dashes."""
+    groups = [kind, *(each.default_factory for each in fields(kind) if is_dataclass(each.default_factory))]
+    name, _, rest = message.partition(": ")
+    known = any(name == each.name for group in groups for each in fields(group))
+    return f"--{name.replace('_', '-')}: {rest}" if known else message
 
 
 def one_line(boxed: str) -> str:
