@@ -17,8 +17,16 @@ from robocov.controllers.gains import Value, value_text
 from robocov.errors import ParameterError, shown
 from robocov_app.figures.curves import DISTANCE
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, Page, even_ticks, figure_of, quiet_axes, tone, value_limits
-from robocov_app.figures.rows import cut_to
+from robocov_app.figures.page import (
+    SMALL,
+    Page,
+    cut_to,
+    even_ticks,
+    figure_of,
+    quiet_axes,
+    tone,
+    value_limits,
+)
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 

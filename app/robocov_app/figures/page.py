@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, cast
 
 from matplotlib.artist import Artist
@@ -63,6 +63,18 @@ def even_ticks(axis: Any, most: int) -> None:
     """Mark 1, 2, 5 times a power of ten on an axis, at most so many of them."""
     axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
     axis.set_major_formatter("{x:g}")
+
+
+def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
+    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it.
+
+    >>> cut_to("Lloyd's algorithm", len, 8)
+    "Lloyd's…"
+    """
+    kept = text
+    while len(kept) > 1 and width_of(text if kept == text else f"{kept}…") > room:
+        kept = kept[:-1]
+    return text if kept == text else f"{kept.rstrip()}…"
 
 
 class PageAxes(Axes):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import value_limits
-from robocov_app.figures.rows import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page
+from robocov_app.figures.results import MOST_POINTS, draw_box, laid_rows, ratio_limits, rows_page
 from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT
 
