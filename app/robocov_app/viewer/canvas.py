@@ -9,7 +9,7 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array
-from robocov.environment import Environment
+from robocov.environment import Environment, Point
 from robocov.observation import Snapshot
 from robocov_app.render import sprites
 from robocov_app.render.annotations import legend_rows, legend_strip
@@ -27,7 +27,7 @@ from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
 from robocov_app.viewer.session.curves import TIME, compared
 from robocov_app.viewer.session.pane import Lane
-from robocov_app.viewer.tools import Point, Preview
+from robocov_app.viewer.tools import Preview
 
 RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
 FAR_SCAN = 12.0  # metres that scans reach where the sensor has no limit

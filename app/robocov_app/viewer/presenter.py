@@ -9,6 +9,7 @@ from typing import Any
 
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
+from robocov.environment import Point
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
@@ -20,7 +21,7 @@ from robocov_app.viewer.session.pane import Lane
 from robocov_app.viewer.session.scenario import Law
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
-from robocov_app.viewer.tools import Brush, Hand, Point, Tool, Wall, toolbox
+from robocov_app.viewer.tools import Brush, Hand, Tool, Wall, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
 

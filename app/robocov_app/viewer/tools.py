@@ -6,12 +6,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TypeAlias
 
 import numpy as np
 
-from robocov.environment import Environment, Obstacle, Ring
+from robocov.environment import Environment, Obstacle, Point, Ring
 from robocov.errors import RobocovError
+from robocov_app.toolkit.draw_tools import SAME, Outline
 from robocov_app.viewer.session.map_edits import (
     circle_of,
     moved,
@@ -33,8 +33,6 @@ WALL_WIDTH = 0.1  # of drawn walls, m
 _SPACING = 0.25  # radii from one dab of the brush to the next
 _PAUSE = 0.08  # seconds between two times that the robots get to know of what is being painted
 _RING = 48  # corners of the circle that shows the brush's size
-
-Point: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -191,41 +189,44 @@ class Polygon(Tool):
     name: str = "polygon"
     title: str = "Polygon"
     hint: str = "click the corners; Enter, a double click or a click on the first corner closes it"
-    _corners: list[Point] = field(default_factory=list)
-    _at: Point = (0.0, 0.0)
+    outline: Outline = field(default_factory=lambda: Outline(least=3, closes=True), repr=False)
     _reach: float = 0.0
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        if self._ends(point, reach):
-            return self.finish(session)
-        self._reach = SNAPS_WITHIN * reach
-        self._at = point = snapped(session.environment, point, self._reach)
-        if not self._corners or apart(point, self._corners[-1]) > 1e-6:
-            self._corners.append(point)
-        return None
+        self._reach = reach
+        ended = self.outline.press(self._snapped(session, point), point, reach, self._same(reach))
+        return self.finish(session) if ended else None
 
     def move(self, session: Session, point: Point) -> None:
-        self._at = snapped(session.environment, point, self._reach) if self._corners else point
+        self.outline.at = self._snapped(session, point) if self.outline.points else point
+
+    def release(self, session: Session, point: Point) -> str | None:
+        if self.outline.release(self._snapped(session, point), point, self._reach):
+            self.outline.points.append(self.outline.at)
+            return self.finish(session)
+        return None
 
     def finish(self, session: Session) -> str | None:
-        corners, self._corners = self._corners, []
+        corners = self.outline.take()
         if not corners:
             return None
         return edited(session, with_obstacle(session.environment, self._made(corners)), f"{self.name} drawn")
 
     def cancel(self, session: Session) -> bool:
-        had, self._corners = bool(self._corners), []
-        return had
+        return self.outline.cancel()
 
     def preview(self, session: Session) -> Preview | None:
-        if not self._corners:
+        if not self.outline.points:
             return None
-        points = (*self._corners, self._at)
+        points = (*self.outline.points, self.outline.at)
         return Preview(points, len(points) > 2, None, f"{apart(points[-1], points[-2]):.2f} m")
 
-    def _ends(self, point: Point, reach: float) -> bool:
-        """Whether a click there ends it: on the first corner."""
-        return len(self._corners) >= 3 and apart(point, self._corners[0]) < reach
+    def _snapped(self, session: Session, point: Point) -> Point:
+        return snapped(session.environment, point, SNAPS_WITHIN * self._reach)
+
+    def _same(self, reach: float) -> float:
+        """Return how near to the last point a press ends it, m."""
+        return SAME
 
     def _made(self, corners: list[Point]) -> Obstacle:
         return polygon_of(corners)
@@ -237,13 +238,14 @@ class Wall(Polygon):
 
     name: str = "wall"
     title: str = "Wall"
-    hint: str = "click its points; Enter or a double click ends it; [ and ] change its width"
+    hint: str = "drag, or click its points, Enter or a double click ends it; [ and ] change its width"
+    outline: Outline = field(default_factory=lambda: Outline(drags=True), repr=False)
     width: float = WALL_WIDTH
 
     def preview(self, session: Session) -> Preview | None:
-        if not self._corners:
+        if not self.outline.points:
             return None
-        points = (*self._corners, self._at)
+        points = (*self.outline.points, self.outline.at)
         words = f"{apart(points[-1], points[-2]):.2f} m, {self.width:g} m wide"
         wall = None
         with suppress(RobocovError):
@@ -254,9 +256,8 @@ class Wall(Polygon):
         """Draw wider walls, or narrower ones."""
         self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
 
-    def _ends(self, point: Point, reach: float) -> bool:
-        """Whether a click there ends it: on the last point."""
-        return len(self._corners) >= 2 and apart(point, self._corners[-1]) < 0.3 * reach
+    def _same(self, reach: float) -> float:
+        return 0.3 * reach
 
     def _made(self, corners: list[Point]) -> Obstacle:
         return wall_of(corners, self.width)

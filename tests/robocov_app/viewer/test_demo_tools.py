@@ -214,10 +214,9 @@ class TestPolygon:
         assert not tool.cancel(session)
         assert tool.preview(session) is None
 
-    def test_a_double_click_is_one_corner(self):
+    def test_a_double_click_closes_it_and_is_one_corner(self):
         tool, session = Polygon(), begun()
-        clicked(tool, session, *self.CORNERS, self.CORNERS[-1])
-        assert tool.finish(session) == "polygon drawn"
+        assert clicked(tool, session, *self.CORNERS, self.CORNERS[-1]) == "polygon drawn"
         assert len(session.environment.obstacles[-1].vertices) == 3
 
     def test_what_is_none_is_refused(self):

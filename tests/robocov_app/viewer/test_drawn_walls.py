@@ -39,6 +39,20 @@ def test_what_is_far_from_walls_stays_where_it_is_drawn(tmp_path: Path) -> None:
         assert driver.desk.message == "wall drawn"
 
 
+def test_a_wall_is_drawn_by_a_drag_too_and_snaps(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, environment=room(), robots=2) as driver:
+        driver.key("w")
+        driver.drag_at((5.0, 0.02), (5.0, 5.98))
+        (wall,) = driver.session.environment.obstacles
+        assert wall.points == ((5.0, 0.0), (5.0, 6.0))
+        assert driver.desk.message.startswith("wall drawn; ")
+        driver.drag_at((2.0, 3.0), (2.0, 3.01))  # a hand that shakes in a click
+        assert driver.session.environment.obstacles == (wall,)
+        driver.click_at((3.0, 3.0))
+        driver.key("return")
+        assert np.allclose(driver.session.environment.obstacles[1].points, ((2, 3), (3, 3)), atol=0.02)
+
+
 def test_corners_come_before_walls() -> None:
     assert snapped(HALL, (0.03, 0.04), 0.1) == (0.0, 0.0)
     assert snapped(HALL, (1.3, 0.04), 0.1) == (1.3, 0.0)

@@ -31,8 +31,7 @@ from robocov_app.editor.tools.tool import (
     length_words,
     ring_area,
 )
-
-SAME = 1e-6  # metres below which two points are one
+from robocov_app.toolkit.draw_tools import SAME, Outline
 
 
 class DrawTool(Tool, ABC):
@@ -45,10 +44,7 @@ class DrawTool(Tool, ABC):
 
     def __init__(self) -> None:
         super().__init__()
-        self.points: list[Point] = []
-        self.at: Point = (0.0, 0.0)
-        self._pressed: Point = (0.0, 0.0)
-        self._dragging = False
+        self.outline = Outline(self.least, self.most, self.closes, self.drags)
 
     def made(self, context: ToolContext, points: Sequence[Point]) -> Change | None:
         """Return what the points make of the map."""
@@ -73,6 +69,11 @@ class DrawTool(Tool, ABC):
         return None
 
     @property
+    def points(self) -> list[Point]:
+        """What has been drawn so far."""
+        return self.outline.points
+
+    @property
     def busy(self) -> bool:
         return bool(self.points)
 
@@ -85,18 +86,8 @@ class DrawTool(Tool, ABC):
         return tuple(self.points if self.most == 2 else self.points[:-1])
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        point = self.at = self.placed(event)
-        enough = len(self.points) >= self.least
-        if self.closes and enough and distance(point, self.points[0]) < 0.7 * event.reach:
+        if self.outline.press(self.placed(event), event.raw, 0.7 * event.reach):
             self.finish(context)
-        elif self.points and distance(point, self.points[-1]) < SAME:
-            if enough:
-                self.finish(context)
-        else:
-            self.points.append(point)
-            self._pressed, self._dragging = event.raw, self.drags and len(self.points) == 1
-            if len(self.points) == self.most:
-                self.finish(context)
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
         if self.most == 2:
@@ -105,24 +96,16 @@ class DrawTool(Tool, ABC):
             self.finish(context)
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
-        self.at = self.placed(event)
+        self.outline.at = self.placed(event)
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
-        dragging, self._dragging = self._dragging, False
-        # meanwhile a key may have taken the point back
-        if dragging and self.points and not clicked:
-            self.at = self.placed(event)
-            # a hand that shakes in a click has drawn nothing
-            if self.most == 2 or distance(self._pressed, event.raw) >= event.reach:
-                self.points = self.dragged(self.points[0], self.at)
-                self.finish(context)
+        if self.outline.release(self.placed(event), event.raw, event.reach, clicked=clicked):
+            self._finish_drag(context, self.outline.at)
 
     def finish(self, context: ToolContext) -> bool:
-        if not self.points:
+        points = self.outline.take()
+        if not points:
             return False
-        points, self.points, self._dragging = self.points, [], False
-        if self.most == 2 and len(points) == 1:
-            points.append(self.at)
         if len(points) < self.least:
             raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
         change = self.made(context, points)
@@ -134,25 +117,29 @@ class DrawTool(Tool, ABC):
         return bool(self.points and self.points.pop())
 
     def cancel(self, context: ToolContext) -> bool:
-        had, self.points, self._dragging = bool(self.points), [], False
-        return had
+        return self.outline.cancel()
 
     def enter(self, context: ToolContext, text: str) -> None:
+        outline = self.outline
         end = self.end_for(text) if len(self.points) == 1 else None
         if end is not None:
-            self.points = self.dragged(self.points[0], end)
-            self.finish(context)
+            self._finish_drag(context, end)
         else:
-            self.points.append(next_point_of(text, self.origin, self.at if self.points else None))
-            self.at, self._dragging = self.points[-1], False
+            outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
+            outline.points.append(outline.at)
+            outline.dragging = False
 
     def preview(self, context: ToolContext) -> Preview | None:
-        return self.shown(context, (*self.points, self.at)) if self.points else None
+        return self.shown(context, (*self.points, self.outline.at)) if self.points else None
+
+    def _finish_drag(self, context: ToolContext, end: Point) -> None:
+        self.outline.points = self.dragged(self.points[0], end)
+        self.finish(context)
 
     def _far_corner(self, text: str) -> Point:
         """Return the corner of a rectangle of a typed size, on the cursor's side of the first."""
         width, height = size_of(text)
-        (x, y), (to_x, to_y) = self.points[0], self.at
+        (x, y), (to_x, to_y) = self.points[0], self.outline.at
         return x + (width if to_x >= x else -width), y + (height if to_y >= y else -height)
 
 
@@ -203,16 +190,16 @@ class MeasureTool(DrawTool):
         super().press(context, event)
 
     def finish(self, context: ToolContext) -> bool:
-        had, self._kept = bool(self.points), tuple(self.points) or self._kept
-        self.points = []
-        return had
+        points = self.outline.take()
+        self._kept = tuple(points) or self._kept
+        return bool(points)
 
     def cancel(self, context: ToolContext) -> bool:
         had, self._kept = bool(self._kept), ()
         return super().cancel(context) or had
 
     def preview(self, context: ToolContext) -> Preview | None:
-        points = (*self.points, self.at) if self.points else self._kept
+        points = (*self.points, self.outline.at) if self.points else self._kept
         if len(points) < 2:
             return None
         (ax, ay), (bx, by) = points[-2], points[-1]
@@ -254,13 +241,13 @@ class BoundaryTool(DrawTool):
         return list(_rectangle(a, b))
 
     def placed(self, event: PointerEvent) -> Point:
-        return event.point if self._dragging else super().placed(event)
+        return event.point if self.outline.dragging else super().placed(event)
 
     def end_for(self, text: str) -> Point | None:
         return self._far_corner(text) if any(sign in text for sign in "x×*") else None
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
-        if not self._dragging:
+        if not self.outline.dragging:
             return super().shown(context, points)
         (ax, ay), (bx, by) = points
         words = f"{length_words(abs(bx - ax))} x {length_words(abs(by - ay))}"
