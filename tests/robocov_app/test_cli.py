@@ -137,6 +137,7 @@ def test_import_a_floor_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ("run rooms --robots 5000", "but 5000 were asked for"),
         ("run rooms --robots many", "--robots: 'many', but a whole number was wanted"),
         ("run rooms --start coridor", "did you mean 'corridor'?"),
+        ("run rooms --max-speed -1", "--max-speed: -1.0 m/s, but a number from"),
         ("run rooms --dt 0", "dt: 0.0 s"),
         ("run rooms --dt nan", "dt: nan s"),
         ("run rooms --duration 1e6 --record-hz 60", "rows of the record"),

@@ -127,13 +127,13 @@ class ConditionOptions:
 
 
 def _by_option(message: str) -> str:
-    """Return a message on conditions with the option in the place of the value's path.
+    """Return a message on conditions or a team with the option in the place of the value's path.
 
     >>> _by_option("conditions.failures[0]: robot 9, but one of 1 to 6 was wanted")
     '--fail: robot 9, but one of 1 to 6 was wanted'
     """
     names = {"failures": "fail", "joins": "join"}
-    option = re.match(r"conditions\.(\w+)(\[\d+\])?", message)
+    option = re.match(r"(?:conditions|team)\.(\w+)(\[\d+\])?", message)
     if option is None:
         return message
     return f"--{names.get(option[1], option[1]).replace('_', '-')}{message[option.end() :]}"
@@ -263,7 +263,12 @@ class RunOptions(JsonOption):
         said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
         if self.communication_range is None:
             said["communication_range"] = math.inf
-        return Team.homogeneous(self.robots, **said) if self.team is None else read_team(self.team, said)
+        if self.team is not None:
+            return read_team(self.team, said)
+        try:
+            return Team.homogeneous(self.robots, **said)
+        except ParameterError as error:
+            raise ParameterError(_by_option(str(error))) from None
 
     def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:
         """Return what is to be run; raises InputError when it cannot be."""
