@@ -80,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _guarded(name: str, rest: list[str]) -> int:
     """Call the command; every way to end is an exit status."""
-    from robocov.errors import RobocovError
+    from robocov.errors import ParameterError, RobocovError
 
     try:
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout belongs to answers
@@ -96,6 +96,10 @@ def _guarded(name: str, rest: list[str]) -> int:
         status = module.command(options)
         sys.stdout.flush()
         return int(status or OK)
+    except ParameterError as error:
+        from robocov_app.terminal.arguments import by_option
+
+        return _complain(by_option(module.Arguments, str(error)))
     except RobocovError as error:
         return _complain(str(error))
     except KeyboardInterrupt:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -113,30 +112,17 @@ class ConditionOptions:
             return None
         from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 
-        limits, where = {name: getattr(self, name) for name in LIMITS}, "--fail: "
+        option = "--fail"
         try:
             failures = tuple(parsed_entry(Failure, text) for text in self.fail)
-            where = "--join: "
+            option = "--join"
             joins = tuple(parsed_entry(Join, text) for text in self.join)
-            where = ""
-            conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
-            conditions.check_team(robots)
         except ParameterError as error:
-            raise ParameterError(_by_option(f"{where}{error}")) from None
+            raise ParameterError(f"{option}: {error}") from None
+        limits = {name: getattr(self, name) for name in LIMITS}
+        conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
+        conditions.check_team(robots)
         return None if conditions.ideal else conditions
-
-
-def _by_option(message: str) -> str:
-    """Return a message on conditions or a team with the option in the place of the value's path.
-
-    >>> _by_option("conditions.failures[0]: robot 9, but one of 1 to 6 was wanted")
-    '--fail: robot 9, but one of 1 to 6 was wanted'
-    """
-    names = {"failures": "fail", "joins": "join"}
-    option = re.match(r"(?:conditions|team)\.(\w+)(\[\d+\])?", message)
-    if option is None:
-        return message
-    return f"--{names.get(option[1], option[1]).replace('_', '-')}{message[option.end() :]}"
 
 
 @dataclass
@@ -263,12 +249,7 @@ class RunOptions(JsonOption):
         said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
         if self.communication_range is None:
             said["communication_range"] = math.inf
-        if self.team is not None:
-            return read_team(self.team, said)
-        try:
-            return Team.homogeneous(self.robots, **said)
-        except ParameterError as error:
-            raise ParameterError(_by_option(str(error))) from None
+        return Team.homogeneous(self.robots, **said) if self.team is None else read_team(self.team, said)
 
     def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:
         """Return what is to be run; raises InputError when it cannot be."""

@@ -63,16 +63,21 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
         if not ending.code:
             raise
         raise InputError(f"{one_line(complaint.getvalue())} (robocov {command} -h explains)") from None
-    except ParameterError as error:
-        raise ParameterError(_of_option(kind, str(error))) from None
 
 
-def _of_option(kind: Any, message: str) -> str:
-    """Return a message on an option that groups of options share with callers from Python, with dashes."""
+def by_option(kind: Any, message: str) -> str:
+    """Return a message on a value with the option that gives it in the place of the value's path.
+
+    >>> from dataclasses import make_dataclass
+    >>> by_option(make_dataclass("Arguments", ["fail"]), "conditions.failures[0]: robot 9, but 1 was wanted")
+    '--fail: robot 9, but 1 was wanted'
+    """
     groups = [kind, *(each.default_factory for each in fields(kind) if is_dataclass(each.default_factory))]
-    name, _, rest = message.partition(": ")
-    known = any(name == each.name for group in groups for each in fields(group))
-    return f"--{name.replace('_', '-')}: {rest}" if known else message
+    found = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
+    name = {"failures": "fail", "joins": "join"}.get(found[1], found[1]) if found else ""
+    if found is None or not any(name == each.name for group in groups for each in fields(group)):
+        return message
+    return f"--{name.replace('_', '-')}{message[found.end() :]}"
 
 
 def one_line(boxed: str) -> str:
