@@ -14,10 +14,10 @@ from PIL import Image
 
 from robocov.mapfile import load_map, map_file
 from robocov_app.editor.edits.create import rectangle_drawn
-from robocov_app.editor.ui.launch import EditorOpening
+from robocov_app.editor.ui.launch import EditorLauncher
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.opening import HEADLESS_FPS, Opening
-from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.launch import HEADLESS_FPS, Launcher
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
@@ -30,19 +30,21 @@ SIZE = (1280, 720)
 
 def picture(theme: str, name: str) -> None:
     """Use the window for a while, and keep what it shows."""
-    session = Session(Scenario(load_map("rooms"), (Law("rapf"), Law("lloyd")), start="kitchen"))
+    session = Session(
+        Scenario(load_map("rooms"), (ControllerChoice("rapf"), ControllerChoice("lloyd")), start="kitchen")
+    )
     session.clock.speed = 2.0
     also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
-    opening = Opening(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
+    opening = Launcher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
     with opening.window() as window:
         for frame in range(12 * HEADLESS_FPS):
             if frame == 6 * HEADLESS_FPS:
                 session.fail_robot(5)
             window.frame(1.0 / HEADLESS_FPS)
-        desk = window.desk
-        desk.active, desk.hand.selected = 1, 4
+        viewer = window.viewer
+        viewer.active, viewer.hand.selected = 1, 4
         window.panel.show_tab("robot")
-        desk.pass_time(60.0)  # what was said is old
+        viewer.pass_time(60.0)  # what was said is old
         for _ in range(8):
             window.frame(0.0)
         keep(window, name)
@@ -51,9 +53,9 @@ def picture(theme: str, name: str) -> None:
 def editor(theme: str, name: str) -> None:
     """Draw a show-case into a museum, and drag it until it is in line with the others."""
     path = map_file("museum")
-    with EditorOpening(path, HERE, theme=theme, size=SIZE, headless=True).window() as window:
-        desk = window.desk
-        desk.change(rectangle_drawn(desk.sketch, (15.6, 7.0), (17.9, 7.6)))
+    with EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True).window() as window:
+        viewer = window.viewer
+        viewer.change(rectangle_drawn(viewer.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
         window.frame(0.5)
         to = window.arena.to_pixel
@@ -84,7 +86,7 @@ def film(name: str) -> None:
         *("-movflags", "+faststart", str(HERE / name)),
     ]
     session = Session(Scenario(load_map("rooms")))
-    opening = Opening(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
+    opening = Launcher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
     with opening.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         window.do("tour")

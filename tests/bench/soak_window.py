@@ -18,7 +18,7 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -35,17 +35,17 @@ def resident() -> float:
 def main(minutes: int, robots: int) -> None:
     """Use the window for so long, and tell how its memory grows."""
     rng = np.random.default_rng(0)
-    session = Session(Scenario(load_map("rooms"), (Law("rapf"),), robots, "uniform"))
+    session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), robots, "uniform"))
     layers = {layer.name for layer in standard_layers() if layer.default}
     with tempfile.TemporaryDirectory() as folder, display(headless=True):
         # the cost beside it takes no memory here; one a frame would take all of the time
-        desk = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
-        window = Window(desk, (1280, 720), 1.0)
+        viewer = Presenter(session, Costs(16, direct=True), layers, Path(folder), "rooms")
+        window = Window(viewer, (1280, 720), 1.0)
         warm = resident()
         for minute in range(1, minutes + 1):
             for _ in range(60 * FPS):
                 if rng.random() < 1 / (20 * FPS):
-                    touch(desk, rng)
+                    touch(viewer, rng)
                 window.frame(1.0 / FPS)
             if minute == WARM:
                 warm = resident()
@@ -55,23 +55,23 @@ def main(minutes: int, robots: int) -> None:
         print(f"grown by {resident() - warm:.1f} MB since minute {WARM}")
 
 
-def touch(desk: Presenter, rng: np.random.Generator) -> None:
+def touch(viewer: Presenter, rng: np.random.Generator) -> None:
     """Do something that people do, and which leaves the run as long as it is."""
-    numbers = desk.session.numbers
+    numbers = viewer.session.numbers
     number = int(rng.choice(numbers))
     try:
         match int(rng.integers(5)):
             case 0:
-                desk.session.grab(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
+                viewer.session.grab(number, (float(rng.uniform(1, 11)), float(rng.uniform(1, 8))))
             case 1:
-                desk.session.release()
+                viewer.session.release()
             case 2 if len(numbers) > 3:
-                desk.session.fail_robot(number)
+                viewer.session.fail_robot(number)
             case 3:
-                for failed in list(desk.session.lanes[0].circumstances.failed):
-                    desk.session.revive_robot(failed)
+                for failed in list(viewer.session.panes[0].setup.failed):
+                    viewer.session.revive_robot(failed)
             case _:
-                desk.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
+                viewer.set_parameter("k_rep", float(rng.uniform(0.1, 2.0)))
     except RobocovError as error:
         print(f"refused: {error}")
 

@@ -56,9 +56,9 @@ def opened_editor(
     with display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
-        desk = Editor(document, readings or measurement_worker(direct=True), OwnPasteboard(), folder)
-        desk.theme = theme
-        hands = Hands(EditorWindow(desk, size, scale, drafts, patient=True))
+        editor = Editor(document, readings or measurement_worker(direct=True), OwnPasteboard(), folder)
+        editor.theme = theme
+        hands = Hands(EditorWindow(editor, size, scale, drafts, patient=True))
         hands.settle()
         hands.frames(2)
         try:
@@ -67,7 +67,7 @@ def opened_editor(
             if pygame.display.get_init():  # another window may have ended it
                 pygame.key.set_mods(0)
             hands.window.close()
-            desk.document.close(discard=False)
+            editor.document.close(discard=False)
 
 
 class Hands(Driver):
@@ -77,7 +77,7 @@ class Hands(Driver):
 
     def __init__(self, window: EditorWindow) -> None:
         self.window = window
-        self.desk = window.desk
+        self.editor = window.editor
         self.at = (5, 5)
 
     def settle(self) -> None:
@@ -89,11 +89,11 @@ class Hands(Driver):
 
     @property
     def sketch(self) -> Sketch:
-        return self.desk.sketch
+        return self.editor.sketch
 
     @property
     def shapes(self) -> list[Any]:
-        return [item.shape for item in self.desk.sketch.obstacles]
+        return [item.shape for item in self.editor.sketch.obstacles]
 
     def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
         return self.window.arena.to_pixel(point)
@@ -131,14 +131,14 @@ class Hands(Driver):
 
     def refused(self) -> str:
         """Return why the dialog that is open refuses what was typed, which stays; and leave it."""
-        asked = self.desk.asked
+        asked = self.editor.asked
         assert isinstance(asked, Choice) and asked.trouble, "nothing was refused"
         self.key("escape")
-        assert self.desk.asked is None
+        assert self.editor.asked is None
         return asked.trouble
 
     def select(self, *keys: Any) -> None:
-        self.desk.select(Selection.of(*keys))
+        self.editor.select(Selection.of(*keys))
         self.settle()
 
     def command(self, text: str) -> None:
@@ -149,4 +149,4 @@ class Hands(Driver):
 
     @property
     def said(self) -> str:
-        return self.desk.message
+        return self.editor.message

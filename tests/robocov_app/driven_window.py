@@ -16,12 +16,12 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.ui import Shown
 from robocov_app.toolkit.window import display
-from robocov_app.viewer.commands import desk_commands, parameter_commands
+from robocov_app.viewer.commands import parameter_commands, viewer_commands
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import SPEEDS
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -48,7 +48,7 @@ MODIFIERS = {"ctrl": pygame.KMOD_LCTRL, "shift": pygame.KMOD_LSHIFT, "alt": pyga
 @contextmanager
 def opened(
     folder: Path,
-    *laws: Law,
+    *laws: ControllerChoice,
     environment: Environment = HALL,
     map_name: str = "hall",
     robots: int = 3,
@@ -62,10 +62,10 @@ def opened(
     with display(headless=True):
         session = begun(*(laws or (RAPF,)), robots=robots, environment=environment, **changes)
         usual = {layer.name for layer in standard_layers() if layer.default}
-        desk = Presenter(
+        viewer = Presenter(
             session, Costs(lattice, direct=True), usual if shown is None else shown, folder, map_name
         )
-        driver = Driver(Window(desk, size, scale, patient=True))
+        driver = Driver(Window(viewer, size, scale, patient=True))
         driver.settle()
         driver.settle()  # now it knows how high the legend is
         yield driver
@@ -82,18 +82,18 @@ def key_event(name: str) -> dict[str, Any]:
     return {"key": KEYS.get(last) or pygame.key.key_code(last), "mod": mod, "unicode": text, "scancode": 0}
 
 
-def listed(desk: Presenter) -> Commands:
+def listed(viewer: Presenter) -> Commands:
     """Return the commands without a window."""
     titles = {layer.name: layer.title for layer in standard_layers()}
-    return Commands(desk_commands(desk, titles), desk.attempt, lambda: parameter_commands(desk))
+    return Commands(viewer_commands(viewer, titles), viewer.attempt, lambda: parameter_commands(viewer))
 
 
-def do(desk: Presenter, name: str) -> None:
-    listed(desk).do(name)
+def do(viewer: Presenter, name: str) -> None:
+    listed(viewer).do(name)
 
 
-def typed(desk: Presenter, text: str) -> None:
-    listed(desk).typed(text)
+def typed(viewer: Presenter, text: str) -> None:
+    listed(viewer).typed(text)
 
 
 class Driver:
@@ -101,12 +101,12 @@ class Driver:
 
     def __init__(self, window: Window) -> None:
         self.window = window
-        self.desk = window.desk
+        self.viewer = window.viewer
         self.at = (5, 5)
 
     @property
     def session(self) -> Session:
-        return self.desk.session
+        return self.viewer.session
 
     def frames(self, count: int = 1, seconds: float = FRAME) -> None:
         for _ in range(count):
@@ -166,9 +166,8 @@ class Driver:
 
     def robot(self, number: int, pane: int = 0) -> tuple[float, float]:
         """Return the pixel where a robot is."""
-        lane = self.session.lanes[pane]
-        row = lane.numbers.index(number)
-        x, y = self.session.positions(lane)[row].tolist()
+        its = self.session.panes[pane]
+        x, y = self.session.positions(its)[its.numbers.index(number)].tolist()
         return self.pixel((x, y), pane)
 
     def click_at(self, point: tuple[float, float], pane: int = 0, button: int = 1) -> None:
@@ -263,8 +262,8 @@ class Driver:
 
 def place(driver: Driver, number: int, pane: int = 0) -> np.ndarray:
     """Return where a robot is, (2,) m."""
-    lane = driver.session.lanes[pane]
-    return driver.session.positions(lane)[lane.numbers.index(number)]
+    its = driver.session.panes[pane]
+    return driver.session.positions(its)[its.numbers.index(number)]
 
 
 def resized(driver: Driver, size: tuple[int, int]) -> None:

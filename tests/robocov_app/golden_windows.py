@@ -20,7 +20,7 @@ def compared(window) -> None:
 
 
 def asked(window) -> None:
-    window.desk.hand.selected = 2
+    window.viewer.hand.selected = 2
     window.panel.show_tab("robot")
     window.do("layer:force_attraction")
     window.do("layer:distances")
@@ -29,7 +29,7 @@ def asked(window) -> None:
 
 def past(window) -> None:
     played(window, 30)
-    window.desk.attempt(lambda: window.desk.session.fail_robot(3))
+    window.viewer.attempt(lambda: window.viewer.session.fail_robot(3))
     played(window, 30)
     window.do("back:second")
     window.panel.show_tab("show")
@@ -63,13 +63,13 @@ def played(window, frames: int) -> None:
 def drawn(name: str, spoil: Callable[[object], None] = lambda window: None) -> np.ndarray:
     """Return the picture of a scene, after something was spoiled, for tests of the tolerance."""
     from robocov_app.viewer.film import pixels
-    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.scenario import Scenario
     from robocov_app.viewer.session.session import Session
 
     theme, play = SCENES[name]
     session = Session(Scenario(load_map("rooms"), robots=4))
-    opening = Opening(session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32)
+    opening = Launcher(session, "rooms", Path(), theme=theme, size=SIZE, scale=1.0, headless=True, lattice=32)
     with opening.window() as window:
         spoil(window)
         play(window)

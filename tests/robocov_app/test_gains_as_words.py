@@ -23,7 +23,7 @@ from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gains import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
-from robocov_app.viewer.session.scenario import Law, branch_words, gain_words
+from robocov_app.viewer.session.scenario import ControllerChoice, branch_words, gain_words
 
 STUDY = """
 maps = ["room.json"]
@@ -162,7 +162,10 @@ def test_words_have_even_places_and_no_line_between_them() -> None:
 
 
 def test_laws_of_the_window_say_words() -> None:
-    before, after = Law("rapf"), Law("rapf", {"target": "median", "attraction_limit": None})
+    before, after = (
+        ControllerChoice("rapf"),
+        ControllerChoice("rapf", {"target": "median", "attraction_limit": None}),
+    )
     assert gain_words(before, after) == "attraction_limit = no limit, target = median"
     assert branch_words(after) == "RAPF, target median, attraction_limit no limit"
     with pytest.raises(ParameterError, match="unknown word 'mediam'"):
@@ -170,18 +173,18 @@ def test_laws_of_the_window_say_words() -> None:
 
 
 def test_in_the_window_words_are_buttons_and_commands(tmp_path: Path) -> None:
-    with opened(tmp_path, Law("rapf"), size=(1000, 1000)) as driver:
-        target = lambda: driver.session.lanes[0].law.value("target")  # noqa: E731
+    with opened(tmp_path, ControllerChoice("rapf"), size=(1000, 1000)) as driver:
+        target = lambda: driver.session.panes[0].law.value("target")  # noqa: E731
         chosen = lambda word: driver.widget("button", f"target:{word}").value  # noqa: E731
         assert target() == "centroid" and chosen("centroid")
         driver.push("target:median")
         assert target() == "median" and driver.session.events[-1].text.endswith("target = median")
         assert chosen("median") and not chosen("centroid")
-        driver.desk.attempt(lambda: driver.window.commands.typed("target sens"))
+        driver.viewer.attempt(lambda: driver.window.commands.typed("target sens"))
         driver.settle()
         assert target() == "sensing" and chosen("sensing")
-        driver.desk.attempt(lambda: driver.window.commands.typed("target 3"))
-        assert driver.desk.trouble and "one of centroid, sensing, median" in driver.desk.message
+        driver.viewer.attempt(lambda: driver.window.commands.typed("target 3"))
+        assert driver.viewer.trouble and "one of centroid, sensing, median" in driver.viewer.message
         driver.push("reset:target")
         assert target() == "centroid"
 
@@ -196,8 +199,8 @@ def test_words_that_do_not_fit_side_by_side_are_a_list(tmp_path: Path) -> None:
         "    def force(self, own):\n"
         "        return own.centroid - own.position\n"
     )
-    with opened(tmp_path, Law(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
+    with opened(tmp_path, ControllerChoice(f"{tmp_path / 'mine.py'}:Mine"), size=(1000, 800)) as driver:
         for word in ("anticlockwise", "whichever is near", "clockwise"):
             driver.choose("way", word)
-            assert driver.session.lanes[0].law.value("way") == word
+            assert driver.session.panes[0].law.value("way") == word
             assert driver.widget("menu", "way").text == word

@@ -9,7 +9,7 @@ import shapely
 from robocov.environment import CircleObstacle, DiscStart, Environment, UniformStart, WallObstacle
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 from robocov_app.viewer.session.session import Session
 
 HALL = Environment(
@@ -19,10 +19,10 @@ HALL = Environment(
     {"corner": DiscStart((1.2, 1.2), 0.8), "far": DiscStart((5.2, 3.2), 0.5), "spread": UniformStart()},
 )
 PILLAR = CircleObstacle((3.5, 3.0), 0.3)
-RAPF, RPF, LLOYD = Law("rapf"), Law("rpf"), Law("lloyd")
+RAPF, RPF, LLOYD = ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")
 
 
-def begun(*laws: Law, robots: int = 3, environment: Environment = HALL, **changes) -> Session:
+def begun(*laws: ControllerChoice, robots: int = 3, environment: Environment = HALL, **changes) -> Session:
     """Return a session that is paused at its beginning."""
     session = Session(Scenario(environment, laws or (RAPF,), robots, **changes))
     session.playing = False
@@ -40,7 +40,7 @@ def stepped(session: Session, steps: int) -> Session:
 
 def robots_of(session: Session) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Return the numbers of the robots that work, and of those that failed."""
-    there = session.circumstances(session.lanes[0])
+    there = session.setup(session.panes[0])
     return there.numbers, tuple(sorted(there.failed))
 
 
@@ -50,14 +50,14 @@ def all_told(session: Session) -> list[object]:
     told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
     told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
     told += [session.head.number, session.can_undo, session.can_redo]
-    for lane in session.lanes:
-        told += [lane.number, lane.circumstances, lane.time]
+    for pane in session.panes:
+        told += [pane.number, pane.setup, pane.time]
         told += [
             array.tobytes()
             for array in (
-                *(lane.simulation.positions, lane.simulation.velocities, lane.starts),
-                *(lane.trail.positions, lane.trail.time, lane.curve.time, lane.curve.value),
-                *lane.sensed.until(np.inf),
+                *(pane.simulation.positions, pane.simulation.velocities, pane.starts),
+                *(pane.trail.positions, pane.trail.time, pane.curve.time, pane.curve.value),
+                *pane.sensed.until(np.inf),
             )
         ]
     return told
@@ -66,12 +66,12 @@ def all_told(session: Session) -> list[object]:
 def too_deep(session: Session) -> float:
     """Return by how many metres some robot is too near to a wall or an obstacle, inf inside of one."""
     deepest = -np.inf
-    for lane in session.lanes:
-        free = lane.circumstances.solid.free
-        places = shapely.points(lane.simulation.positions)
+    for pane in session.panes:
+        free = pane.setup.solid.free
+        places = shapely.points(pane.simulation.positions)
         if not shapely.contains_properly(free, places).all():
             return np.inf
-        rim = shapely.distance(free.boundary, places) - lane.simulation.team.radius
+        rim = shapely.distance(free.boundary, places) - pane.simulation.team.radius
         deepest = max(deepest, float(-rim.min()))
     return deepest
 
@@ -81,19 +81,19 @@ def with_pillar(environment=HALL, pillar=PILLAR) -> Environment:
     return replace(environment, obstacles=(*environment.obstacles, pillar))
 
 
-def desk_of(*laws: Law, folder: Path = Path(), **changes) -> Presenter:
+def viewer_of(*laws: ControllerChoice, folder: Path = Path(), **changes) -> Presenter:
     """Return a desk in the hall, paused at its beginning."""
     return Presenter(begun(*laws, **changes), Costs(8, direct=True), {"cells", "robots"}, folder, "hall")
 
 
 def positions_of(session) -> list[np.ndarray]:
     """Return where the robots of each pane are, (n, 2) m."""
-    return [session.positions(lane).copy() for lane in session.lanes]
+    return [session.positions(pane).copy() for pane in session.panes]
 
 
 def with_curves(session, steps) -> None:
     """Make steps, with a cost at each, as the window notes it."""
     for _ in range(steps):
-        for lane in session.lanes:
-            lane.curve.add(session.time, 3.0 - session.time)
+        for pane in session.panes:
+            pane.curve.add(session.time, 3.0 - session.time)
         session.step()

@@ -16,7 +16,7 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -36,18 +36,18 @@ def cases(*, quick: bool = False) -> list[Case]:
 
 
 def _used(n: int, seconds: float) -> Iterator[Row]:
-    limits = Limits(radius=0.05) if n >= _CROWD else Limits()
+    limits = TeamSpec(radius=0.05) if n >= _CROWD else TeamSpec()
     start = "uniform" if n > 10 else None
-    session = Session(Scenario(load_map("rooms"), (Law("rapf"),), n, start, limits=limits))
+    session = Session(Scenario(load_map("rooms"), (ControllerChoice("rapf"),), n, start, limits=limits))
     with display(headless=True):
         shown = {layer.name for layer in standard_layers() if layer.default}
-        desk = Presenter(session, Costs(LATTICE), shown, Path(), "rooms")
-        window = Window(desk, SIZE, 1.0)
+        viewer = Presenter(session, Costs(LATTICE), shown, Path(), "rooms")
+        window = Window(viewer, SIZE, 1.0)
         try:
             with undisturbed():
                 frames, drawing, answers = _played(window, seconds)
         finally:
-            desk.costs.close()
+            viewer.costs.close()
         bare = _bare(len(frames))
     for name, took, goal, note in (
         ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
@@ -65,7 +65,7 @@ def _played(window: Window, seconds: float) -> tuple[list[float], list[float], i
     # the first moments prepare the map's cost and draw all that is kept afterwards
     for _ in range(FPS):
         window.frame(clock.tick(FPS) / 1000.0)
-    curve = window.desk.lane.curve
+    curve = window.viewer.pane.curve
     known = len(curve)
     began = before = perf_counter()
     while perf_counter() - began < seconds:

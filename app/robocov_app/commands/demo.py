@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from robocov_app.runs.recording import Frame
-    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.window import Window
 
@@ -92,7 +92,7 @@ def command(options: Arguments) -> int:
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.toolkit.window import show_compiling
-    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
 
@@ -107,7 +107,7 @@ def command(options: Arguments) -> int:
     else:
         session = session_of(options)
     also, without = options.layers()
-    opening = Opening(
+    opening = Launcher(
         session,
         name,
         options.folder,
@@ -141,15 +141,15 @@ def session_of(options: Arguments) -> Session:
     """Return the session that the options describe."""
     from robocov.mapfile import load_map
     from robocov.robots import read_team
-    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
     from robocov_app.viewer.session.session import Session
 
-    robots, limits = options.robots, Limits(radius=options.radius)
+    robots, limits = options.robots, TeamSpec(radius=options.radius)
     if options.team is not None:
         team = read_team(options.team, {"radius": options.radius})
-        robots, limits = robots_of(team, robots, Arguments.robots, options.team), Limits.of(team)
+        robots, limits = robots_of(team, robots, Arguments.robots, options.team), TeamSpec.of(team)
     first, *others = options.controllers
-    laws = (Law(first, parsed_gains(options.gains)), *map(Law, others))
+    laws = (ControllerChoice(first, parsed_gains(options.gains)), *map(ControllerChoice, others))
     conditions, start = options.conditions.conditions(options.seed, robots), (options.start, options.seed)
     environment = load_map(options.map)
     session = Session(Scenario(environment, laws, robots, *start, limits, options.dt, conditions=conditions))
@@ -158,7 +158,7 @@ def session_of(options: Arguments) -> Session:
     return session
 
 
-def rendered(opening: Opening, options: Arguments) -> int:
+def rendered(opening: Launcher, options: Arguments) -> int:
     """Render frames of the window without a display."""
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
@@ -166,7 +166,7 @@ def rendered(opening: Opening, options: Arguments) -> int:
     from robocov_app.terminal.interruption import INTERRUPTED, Interruption
     from robocov_app.terminal.progress import progress
     from robocov_app.viewer.film import pixels
-    from robocov_app.viewer.opening import HEADLESS_FPS
+    from robocov_app.viewer.launch import HEADLESS_FPS
 
     if options.video is not None:
         writable(options.video)

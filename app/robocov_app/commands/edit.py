@@ -42,9 +42,9 @@ class Arguments(WindowOptions):
 
 def command(options: Arguments) -> int:
     """Open the editor, or save a picture of it."""
-    from robocov_app.editor.ui.launch import EditorOpening
+    from robocov_app.editor.ui.launch import EditorLauncher
 
-    opening = EditorOpening(
+    opening = EditorLauncher(
         None if options.map is None else map_path(options.map),
         options.folder,
         background=options.background,
@@ -62,7 +62,7 @@ def command(options: Arguments) -> int:
         from robocov_app.viewer.film import pixels
 
         window.panel.show_tab(options.page)
-        window.desk.message = ""
+        window.editor.message = ""
         for _ in range(3):
             window.frame(0.2)
         with written(options.screenshot) as part:

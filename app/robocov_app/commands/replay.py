@@ -87,7 +87,7 @@ def play_story(options: Arguments, path: Path) -> int:
 def play_runs(options: Arguments, saved: list[Saved]) -> int:
     """Show saved runs in the window."""
     from robocov.controllers import controller_kind
-    from robocov_app.viewer.session.replayed import replayed_session
+    from robocov_app.viewer.session.recorded import replayed_session
 
     for controller in options.controller:
         controller_kind(controller)
@@ -108,12 +108,12 @@ def play_runs(options: Arguments, saved: list[Saved]) -> int:
 def open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
     """Open the window with a session, and the file that it is from."""
     from robocov.mapfile import bundled_maps, load_map
-    from robocov_app.viewer.opening import Opening
+    from robocov_app.viewer.launch import Launcher
 
     laws, same = options.controller, (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
     (also, without), theme, size = options.film.layers(), options.film.theme, window_size(options.film.size)
-    opening = Opening(
+    opening = Launcher(
         session, name, Path(), theme=theme, size=size, also=also, without=without, laws=laws, file=file
     )
     with opening.window() as window:

@@ -4,10 +4,10 @@ How a window writes its list::
 
     commands = Commands([
         Command("pause", "Play or pause", "Run", editor.pause, keys=("space",)),
-        Command("robot:remove", "Remove the robot", "Edit", desk.remove, ("delete",), when=desk.why_no_robot),
-        Command("map", "Open a map", "Run", desk.open_map, takes=Takes("name", options=desk.maps)),
-        Command("speed", "Speed", "Run", desk.set_speed, takes=Takes("factor", read=float)),
-    ], attempt=desk.attempt)
+        Command("remove", "Remove the robot", "Edit", viewer.remove, ("delete",), when=viewer.why_not),
+        Command("map", "Open a map", "Run", viewer.open_map, takes=Takes("name", options=viewer.maps)),
+        Command("speed", "Speed", "Run", viewer.set_speed, takes=Takes("factor", read=float)),
+    ], attempt=viewer.attempt)
     commands.press(event)                       # a key of the keyboard
     commands.do("pause")                        # a button or a menu
     commands.typed("map office")                # raises InputError where it means nothing

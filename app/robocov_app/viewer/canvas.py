@@ -26,7 +26,7 @@ from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
 from robocov_app.viewer.session.curves import TIME, compared
-from robocov_app.viewer.session.pane import Lane
+from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
 RAYS, MOST_RAYS = 120, 720  # of one scan, of all scans of a pane together
@@ -38,8 +38,8 @@ _REACH = 12.0  # pixels at scale 1 that a finger is wide
 class ViewerCanvas:
     """Draws the panes of a session, and finds what is under the cursor."""
 
-    def __init__(self, desk: Presenter, theme: Theme) -> None:
-        self.desk = desk
+    def __init__(self, viewer: Presenter, theme: Theme) -> None:
+        self.viewer = viewer
         self.theme = theme
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
@@ -55,14 +55,14 @@ class ViewerCanvas:
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Make the painters fit the layout and the theme."""
         self.layout, self.theme = layout, theme
-        self._environment = self.desk.session.environment
+        self._environment = self.viewer.session.environment
         several = len(layout.panes) > 1
         self._painters = []
         for _, _, width, height in layout.panes:
             layers = standard_layers()
             if several:  # they share the time, which stands in the window's own status line
                 layers = [layer for layer in pane_layers() if layer.name != "status"]
-            painter = Painter(self.desk.session.environment, (width, height), theme, layers, layout.scale)
+            painter = Painter(self.viewer.session.environment, (width, height), theme, layers, layout.scale)
             if self._camera is not None:
                 painter.camera = self._camera.within(painter.camera.view)
             self._painters.append(painter)
@@ -81,7 +81,7 @@ class ViewerCanvas:
         pane = self.pane_at(at) or 0
         left, top, _, _ = self.layout.panes[pane]
         camera = self._painters[pane].camera
-        low_x, low_y, high_x, high_y = self.desk.session.environment.region.bounds
+        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
         whole = max(high_x - low_x, high_y - low_y)
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
@@ -90,7 +90,7 @@ class ViewerCanvas:
     def pan(self, dx: float, dy: float) -> None:
         """Move all cameras by so many pixels."""
         camera = self._painters[0].camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self.desk.session.environment.region.bounds
+        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
         x = float(np.clip(camera.center[0], low_x, high_x))
         y = float(np.clip(camera.center[1], low_y, high_y))
         self._look(replace(camera, center=(x, y)))
@@ -145,7 +145,7 @@ class ViewerCanvas:
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw all panes."""
-        session = self.desk.session
+        session = self.viewer.session
         if session.environment is not self._environment:
             before, self._environment = self._environment, session.environment
             for painter in self._painters:
@@ -153,58 +153,58 @@ class ViewerCanvas:
             if before is not None and before.region.bounds != session.environment.region.bounds:
                 self.fit()
         self._scenes = []
-        for pane, (lane, box) in enumerate(zip(session.lanes, self.layout.panes, strict=False)):
-            painter = self._painters[pane]
-            painter.visible = set(self.desk.shown)
+        for k, (pane, box) in enumerate(zip(session.panes, self.layout.panes, strict=False)):
+            painter = self._painters[k]
+            painter.visible = set(self.viewer.shown)
             painter.visible |= {"caption"} & {layer.name for layer in painter.layers}
-            scene = self._scene(lane, painter)
+            scene = self._scene(pane, painter)
             self._scenes.append(scene)
             surface = screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
-            self._draw_tool(surface, pane, scene)
+            self._draw_tool(surface, k, scene)
         self._draw_frames(screen)
 
-    def _scene(self, lane: Lane, painter: Painter) -> Scene:
-        desk, session = self.desk, self.desk.session
-        circumstances, snapshot = session.circumstances(lane), session.snapshot(lane)
-        trail, times = session.trail(lane)
-        team = lane.simulation.team if session.live else circumstances.team
-        numbers, failed = circumstances.numbers, circumstances.failed
-        known, field = desk.costs.known.get(lane.number), None
+    def _scene(self, pane: Pane, painter: Painter) -> Scene:
+        viewer, session = self.viewer, self.viewer.session
+        setup, snapshot = session.setup(pane), session.snapshot(pane)
+        trail, times = session.trail(pane)
+        team = pane.simulation.team if session.live else setup.team
+        numbers, failed = setup.numbers, setup.failed
+        known, field = viewer.costs.known.get(pane.number), None
         if known is not None and painter.needs_field:
             field = known.field
             self._scale_colours(known.field.largest)
-        selected = numbers.index(desk.selected) if desk.selected in numbers else None
+        selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
         return Scene.of(
-            circumstances.environment,
+            setup.environment,
             team,
             snapshot,
-            starts=lane.starts if len(lane.starts) == len(numbers) else None,
+            starts=pane.starts if len(pane.starts) == len(numbers) else None,
             trail=trail if len(trail) else None,
             trail_time=times,
-            trail_fade=FADE if desk.fade else None,
-            label=circumstances.law.label,
-            cost=self._caption_cost(lane),
+            trail_fade=FADE if viewer.fade else None,
+            label=setup.law.label,
+            cost=self._caption_cost(pane),
             field=field,
             field_limit=self._limit,
             numbers=numbers,
             failed=failed,
-            failed_radii={number: circumstances.limits.radius_of(number) for number in failed},
+            failed_radii={number: setup.limits.radius_of(number) for number in failed},
             selected=selected,
-            scans=self._scans(lane, snapshot, team.sensing_range, selected) if "scan" in desk.shown else (),
-            sensed=lane.sensed,
-            path=known.path if known is not None and desk.cursor is not None else None,
+            scans=self._scans(pane, snapshot, team.sensing_range, selected) if "scan" in viewer.shown else (),
+            sensed=pane.sensed,
+            path=known.path if known is not None and viewer.cursor is not None else None,
         )
 
-    def _caption_cost(self, lane: Lane) -> str:
+    def _caption_cost(self, pane: Pane) -> str:
         """Return the numbers that the chart shows, with their time where that is not the present's."""
-        session = self.desk.session
+        session = self.viewer.session
         time, distances = compared(session)
         _, times = compared(session, TIME)
-        if lane.number not in distances:
+        if pane.number not in distances:
             return ""
-        what = mean_label(session.circumstances(lane).environment)
-        words = cost_label(what, distances[lane.number], times.get(lane.number))
+        what = mean_label(session.setup(pane).environment)
+        words = cost_label(what, distances[pane.number], times.get(pane.number))
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
     def _scale_colours(self, largest: float) -> None:
@@ -213,7 +213,7 @@ class ViewerCanvas:
             self._limit = round_limit(1.1 * largest)
 
     def _scans(
-        self, lane: Lane, snapshot: Snapshot, ranges: Array, selected: int | None
+        self, pane: Pane, snapshot: Snapshot, ranges: Array, selected: int | None
     ) -> list[tuple[Array, Array]]:
         """Return ray scans: of the robot that is asked about, else of all unless they are many."""
         rows = [selected] if selected is not None else list(range(len(snapshot.positions)))
@@ -224,7 +224,7 @@ class ViewerCanvas:
         for row in rows:
             reach = float(ranges[row]) if np.isfinite(ranges[row]) else FAR_SCAN
             place = snapshot.positions[row]
-            scans.append((place, lane.simulation.sensor.scan(place, rays, reach)[1]))
+            scans.append((place, pane.simulation.sensor.scan(place, rays, reach)[1]))
         return scans
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
@@ -236,13 +236,13 @@ class ViewerCanvas:
         canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
         numbers = list(scene.numbers or ()) if scene.snapshot is not None else []
-        if self.desk.session.hand is not None and self.desk.session.hand[0] in numbers:
-            number, target = self.desk.session.hand
+        if self.viewer.session.hand is not None and self.viewer.session.hand[0] in numbers:
+            number, target = self.viewer.session.hand
             assert scene.snapshot is not None
             place = scene.snapshot.positions[numbers.index(number)]
             begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
             canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
-        asked = self.desk.selected
+        asked = self.viewer.selected
         if asked is not None and asked in scene.failed:
             radius = max(scene.failed_radius(asked) * canvas.camera.zoom, 9.0 * canvas.scale)
             ring = partial(sprites.ring, round(radius) + 4.0 * canvas.scale, ink, 2.2 * canvas.scale)
@@ -254,7 +254,7 @@ class ViewerCanvas:
                 radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
                 center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
                 canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
-        preview = self.desk.tool.preview(self.desk.session)
+        preview = self.viewer.tool.preview(self.viewer.session)
         if preview is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
@@ -296,16 +296,16 @@ class ViewerCanvas:
         for pane, box in enumerate(self.layout.panes):
             rect = pygame.Rect(box)
             pygame.draw.rect(screen, mix(theme.background, theme.ink, 0.18), rect.inflate(2, 2), 2)
-            if pane == self.desk.active:
+            if pane == self.viewer.active:
                 bar = pygame.Rect(rect.topleft, (rect.width, max(2, round(3 * scale))))
-                screen.fill(theme.controller(self.desk.session.lanes[pane].law.name), bar)
+                screen.fill(theme.controller(self.viewer.session.panes[pane].law.name), bar)
         x, y, wide, high = self.layout.legend
         entries = self._legend_entries()
         key = (tuple(entry.key() for entry in entries), wide, theme.name, scale)
         if self._strip is None or self._strip_key != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
-            camera, shown = self._painters[0].camera, frozenset(self.desk.shown)
+            camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
             canvas = Canvas(page, camera, theme, scale, robot_hues(1), shown)
             page.blit(legend_strip(entries, canvas), (0, 0))
             self._strip, self._strip_key = page, key
@@ -315,7 +315,7 @@ class ViewerCanvas:
         """Return how many rows the shared legend has needed as long as the same is shown."""
         if len(self._scenes) < 2:
             return 0
-        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.desk.shown)
+        kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
         entries = self._legend_entries()
         page = pygame.Surface((self.layout.arena[2], 1))
         canvas = Canvas(page, self._painters[0].camera, self.theme, self.layout.scale, robot_hues(1))

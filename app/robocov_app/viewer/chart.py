@@ -19,7 +19,7 @@ from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared, curve_of
-from robocov_app.viewer.session.pane import Lane
+from robocov_app.viewer.session.pane import Pane
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20
 """Pixels at scale 1 round the plot."""
@@ -66,8 +66,8 @@ def value_axis(low: float, high: float) -> tuple[float, float, float]:
 class Chart:
     """Draws the plot and the time line of a session; keeps what changes seldom."""
 
-    def __init__(self, desk: Presenter) -> None:
-        self.desk = desk
+    def __init__(self, viewer: Presenter) -> None:
+        self.viewer = viewer
         self._page: pygame.Surface | None = None
         self._place: Callable[[Array, Array], Array]
         self._key: object = None
@@ -89,12 +89,12 @@ class Chart:
     @property
     def plotted(self) -> Plotted:
         """What is plotted now."""
-        return chosen(self.desk.session, self._wanted)
+        return chosen(self.viewer.session, self._wanted)
 
     def switch(self) -> str:
         """Plot the other quantity, if there are two."""
         wanted = TIME if self.plotted is DISTANCE else DISTANCE
-        if wanted is TIME and chosen(self.desk.session, TIME) is not TIME:
+        if wanted is TIME and chosen(self.viewer.session, TIME) is not TIME:
             return "all robots are equally fast: the mean time goes as the mean distance"
         self._wanted, self._page = wanted, None
         return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
@@ -116,20 +116,20 @@ class Chart:
     def _span(self) -> tuple[float, float, float]:
         """Left and right of the axis in pixels of the window, and the time at its end."""
         left, _, width, _ = self.layout.chart
-        scale, lanes, beside = self.layout.scale, self.desk.session.lanes, RIGHT * self.layout.scale
-        if len(lanes) > 1:  # their names stand there, too
+        scale, panes, beside = self.layout.scale, self.viewer.session.panes, RIGHT * self.layout.scale
+        if len(panes) > 1:  # their names stand there, too
             size = round(self.theme.small_text * scale)
-            names = (text_width(f"{lane.law.label}  8.888  +88.8 %", size, True) for lane in lanes)
+            names = (text_width(f"{pane.law.label}  8.888  +88.8 %", size, True) for pane in panes)
             beside = min(max(names) + 20 * scale, 0.4 * width)
-        ghosts = max((float(ghost.time[-1]) for ghost in self.desk.session.ghosts), default=0.0)
-        end = time_axis(max(self.desk.session.end, ghosts))
+        ghosts = max((float(ghost.time[-1]) for ghost in self.viewer.session.ghosts), default=0.0)
+        end = time_axis(max(self.viewer.session.end, ghosts))
         return left + LEFT * scale, left + width - beside, end
 
     def time_at(self, x: float) -> float:
         """Return the time at a pixel's column, s, within the run."""
         left, right, end = self._span
         time = (x - left) / max(right - left, 1.0) * end
-        return float(np.clip(time, 0.0, self.desk.session.end))
+        return float(np.clip(time, 0.0, self.viewer.session.end))
 
     def column(self, time: float) -> float:
         """Return the pixel's column of a time."""
@@ -140,20 +140,20 @@ class Chart:
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw both."""
-        session, layout = self.desk.session, self.layout
-        curves = [curve_of(lane, self.plotted) for lane in session.lanes]
+        session, layout = self.viewer.session, self.layout
+        curves = [curve_of(pane, self.plotted) for pane in session.panes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
-        panes = tuple(lane.number for lane in session.lanes)
+        panes = tuple(pane.number for pane in session.panes)
         rest = (
             *(panes, len(session.events), len(session.ghosts), self._span, self.plotted),
-            *(self.desk.costs.state, None if session.live else session.time, session.serial),
+            *(self.viewer.costs.state, None if session.live else session.time, session.serial),
         )
         # curves grow sixty times a second, which nobody sees
-        old = self.desk.now - self._drawn_at >= REFRESHED
+        old = self.viewer.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):
             _, _, width, height = layout.chart
             self._page = pygame.Surface((width, height + layout.track[3]), 0, 32)
-            self._key, self._samples, self._drawn_at = rest, samples, self.desk.now
+            self._key, self._samples, self._drawn_at = rest, samples, self.viewer.now
             canvas = flat_canvas(self._page, self.theme, layout.scale)
             self._plot(canvas)
             self._track(canvas)
@@ -176,7 +176,7 @@ class Chart:
         canvas.text(words, at, anchor=anchor, colour=colour, bold=bold, size=self.theme.small_text)
 
     def _plot(self, canvas: Canvas) -> None:
-        theme, scale, session, what = self.theme, self.layout.scale, self.desk.session, self.plotted
+        theme, scale, session, what = self.theme, self.layout.scale, self.viewer.session, self.plotted
         canvas.surface.fill(theme.panel)
         left, right, end = self._span
         height = self.layout.chart[3]
@@ -185,10 +185,12 @@ class Chart:
         title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
         self._offer(canvas, 12 * scale + canvas.text_width(title, bold=True))
-        if self.desk.costs.state:
-            canvas.text(self.desk.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
+        if self.viewer.costs.state:
+            canvas.text(
+                self.viewer.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right"
+            )
         ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
-        values = [curve_of(lane, what).value for lane in session.lanes] + [ghost.value for ghost in ghosts]
+        values = [curve_of(pane, what).value for pane in session.panes] + [ghost.value for ghost in ghosts]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
@@ -219,17 +221,17 @@ class Chart:
             if len(points):
                 x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
                 self._note(canvas, ghost.words, (x, points[-1][1] - 9 * scale), "right", colour)
-        for lane in session.lanes:
-            curve = curve_of(lane, what)
+        for pane in session.panes:
+            curve = curve_of(pane, what)
             points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
                 ends = np.hstack([points[:-1], points[1:]])
-                canvas.segments(ends, curve_colour(self.desk, theme, lane), canvas.width(1.8))
+                canvas.segments(ends, curve_colour(self.viewer, theme, pane), canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
         self._other = None
-        if chosen(self.desk.session, TIME) is DISTANCE:
+        if chosen(self.viewer.session, TIME) is DISTANCE:
             return
         scale, words = self.layout.scale, f"{(DISTANCE if self.plotted is TIME else TIME).short} ›"
         left += 16 * scale
@@ -259,7 +261,7 @@ class Chart:
 
         They are those of the captions, which are newer than a page that is drawn ten times a second.
         """
-        session, theme, scale = self.desk.session, self.theme, self.layout.scale
+        session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)
         _, right, _ = self._span
@@ -267,25 +269,25 @@ class Chart:
         if not known:
             return
         best = min(known.values())
-        lanes = [lane for lane in session.lanes if lane.number in known]
-        lanes.sort(key=lambda lane: -known[lane.number])
-        values = np.array([known[lane.number] for lane in lanes])
-        wanted = self._place(np.full(len(lanes), time), values)[:, 1]
+        panes = [pane for pane in session.panes if pane.number in known]
+        panes.sort(key=lambda pane: -known[pane.number])
+        values = np.array([known[pane.number] for pane in panes])
+        wanted = self._place(np.full(len(panes), time), values)[:, 1]
         rows = spread(wanted, 15.0 * scale, self.layout.chart[3] - 8 * scale)
-        for y, lane, value in zip(rows, lanes, values.tolist(), strict=True):
+        for y, pane, value in zip(rows, panes, values.tolist(), strict=True):
             words = f"{value:.3f}"
             if len(known) > 1:
                 gap = f"  +{100 * (value / best - 1):.1f} %" if value > best else "  best"
                 room = chart.get_width() - right - 15 * scale
                 room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
-                name = shortened(lane.law.label, canvas.text_size(theme.small_text), room, True)
+                name = shortened(pane.law.label, canvas.text_size(theme.small_text), room, True)
                 words = f"{name}  {words}{gap}"
-            colour = curve_colour(self.desk, theme, lane)
+            colour = curve_colour(self.viewer, theme, pane)
             self._note(canvas, words, (right + 9 * scale, y), colour=colour, bold=True)
 
     def _track(self, canvas: Canvas) -> None:
         """Draw the time line."""
-        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         top = self.layout.chart[3]
         middle = top + 0.5 * self.layout.track[3]
@@ -312,7 +314,7 @@ class Chart:
 
     def _cursor(self, screen: pygame.Surface) -> None:
         """Draw how far the run has come, the handle on the time line, and the line through the plot."""
-        theme, scale, session = self.theme, self.layout.scale, self.desk.session
+        theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         canvas = flat_canvas(screen, theme, scale)
         middle = self.layout.track[1] + 0.5 * self.layout.track[3]
         thick = max(4, round(5 * scale))
@@ -333,7 +335,7 @@ class Chart:
 
     def _hovered(self, screen: pygame.Surface) -> None:
         """Tell what was at the time under the cursor: an event near it, or the values."""
-        over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.desk.session
+        over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         if over is None or not left <= over[0] <= right:
             return
@@ -345,7 +347,7 @@ class Chart:
             words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
         else:
             what = self.plotted
-            values = [(lane.law.label, curve_of(lane, what).at(time)) for lane in session.lanes]
+            values = [(pane.law.label, curve_of(pane, what).at(time)) for pane in session.panes]
             known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
         x = round(self.column(time))
@@ -355,14 +357,14 @@ class Chart:
         tag(screen, words, at, theme, scale)
 
 
-def curve_colour(desk: Presenter, theme: Theme, lane: Lane) -> Colour:
+def curve_colour(viewer: Presenter, theme: Theme, pane: Pane) -> Colour:
     """Return the colour of a pane's curve: its controller's, another one where that is taken."""
     taken: list[Colour] = []
-    for other in desk.session.lanes:
+    for other in viewer.session.panes:
         own = theme.controllers.get(other.law.name)
         free = [colour for colour in theme.others if colour not in taken]
         taken.append(own if own is not None and own not in taken else free[0])
-        if other is lane:
+        if other is pane:
             break
     return taken[-1]
 

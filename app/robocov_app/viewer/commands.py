@@ -58,135 +58,141 @@ def grouped(group: str, *rows: Row) -> list[Command]:
     ]
 
 
-def desk_commands(desk: Presenter, titles: dict[str, str]) -> list[Command]:
+def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     """Return the commands that need no window; `titles` are the layers', by their names."""
 
     def robot_numbers() -> list[str]:
-        return [str(number) for number in desk.numbers]
+        return [str(number) for number in viewer.numbers]
 
     def speeds() -> list[str]:
         return [speed_words(speed).rstrip("×") for speed in SPEEDS]
 
     def files() -> list[str]:
-        return sorted(str(path) for path in desk.folder.glob(f"*{SUFFIX}"))
+        return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
 
     def branches() -> list[str]:
-        return [str(k + 1) for k in range(len(desk.session.branches))]
+        return [str(k + 1) for k in range(len(viewer.session.branches))]
 
     def save(name: object) -> None:
-        desk.save_session(Path(str(name)) if name else None)
+        viewer.save_session(Path(str(name)) if name else None)
 
     def open_session(name: str) -> None:
-        desk.open_session(Path(name))
+        viewer.open_session(Path(name))
 
     def next_seed() -> None:
-        desk.restart(seed=desk.session.scenario.seed + 1)
+        viewer.restart(seed=viewer.session.scenario.seed + 1)
 
     def begin_at(start: str) -> None:
-        desk.restart(start=start)
+        viewer.restart(start=start)
 
     def look_on(seconds: float) -> None:
-        desk.look_at(desk.session.time + seconds)
+        viewer.look_at(viewer.session.time + seconds)
 
     def finish() -> str | None:
-        return desk.tool.finish(desk.session)
+        return viewer.tool.finish(viewer.session)
 
-    more, fewer = partial(desk.change_robots, 1), partial(desk.change_robots, -1)
-    fail, start = desk.fail_or_revive, Takes("start", options=desk.starts)
+    more, fewer = partial(viewer.change_robots, 1), partial(viewer.change_robots, -1)
+    fail, start = viewer.fail_or_revive, Takes("start", options=viewer.starts)
 
     def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
         return Row(name, title, run, takes=takes)
 
     def tool_row(tool: Tool) -> Row:
-        run = partial(desk.take_tool, tool.name)
+        run = partial(viewer.take_tool, tool.name)
         return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
 
     def layer_row(name: str) -> Row:
-        return Row(f"layer:{name}", titles[name], partial(desk.switch_layer, name), keys.get(name, ""))
+        return Row(f"layer:{name}", titles[name], partial(viewer.switch_layer, name), keys.get(name, ""))
 
     keys = {name: key for key, name in _LAYER_KEYS.items()}
     layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
     return [
         *grouped(
             "Run",
-            Row("pause", "Play or pause", desk.pause, "space"),
-            Row("step", "Single step", lambda: desk.session.step(), ".", REPEATS),
-            Row("restart", "Restart", desk.restart, "r"),
-            Row("settle", "Play until settled, then stop", desk.settle, "s"),
-            Row("slower", "Slower", lambda: desk.change_speed(-1), "-", REPEATS),
-            Row("faster", "Faster", lambda: desk.change_speed(1), "=, +", REPEATS),
+            Row("pause", "Play or pause", viewer.pause, "space"),
+            Row("step", "Single step", lambda: viewer.session.step(), ".", REPEATS),
+            Row("restart", "Restart", viewer.restart, "r"),
+            Row("settle", "Play until settled, then stop", viewer.settle, "s"),
+            Row("slower", "Slower", lambda: viewer.change_speed(-1), "-", REPEATS),
+            Row("faster", "Faster", lambda: viewer.change_speed(1), "=, +", REPEATS),
             Row("seed:next", "Other starting positions (next seed)", next_seed, "n"),
-            Row("start:next", "Next start of the map", desk.next_start, "shift+n"),
+            Row("start:next", "Next start of the map", viewer.next_start, "shift+n"),
             Row("more", "One robot more, from the start", more, "shift+=, shift++", REPEATS),
             Row("fewer", "One robot fewer, from the start", fewer, "shift+-", REPEATS),
-            Row("map:next", "Next map", lambda: desk.next_map(1), "page down"),
-            Row("map:previous", "Previous map", lambda: desk.next_map(-1), "page up"),
-            taking("robots", "Number of robots", lambda n: desk.restart(robots=n), _whole("robots")),
-            taking("seed", "Seed", lambda n: desk.restart(seed=n), _whole("seed")),
+            Row("map:next", "Next map", lambda: viewer.next_map(1), "page down"),
+            Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
+            taking("robots", "Number of robots", lambda n: viewer.restart(robots=n), _whole("robots")),
+            taking("seed", "Seed", lambda n: viewer.restart(seed=n), _whole("seed")),
             taking("start", "Start of the map", begin_at, start),
-            taking("map", "Open a map", desk.open_map, Takes("map or file", options=desk.maps)),
-            taking("speed", "Speed", desk.set_speed, Takes("factor", _speed, speeds)),
+            taking("map", "Open a map", viewer.open_map, Takes("map or file", options=viewer.maps)),
+            taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, speeds)),
         ),
         *grouped(
             "Time",
-            Row("back", "Back by a moment", lambda: desk.look_by(-1), "left", REPEATS),
-            Row("forward", "On by a moment", lambda: desk.look_by(1), "right", REPEATS),
+            Row("back", "Back by a moment", lambda: viewer.look_by(-1), "left", REPEATS),
+            Row("forward", "On by a moment", lambda: viewer.look_by(1), "right", REPEATS),
             Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
             Row("forward:second", "On by a second", lambda: look_on(1.0), "shift+right", REPEATS),
-            Row("first", "To the beginning", lambda: desk.look_at(0.0), "home"),
-            Row("live", "To the present", lambda: desk.session.look_at(desk.session.end), "end"),
-            Row("branch:here", "Go on from the moment that is shown", desk.branch, "b"),
-            Row("branch:previous", "Branch before", lambda: desk.enter_branch(-1), "alt+left"),
-            Row("branch:next", "Next branch", lambda: desk.enter_branch(1), "alt+right"),
-            taking("time", "Go to a time", desk.look_at, Takes("seconds", partial(_positive, "time"))),
-            taking("branch", "Enter a branch", desk.enter_named_branch, Takes("branch", options=branches)),
+            Row("first", "To the beginning", lambda: viewer.look_at(0.0), "home"),
+            Row("live", "To the present", lambda: viewer.session.look_at(viewer.session.end), "end"),
+            Row("branch:here", "Go on from the moment that is shown", viewer.branch, "b"),
+            Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
+            Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
+            taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
+            taking("branch", "Enter a branch", viewer.enter_named_branch, Takes("branch", options=branches)),
         ),
         *grouped(
             "Compare",
-            Row("law", "Next controller in this pane", desk.next_law, "o"),
-            Row("pane:add", "Compare with one more controller", desk.add_pane, "k"),
-            Row("pane:remove", "Remove this pane", lambda: desk.session.remove_pane(desk.lane), "shift+k"),
-            Row("pane:next", "Next pane", desk.next_pane, "`"),
-            taking("controller", "Controller", desk.use_law, Takes("controller", options=lambda: desk.laws)),
+            Row("law", "Next controller in this pane", viewer.next_law, "o"),
+            Row("pane:add", "Compare with one more controller", viewer.add_pane, "k"),
+            Row(
+                "pane:remove", "Remove this pane", lambda: viewer.session.remove_pane(viewer.pane), "shift+k"
+            ),
+            Row("pane:next", "Next pane", viewer.next_pane, "`"),
+            taking(
+                "controller", "Controller", viewer.use_law, Takes("controller", options=lambda: viewer.laws)
+            ),
         ),
         *grouped(
             "Touch",
-            Row("undo", "Undo", desk.undo, "ctrl+z", REPEATS),
-            Row("redo", "Redo", desk.redo, "ctrl+y, ctrl+shift+z", REPEATS),
-            Row("robot:next", "Ask the next robot", lambda: desk.ask_next(1), "tab", REPEATS),
-            Row("robot:previous", "Ask the previous robot", lambda: desk.ask_next(-1), "shift+tab", REPEATS),
+            Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
+            Row("redo", "Redo", viewer.redo, "ctrl+y, ctrl+shift+z", REPEATS),
+            Row("robot:next", "Ask the next robot", lambda: viewer.ask_next(1), "tab", REPEATS),
+            Row(
+                "robot:previous", "Ask the previous robot", lambda: viewer.ask_next(-1), "shift+tab", REPEATS
+            ),
             Row("robot:fail", "Let the robot that is asked fail, or revive it", fail, "shift+d"),
-            Row("robot:remove", "Take the robot that is asked out", desk.remove_robot, "delete"),
+            Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
             Row("finish", "Finish what is being drawn", finish, "return, enter"),
-            Row("cancel", "Give up; close", desk.cancel, "escape"),
-            Row("wider", "Wider walls; a larger brush", lambda: desk.widen(1.25), "]", REPEATS),
-            Row("narrower", "Narrower walls; a smaller brush", lambda: desk.widen(0.8), "[", REPEATS),
-            taking("robot", "Ask a robot", desk.ask, _whole("robot", robot_numbers)),
+            Row("cancel", "Give up; close", viewer.cancel, "escape"),
+            Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
+            Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
+            taking("robot", "Ask a robot", viewer.ask, _whole("robot", robot_numbers)),
         ),
         *grouped(
             "View",
-            Row("theme", "Light or dark", desk.switch_theme, "t"),
-            Row("fade", "Trajectories fade", desk.switch_fade, "shift+t"),
-            Row("suggestions", "Suggestions once the team has settled", desk.switch_suggestions, "shift+h"),
-            Row("panel", "Hide or show the panel", desk.switch_panel, "h"),
+            Row("theme", "Light or dark", viewer.switch_theme, "t"),
+            Row("fade", "Trajectories fade", viewer.switch_fade, "shift+t"),
+            Row("suggestions", "Suggestions once the team has settled", viewer.switch_suggestions, "shift+h"),
+            Row("panel", "Hide or show the panel", viewer.switch_panel, "h"),
         ),
         *grouped(
             "Keep",
-            Row("save:session", "Save the session", desk.save_session, "ctrl+s"),
-            Row("recover", "Recover a session", desk.recover, "ctrl+shift+o"),
-            Row("save:map", "Save the map", desk.save_map, "ctrl+shift+s"),
+            Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
+            Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
+            Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
             taking("open", "Open a session", open_session, Takes("file", options=files)),
             taking("save", "Save the session as", save, Takes("file")),
         ),
-        *grouped("Tools", *map(tool_row, desk.tools.values())),
+        *grouped("Tools", *map(tool_row, viewer.tools.values())),
         *grouped("Show", *map(layer_row, layers)),
     ]
 
 
-def parameter_commands(desk: Presenter) -> Iterator[Command]:
+def parameter_commands(viewer: Presenter) -> Iterator[Command]:
     """Return a command for each gain of the chosen controller and each limit of the team: ``k_rep 0.5``."""
-    for each in desk.parameters():
-        run = partial(desk.set_parameter, each.name)
+    for each in viewer.parameters():
+        run = partial(viewer.set_parameter, each.name)
         words = tuple(getattr(each, "offered", ()))
         takes = Takes(f"now {each.words()}", each.read, lambda words=words: words)  # type: ignore[misc]
         plain = each.name.removeprefix("team.")

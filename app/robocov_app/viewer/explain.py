@@ -55,16 +55,16 @@ class Report:
     lines: tuple[Line, ...]
 
 
-def report_on(desk: Presenter, number: int) -> Report:
+def report_on(viewer: Presenter, number: int) -> Report:
     """Return what the inspector says of a robot of the chosen pane."""
-    session, lane = desk.session, desk.lane
-    circumstances = session.circumstances(lane)
-    if number in circumstances.failed:
-        x, y = circumstances.failed[number]
+    session, pane = viewer.session, viewer.pane
+    setup = session.setup(pane)
+    if number in setup.failed:
+        x, y = setup.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    snapshot, team, names = session.snapshot(lane), circumstances.team, circumstances.numbers
-    recent, solid = session.recent(lane, number), circumstances.solid
+    snapshot, team, names = session.snapshot(pane), setup.team, setup.numbers
+    recent, solid = session.recent(pane, number), setup.solid
     return explain(snapshot, team, solid, names.index(number), names=names, recent=recent)
 
 

@@ -64,17 +64,17 @@ def load_lesson(path: Path) -> SavedSession:
 
 def holds(condition: ConditionModel, session: Session) -> bool:
     """Return whether what is waited for is so."""
-    lane = session.lanes[0]
+    pane = session.panes[0]
     if condition.step is not None and session.step_now >= condition.step:
         return True
     if condition.settled and session.settled:
         return True
-    if condition.mean_distance_below is not None and len(lane.curve):
-        return bool(lane.curve.value[-1] < condition.mean_distance_below)
-    row = None if condition.robot is None else lane.row(condition.robot)
+    if condition.mean_distance_below is not None and len(pane.curve):
+        return bool(pane.curve.value[-1] < condition.mean_distance_below)
+    row = None if condition.robot is None else pane.row(condition.robot)
     if row is None:
         return False
-    x, y = (float(each) for each in lane.simulation.positions[row])
+    x, y = (float(each) for each in pane.simulation.positions[row])
 
     def within(box: list[float]) -> bool:
         return box[0] <= x <= box[2] and box[1] <= y <= box[3]
@@ -93,7 +93,7 @@ class LessonPlayer:
 
     def __init__(
         self,
-        desk: Presenter,
+        viewer: Presenter,
         fit: Callable[[], None],
         saved: SavedSession | None = None,
         *,
@@ -102,11 +102,11 @@ class LessonPlayer:
         saved = saved or first_lesson()
         assert saved.lesson is not None
         self.lesson: LessonModel = saved.lesson
-        self._desk, self._fit, self.alone = desk, fit, alone
-        self._before = desk.workspace, desk.map_name, desk.shown, desk.tool, desk.active
+        self._viewer, self._fit, self.alone = viewer, fit, alone
+        self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
         self.session = Session(saved.document.path(saved.document.nodes[0])[0].scenario)  # type: ignore[arg-type]
         self.session.document, self.session.head = saved.document, saved.document.nodes[0]
-        self.session.clock.budget = desk.session.clock.budget
+        self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
         self.number, self.state, self.done = 0, "plays", False
         self.answer: int | None = None
@@ -210,33 +210,33 @@ class LessonPlayer:
 
     def end(self) -> None:
         """End; the session from before is there again."""
-        desk = self._desk
+        viewer = self._viewer
         self._workspace.close()
-        desk.workspace, desk.map_name, desk.shown, desk.tool, desk.active = self._before
-        desk.show_session(desk.workspace.session)
+        viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before
+        viewer.show_session(viewer.workspace.session)
         self._fit()
         self.done = True
 
     def _turn(self, state: str) -> None:
         self.state, self._waited = state, 0.0
-        self._desk.version += 1
+        self._viewer.version += 1
 
     def _begin(self, number: int) -> None:
         self.number, self.answer = number, None
-        chapter, desk, session = self.chapter, self._desk, self.session
+        chapter, viewer, session = self.chapter, self._viewer, self.session
         target = session.document.nodes[chapter.touch]
         session.enter(session.document.path(target)[0], 0)
         session.finish_remaking()
         session.follow(target)
         session.playing, session.stop_when_settled = chapter.question is None, False
         session.clock.speed = chapter.speed
-        desk.workspace = self._workspace
-        desk.show_session(session)
-        desk.map_name = session.environment.name
-        desk.tool, desk.active = desk.hand, 0
-        desk.hand.selected = chapter.robot
-        desk.shown = set(PLAIN | frozenset(chapter.show))
-        desk.message = ""
+        viewer.workspace = self._workspace
+        viewer.show_session(session)
+        viewer.map_name = session.environment.name
+        viewer.tool, viewer.active = viewer.hand, 0
+        viewer.hand.selected = chapter.robot
+        viewer.shown = set(PLAIN | frozenset(chapter.show))
+        viewer.message = ""
         self._fit()
         self._turn("asks" if chapter.question is not None else "plays")
 

@@ -51,9 +51,9 @@ class Panel:
     """
 
     def __init__(
-        self, desk: Presenter, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
+        self, viewer: Presenter, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
     ) -> None:
-        self.desk, self.titles, self._commands, self._do = desk, titles, commands, do
+        self.viewer, self.titles, self._commands, self._do = viewer, titles, commands, do
         self.tab = TABS[0]
         self.covered = self.hidden = False
         self.report: Report | None = None
@@ -74,15 +74,15 @@ class Panel:
         """Turn to a page."""
         if name in TABS:
             self.tab = name
-            self.desk.version += 1
+            self.viewer.version += 1
 
     def update(self, seconds: float) -> None:
         """Let time pass: the page is drawn anew when something that it shows is different."""
         self._age += seconds
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
-        desk, session = self.desk, self.desk.session
-        shows = (desk.version, self.tab, desk.theme, session.playing, id(self.report))
+        viewer, session = self.viewer, self.viewer.session
+        shows = (viewer.version, self.tab, viewer.theme, session.playing, id(self.report))
         old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
         if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
@@ -128,32 +128,32 @@ class Panel:
             self._do(action)
 
     def _environment(self, ui: Ui) -> None:
-        desk, session = self.desk, self.desk.session
-        files = short_names(desk.maps())
+        viewer, session = self.viewer, self.viewer.session
+        files = short_names(viewer.maps())
         names = {name: file for file, name in files.items()}
         ui.header("ENVIRONMENT")
         ui.row(172, 0, height=28, below=5)
-        now = files.get(desk.map_name, desk.map_name)
+        now = files.get(viewer.map_name, viewer.map_name)
         if (name := ui.dropdown("map", list(names), now)) is not None:
-            desk.attempt(lambda: desk.open_map(names[name]))
-        if (start := ui.dropdown("start", desk.starts(), session.scenario.start_name)) is not None:
-            desk.attempt(lambda: desk.restart(start=start))
+            viewer.attempt(lambda: viewer.open_map(names[name]))
+        if (start := ui.dropdown("start", viewer.starts(), session.scenario.start_name)) is not None:
+            viewer.attempt(lambda: viewer.restart(start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
-        if (robots := ui.text_entry("robots", str(desk.robots))) is not None:
-            desk.attempt(lambda: self._commands.typed(f"robots {robots}"))
+        if (robots := ui.text_entry("robots", str(viewer.robots))) is not None:
+            viewer.attempt(lambda: self._commands.typed(f"robots {robots}"))
         self._does(ui, "−", "fewer")
         self._does(ui, "+", "more")
         ui.cell()
         ui.label("Seed")
         if (seed := ui.text_entry("seed", str(session.scenario.seed))) is not None:
-            desk.attempt(lambda: self._commands.typed(f"seed {seed}"))
+            viewer.attempt(lambda: self._commands.typed(f"seed {seed}"))
         self._does(ui, "↻", "seed:next")
 
     def _controllers(self, ui: Ui) -> None:
-        desk, session = self.desk, self.desk.session
-        laws = [session.circumstances(lane).law for lane in session.lanes]
-        labels = law_labels(desk.laws, {law.name: law.label for law in laws})
+        viewer, session = self.viewer, self.viewer.session
+        laws = [session.setup(pane).law for pane in session.panes]
+        labels = law_labels(viewer.laws, {law.name: law.label for law in laws})
         names = {label: name for name, label in labels.items()}
         count = len(laws)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
@@ -165,10 +165,10 @@ class Panel:
             ui.row(0, 24, 3, 0, 24, height=28, gap=2, below=4)
         for k, law in enumerate(laws):
             if (label := ui.dropdown(f"law:{k}", list(names), labels[law.name])) is not None:
-                desk.attempt(lambda k=k, label=label: desk.set_law(k, names[label]))  # type: ignore[misc]
+                viewer.attempt(lambda k=k, label=label: viewer.set_law(k, names[label]))  # type: ignore[misc]
             if count > 1:
                 if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
-                    desk.active = k
+                    viewer.active = k
                     self._do("pane:remove")
                 if count == 2 or k % 2 == 0:
                     ui.cell()
@@ -177,7 +177,7 @@ class Panel:
         ui.space(4)
 
     def _run(self, ui: Ui) -> None:
-        session = self.desk.session
+        session = self.viewer.session
         ui.header("RUN")
         ui.row(0, 0, 0, 0, height=28, below=5)
         self._does(ui, "Pause" if session.playing else "Play", "pause", chosen=not session.playing)
@@ -188,22 +188,22 @@ class Panel:
         ui.label("Speed")
         now = float(speed_index(session.clock.speed))
         if (place := ui.slider("speed", now, 0.0, len(SPEEDS) - 1.0, step=1.0)) is not None:
-            self.desk.attempt(lambda: self.desk.set_speed(SPEEDS[round(place)]))
+            self.viewer.attempt(lambda: self.viewer.set_speed(SPEEDS[round(place)]))
         ui.label(speed_words(session.clock.speed), key="speed")
 
     def _tools(self, ui: Ui) -> None:
         ui.header("MOUSE")
         ui.row(0, 0, 0, 0, 0, below=4)
-        for tool in self.desk.tools.values():
-            self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.desk.tool is tool, small=True)
+        for tool in self.viewer.tools.values():
+            self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.viewer.tool is tool, small=True)
         ui.space(6)
 
     # pages
 
     def _parameters(self, ui: Ui) -> None:
         """Show sliders, fields and resets of the chosen controller's gains and of the team's limits."""
-        found = self.desk.parameters()
-        law = self.desk.session.circumstances(self.desk.lane).law
+        found = self.viewer.parameters()
+        law = self.viewer.session.setup(self.viewer.pane).law
         groups = {
             f"GAINS OF {law.label.upper()}": [each for each in found if not each.name.startswith("team.")],
             "ROBOTS": [each for each in found if each.name.startswith("team.")],
@@ -222,7 +222,7 @@ class Panel:
                 ui.space(4)
 
     def _set(self, name: str, value: float | str | None) -> None:
-        self.desk.attempt(lambda: self.desk.set_parameter(name, value))
+        self.viewer.attempt(lambda: self.viewer.set_parameter(name, value))
 
     def _slider(self, ui: Ui, each: Parameter) -> None:
         ui.row(100, 0, 50, 34, 22, height=24, gap=3, below=3)
@@ -230,7 +230,7 @@ class Panel:
         if (place := ui.slider(each.name, each.place(), 0.0, 1.0)) is not None:
             self._set(each.name, each.at(place))
         if (text := ui.text_entry(each.name, each.words())) is not None:
-            self.desk.attempt(lambda: self.desk.set_parameter(each.name, each.read(text)))
+            self.viewer.attempt(lambda: self.viewer.set_parameter(each.name, each.read(text)))
         ui.label(each.unit, key=f"unit:{each.name}", style="unit")
         usual = "no limit" if each.default is None else f"{each.default:g} {each.unit}".rstrip()
         self._reset(ui, each, usual)
@@ -256,7 +256,7 @@ class Panel:
 
     def _show(self, ui: Ui) -> None:
         """Show check boxes of the layers."""
-        desk = self.desk
+        viewer = self.viewer
         names = [name for name in self.titles if name not in NOT_OFFERED]
         rows = -(-len(names) // 2)
         with ui.scroll("show"):
@@ -267,17 +267,17 @@ class Panel:
                     ui.cell()
                     continue
                 tip = self._commands[f"layer:{name}"].tip
-                if ui.check(self.titles[name], key=name, now=name in desk.shown, tip=tip) is not None:
+                if ui.check(self.titles[name], key=name, now=name in viewer.shown, tip=tip) is not None:
                     self._do(f"layer:{name}")
             ui.space(5)
             ui.row(0, 0, 0)
-            self._does(ui, "Fading", "fade", chosen=desk.fade)
-            self._does(ui, "Dark" if desk.theme == "light" else "Light", "theme")
+            self._does(ui, "Fading", "fade", chosen=viewer.fade)
+            self._does(ui, "Dark" if viewer.theme == "light" else "Light", "theme")
             self._does(ui, "Whole map", "fit")
 
     def _robot(self, ui: Ui) -> None:
         """Show what the inspector says, and what can be done to its robot."""
-        why = "" if self.desk.selected is not None else "no robot is chosen: click one first, or press Tab"
+        why = "" if self.viewer.selected is not None else "no robot is chosen: click one first, or press Tab"
         ui.row(0, 0, 0, 0, below=8)
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
@@ -285,7 +285,7 @@ class Panel:
             if ui.button(text, key=action, tip=self._commands[action].tip, why=why):
                 self._do(action)
         report = self.report
-        with ui.scroll(f"robot:{self.desk.selected}"):
+        with ui.scroll(f"robot:{self.viewer.selected}"):
             if report is None:
                 ui.words(_NOBODY, colour=ui.theme.faint)
                 return
@@ -295,7 +295,7 @@ class Panel:
         """Show buttons for what is saved, and for help."""
         ui.row(0, 0, height=28, below=5)
         for text, action in (each for row in _KEPT for each in row):
-            filming = action == "film" and self.desk.filming
+            filming = action == "film" and self.viewer.filming
             self._does(ui, "End film" if filming else text, action, chosen=filming)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, shown
 from robocov.robots import UNITS
-from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 SPAN = 30.0
 """A slider reaches from so many times less than the default to so many times more."""
@@ -108,7 +108,7 @@ class Pick:
         return (exact or begun)[0]
 
 
-def gain_parameters(law: Law) -> list[Parameter | Pick]:
+def gain_parameters(law: ControllerChoice) -> list[Parameter | Pick]:
     """Return a slider for each gain of a controller that is a number, and the words of each other."""
     found: list[Parameter | Pick] = []
     for name, gain in law.known.items():
@@ -130,9 +130,9 @@ def gain_parameters(law: Law) -> list[Parameter | Pick]:
     return found
 
 
-def limit_parameters(limits: Limits) -> list[Parameter]:
+def limit_parameters(limits: TeamSpec) -> list[Parameter]:
     """Return a slider for each limit of the team; what it sets, it sets for all robots."""
-    usual, found = Limits(), []
+    usual, found = TeamSpec(), []
     mixed = {name for name, _ in limits.different}
     for name, (label, meaning, (low, high)) in _LIMITS.items():
         if name in mixed:
@@ -145,7 +145,7 @@ def limit_parameters(limits: Limits) -> list[Parameter]:
     return found
 
 
-def with_limit(limits: Limits, name: str, value: float | None) -> Limits:
+def with_limit(limits: TeamSpec, name: str, value: float | None) -> TeamSpec:
     """Return the limits with another value of one; `name` may begin with ``team.``."""
     name = name.removeprefix("team.")
     number = math.inf if value is None else value

@@ -26,9 +26,14 @@ class Pointer:
     """
 
     def __init__(
-        self, desk: Presenter, canvas: ViewerCanvas, chart: Chart, panel: Panel, touched: Callable[[], object]
+        self,
+        viewer: Presenter,
+        canvas: ViewerCanvas,
+        chart: Chart,
+        panel: Panel,
+        touched: Callable[[], object],
     ) -> None:
-        self._desk, self._canvas, self._chart, self._panel = desk, canvas, chart, panel
+        self._viewer, self._canvas, self._chart, self._panel = viewer, canvas, chart, panel
         self._interrupt = touched
         self.at = (0, 0)
         self._drag = ""
@@ -52,7 +57,7 @@ class Pointer:
         elif event.type == pygame.MOUSEBUTTONUP:
             self._released(event)
         elif taken:
-            self._desk.cursor = None
+            self._viewer.cursor = None
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self._panel.stop_typing()
             self._pressed(event, now)
@@ -62,19 +67,19 @@ class Pointer:
     def _turned(self, factor: float) -> None:
         if self._canvas.pane_at(self.at) is None:
             return
-        if isinstance(self._desk.tool, Brush):
-            self._desk.widen(factor)
+        if isinstance(self._viewer.tool, Brush):
+            self._viewer.widen(factor)
         else:
             self._canvas.zoom(factor, self.at)
 
     def show(self) -> None:
         """Let the cursor, and a ring around the robot under it, tell what a press would do."""
-        desk, canvas, layout = self._desk, self._canvas, self._canvas.layout
-        pane = canvas.pane_at(self.at) if desk.cursor is not None else None
+        viewer, canvas, layout = self._viewer, self._canvas, self._canvas.layout
+        pane = canvas.pane_at(self.at) if viewer.cursor is not None else None
         if pane is not None:  # the cameras may have moved below it
-            desk.cursor, desk.cursor_pane = canvas.to_world(self.at, pane), pane
+            viewer.cursor, viewer.cursor_pane = canvas.to_world(self.at, pane), pane
         number = None
-        if pane is not None and desk.tool.name in _TAKES_ROBOTS:
+        if pane is not None and viewer.tool.name in _TAKES_ROBOTS:
             number = canvas.robot_at(self.at, pane)
         canvas.hovered = (-1, -1) if pane is None or number is None else (pane, number)
         if inside(layout.panel, self.at):
@@ -83,7 +88,7 @@ class Pointer:
         shape = pygame.SYSTEM_CURSOR_ARROW
         if number is not None:
             shape = pygame.SYSTEM_CURSOR_HAND
-        elif pane is not None and desk.tool is not desk.hand:
+        elif pane is not None and viewer.tool is not viewer.hand:
             shape = pygame.SYSTEM_CURSOR_CROSSHAIR
         elif inside(layout.track, self.at) or inside(layout.chart, self.at):
             offered = self._chart.offers(self.at)
@@ -94,11 +99,11 @@ class Pointer:
 
     def leave(self) -> None:
         """The cursor is not in the window any more."""
-        self._desk.cursor = None
+        self._viewer.cursor = None
         self._chart.hover = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
-        desk, layout = self._desk, self._canvas.layout
+        viewer, layout = self._viewer, self._canvas.layout
         if self._drag:  # a second button while the first is held
             return
         pane = self._canvas.pane_at(event.pos)
@@ -109,73 +114,73 @@ class Pointer:
             return
         if pane is None or event.button not in (1, 2, 3):
             return
-        brush = desk.tool if isinstance(desk.tool, Brush) else None
+        brush = viewer.tool if isinstance(viewer.tool, Brush) else None
         if event.button != 1 and not (brush and event.button == 3):
             self._drag = "pan"
             return
         if brush:
             brush.lowers = event.button == 3
         self._interrupt()
-        pane = min(pane, len(desk.session.lanes) - 1)
-        if desk.active != pane:
-            desk.active = pane
-            desk.version += 1
+        pane = min(pane, len(viewer.session.panes) - 1)
+        if viewer.active != pane:
+            viewer.active = pane
+            viewer.version += 1
         then, where = self._last_click
         double = now - then < DOUBLE and _far(where, event.pos) < SLIP
         self._last_click = now, event.pos
-        if double and desk.tool.name in ("polygon", "wall"):
-            desk.attempt(lambda: desk.tool.finish(desk.session))
+        if double and viewer.tool.name in ("polygon", "wall"):
+            viewer.attempt(lambda: viewer.tool.finish(viewer.session))
             return
         point = self._canvas.to_world(event.pos, pane)
         number, reach = self._canvas.robot_at(event.pos, pane), self._canvas.reach(pane)
-        desk.attempt(lambda: desk.tool.press(desk.session, point, reach, number))
-        if desk.tool is desk.hand and number is not None:
+        viewer.attempt(lambda: viewer.tool.press(viewer.session, point, reach, number))
+        if viewer.tool is viewer.hand and number is not None:
             self._panel.show_tab("robot")
-        self._drag = "pan" if desk.tool is desk.hand and not desk.hand.holds else "tool"
+        self._drag = "pan" if viewer.tool is viewer.hand and not viewer.hand.holds else "tool"
         self._held = pane
 
     def _press_chart(self, at: tuple[int, int]) -> None:
         """Plot the other quantity, enter a branch by its ghost, or look at the time there."""
-        desk, chart = self._desk, self._chart
+        viewer, chart = self._viewer, self._chart
         if chart.offers(at):
-            desk.attempt(chart.switch)
+            viewer.attempt(chart.switch)
         elif (ghost := chart.ghost_at(at)) is not None:
-            desk.attempt(lambda: desk.enter(ghost))
+            viewer.attempt(lambda: viewer.enter(ghost))
         else:
             self._interrupt()
             self._drag = "time"
-            desk.attempt(lambda: desk.look_at(chart.time_at(at[0])))
+            viewer.attempt(lambda: viewer.look_at(chart.time_at(at[0])))
 
     def _moved(self, event: pygame.event.Event) -> None:
-        desk = self._desk
-        pane, desk.cursor = self._canvas.pane_at(event.pos), None
+        viewer = self._viewer
+        pane, viewer.cursor = self._canvas.pane_at(event.pos), None
         if pane is not None and not inside(self._canvas.layout.panel, event.pos):
-            desk.cursor, desk.cursor_pane = self._canvas.to_world(event.pos, pane), pane
+            viewer.cursor, viewer.cursor_pane = self._canvas.to_world(event.pos, pane), pane
         self._chart.hover = event.pos if not self._drag else None
         if self._drag == "time":
-            desk.attempt(lambda: desk.look_at(self._chart.time_at(event.pos[0])))
+            viewer.attempt(lambda: viewer.look_at(self._chart.time_at(event.pos[0])))
         elif self._drag == "pan":
             self._canvas.pan(*event.rel)
         elif self._drag == "tool":
             point = self._canvas.to_world(event.pos, self._pane())
-            desk.attempt(lambda: desk.tool.move(desk.session, point))
-        elif desk.cursor is not None:
-            desk.tool.move(desk.session, desk.cursor)
+            viewer.attempt(lambda: viewer.tool.move(viewer.session, point))
+        elif viewer.cursor is not None:
+            viewer.tool.move(viewer.session, viewer.cursor)
 
     def _released(self, event: pygame.event.Event) -> None:
-        desk, drag = self._desk, self._drag
+        viewer, drag = self._viewer, self._drag
         if event.button != self._button:  # another one than the one that is held
             return
         self._drag = ""
         clicked = _far(event.pos, self._pressed_at) < SLIP
         if drag == "tool":
             point = self._canvas.to_world(event.pos, self._pane())
-            desk.attempt(lambda: desk.tool.release(desk.session, point))
+            viewer.attempt(lambda: viewer.tool.release(viewer.session, point))
         elif drag == "pan" and clicked and event.button == 3:
-            desk.attempt(lambda: desk.tool.finish(desk.session))
-        elif drag == "pan" and clicked and event.button == 1 and desk.tool is desk.hand:
-            desk.hand.selected = None
-            desk.version += 1
+            viewer.attempt(lambda: viewer.tool.finish(viewer.session))
+        elif drag == "pan" and clicked and event.button == 1 and viewer.tool is viewer.hand:
+            viewer.hand.selected = None
+            viewer.version += 1
 
     def _pane(self) -> int:
         return min(self._held, len(self._canvas.layout.panes) - 1)

@@ -1,4 +1,4 @@
-"""The desk: what every key, button and typed command does, and what is to be shown. Knows no pygame."""
+"""The viewer: what every key, button and typed command does, and what is to be shown. Knows no pygame."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
 from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.session.pane import Lane
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
 from robocov_app.viewer.tools import Brush, Hand, Tool, Wall, toolbox
@@ -78,8 +78,8 @@ class Presenter:
     @property
     def numbers(self) -> list[int]:
         """The numbers of the robots in the chosen pane, those that failed with them."""
-        circumstances = self.session.circumstances(self.lane)
-        return sorted([*circumstances.numbers, *circumstances.failed])
+        setup = self.session.setup(self.pane)
+        return sorted([*setup.numbers, *setup.failed])
 
     @property
     def selected(self) -> int | None:
@@ -87,10 +87,10 @@ class Presenter:
         return self.hand.selected if self.hand.selected in self.numbers else None
 
     @property
-    def lane(self) -> Lane:
+    def pane(self) -> Pane:
         """The pane that is chosen."""
-        self.active = min(self.active, len(self.session.lanes) - 1)
-        return self.session.lanes[self.active]
+        self.active = min(self.active, len(self.session.panes) - 1)
+        return self.session.panes[self.active]
 
     @property
     def robots(self) -> int:
@@ -99,8 +99,8 @@ class Presenter:
 
     def parameters(self) -> list[Parameter | Pick]:
         """Return all sliders and words: the chosen controller's gains, then the team's limits."""
-        circumstances = self.session.circumstances(self.lane)
-        return [*gain_parameters(circumstances.law), *limit_parameters(circumstances.limits)]
+        setup = self.session.setup(self.pane)
+        return [*gain_parameters(setup.law), *limit_parameters(setup.limits)]
 
     def maps(self) -> list[str]:
         """Return the maps to choose from: the bundled ones, and the one that is open."""
@@ -234,21 +234,21 @@ class Presenter:
 
     def next_law(self) -> None:
         """Let the next controller take over in the chosen pane."""
-        now = self.session.circumstances(self.lane).law.name
+        now = self.session.setup(self.pane).law.name
         k = self.laws.index(now) if now in self.laws else -1
-        self.session.set_law(self.lane, Law(self.laws[(k + 1) % len(self.laws)]))
+        self.session.set_law(self.pane, ControllerChoice(self.laws[(k + 1) % len(self.laws)]))
 
     def add_pane(self) -> None:
         """Compare with a controller that is not there yet."""
-        there = {lane.law.name for lane in self.session.lanes}
+        there = {pane.law.name for pane in self.session.panes}
         name = next((name for name in self.laws if name not in there), self.laws[0])
-        self.session.add_pane(Law(name))
-        self.active = len(self.session.lanes) - 1
+        self.session.add_pane(ControllerChoice(name))
+        self.active = len(self.session.panes) - 1
         self.say("all begin anew, from the same starts")
 
     def next_pane(self) -> None:
         """Choose the next pane."""
-        self.active = (self.active + 1) % len(self.session.lanes)
+        self.active = (self.active + 1) % len(self.session.panes)
 
     def undo(self) -> None:
         """Take the last edit back."""
@@ -269,7 +269,7 @@ class Presenter:
     def fail_or_revive(self) -> None:
         """Let the robot that is asked fail, or work again."""
         number = self._asked()
-        if number in self.session.circumstances(self.lane).failed:
+        if number in self.session.setup(self.pane).failed:
             self.session.revive_robot(number)
         else:
             self.session.fail_robot(number)
@@ -395,22 +395,22 @@ class Presenter:
 
     def set_parameter(self, name: str, value: Value) -> None:
         """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""
-        circumstances = self.session.circumstances(self.lane)
+        setup = self.session.setup(self.pane)
         if name.startswith("team.") and not isinstance(value, str):
-            self.session.set_limits(with_limit(circumstances.limits, name, value))
+            self.session.set_limits(with_limit(setup.limits, name, value))
         else:
-            self.session.set_law(self.lane, circumstances.law.with_gain(name, value))
+            self.session.set_law(self.pane, setup.law.with_gain(name, value))
 
-    def set_law(self, pane: int, name: str) -> None:
+    def set_law(self, number: int, name: str) -> None:
         """Let a controller take over in a pane."""
-        lane = self.session.lanes[pane]
-        if self.session.circumstances(lane).law.name != name:
-            self.session.set_law(lane, Law(name))
-        self.active = pane
+        pane = self.session.panes[number]
+        if self.session.setup(pane).law.name != name:
+            self.session.set_law(pane, ControllerChoice(name))
+        self.active = number
 
     def use_law(self, name: str) -> None:
         """Let a controller take over in the chosen pane; it may be new to the list."""
-        Law(name).made()
+        ControllerChoice(name).made()
         if name not in self.laws:
             self.laws.append(name)
         self.set_law(self.active, name)

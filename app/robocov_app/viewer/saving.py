@@ -124,7 +124,7 @@ def own_controllers(document: Document) -> list[str]:
 def _stem(session: Session, map_name: str) -> str:
     """Return what the folder is called, but for its number."""
     name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
-    laws = [lane.law.name for lane in session.lanes]
+    laws = [pane.law.name for pane in session.panes]
     what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
     stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
     return f"{stem}-{what}"

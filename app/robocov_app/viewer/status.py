@@ -22,10 +22,10 @@ _OFFERED = (
 _AT_ONCE = 3
 
 
-def facts(desk: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
+def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
     """Return what the line says, the most important first; `frames` and `steps` a second, `filmed` s."""
-    session = desk.session
-    known = desk.costs.known.get(desk.lane.number)
+    session = viewer.session
+    known = viewer.costs.known.get(viewer.pane.number)
     said = [f"{'' if session.playing else 'paused · '}t = {session.time:.2f} s"]
     if known is not None:
         when = f" (at {known.time:.1f} s)" if abs(known.time - session.time) > 0.05 else ""
@@ -37,19 +37,19 @@ def facts(desk: Presenter, frames: float, steps: float, filmed: float | None) ->
     speed, rate = speed_words(session.clock.speed), f"{frames:.0f} fps"
     if session.playing and session.clock.behind:
         speed += f", really {steps * session.scenario.dt:.1f}×"
-    rest = [cursor_words(desk), speed, f"{steps:.0f} steps/s"]
+    rest = [cursor_words(viewer), speed, f"{steps:.0f} steps/s"]
     said += [rate, *rest] if frames < _SLOW else [*rest, rate]  # the first thing to know if it is low
     return [each for each in said if each]
 
 
-def cursor_words(desk: Presenter) -> str:
+def cursor_words(viewer: Presenter) -> str:
     """Return where the cursor is, and what the place adds to the cost."""
-    if desk.cursor is None:
+    if viewer.cursor is None:
         return ""
-    x, y = desk.cursor
+    x, y = viewer.cursor
     words = f"({x:.2f}, {y:.2f}) m"
-    lane = desk.session.lanes[min(desk.cursor_pane, len(desk.session.lanes) - 1)]
-    known = desk.costs.known.get(lane.number)
+    pane = viewer.session.panes[min(viewer.cursor_pane, len(viewer.session.panes) - 1)]
+    known = viewer.costs.known.get(pane.number)
     if known is None:
         return words
     result = known.result
@@ -58,7 +58,7 @@ def cursor_words(desk: Presenter) -> str:
     if square[site] > (1.5 * known.lattice().spacing) ** 2:
         return f"{words}: not free"
     owner = int(result.owner[site])
-    numbers = desk.session.circumstances(lane).numbers
+    numbers = viewer.session.setup(pane).numbers
     if not 0 <= owner < len(numbers):
         return f"{words}: no robot can come"
     distance = float(result.distances[site])
@@ -66,12 +66,12 @@ def cursor_words(desk: Presenter) -> str:
     return f"{words}: {distance:.2f} m to robot {numbers[owner]}, {share:.1f} × the mean"
 
 
-def suggestion(desk: Presenter) -> str:
+def suggestion(viewer: Presenter) -> str:
     """Return what this session has not tried yet, if the present is shown and has settled; else nothing."""
-    session = desk.session
-    if not (desk.suggests and session.settled and session.live) or session.hand is not None:
+    session = viewer.session
+    if not (viewer.suggests and session.settled and session.live) or session.hand is not None:
         return ""
     tried = {node.kind for node in session.document.nodes}
-    tried |= {"pane"} if len(session.lanes) > 1 else set()
+    tried |= {"pane"} if len(session.panes) > 1 else set()
     new = [words for kind, words in _OFFERED if kind not in tried][:_AT_ONCE]
     return f"The team has settled. Try:\n{' · '.join(new)}" if new else ""

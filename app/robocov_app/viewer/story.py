@@ -36,7 +36,7 @@ from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.session.changes import Place, Restart
 from robocov_app.viewer.session.document import Document, Node
-from robocov_app.viewer.session.history import Circumstances
+from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.map_edits import with_obstacle
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from robocov_app.runs.options import FilmOptions, RunOptions
     from robocov_app.runs.recording import Frame
     from robocov_app.terminal.interruption import Interruption
-    from robocov_app.viewer.session.pane import Lane
+    from robocov_app.viewer.session.pane import Pane
 
 
 STORY = "story.json"
@@ -91,7 +91,7 @@ class Part:
 
     node: Node
     begin: int
-    setups: dict[int, Circumstances]
+    setups: dict[int, PaneSetup]
     recorders: dict[int, Recorder]
     touched: list[list[int]] = field(default_factory=list)
     scenes: list[Scene] = field(default_factory=list)
@@ -109,7 +109,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
     dt = 0.0
     for run, here in retold(document, node, end):
         dt = run.scenario.dt
-        setups = {pane.number: pane.circumstances for pane in run.panes}
+        setups = {pane.number: pane.setup for pane in run.panes}
         if not parts or parts[-1].setups != setups:
             if parts and parts[-1].node is here and here.scenario is None:
                 parts.pop()  # the touch is still going on
@@ -148,14 +148,14 @@ def records_of_part(part: Part, root: Node) -> list[Record]:
     return found
 
 
-def _recorder(pane: Lane, dt: float) -> Recorder:
-    setup = pane.circumstances
+def _recorder(pane: Pane, dt: float) -> Recorder:
+    setup = pane.setup
     return Recorder(
         with_wrecks(setup), setup.team, setup.law.made(), dt, name=setup.law.name, conditions=setup.conditions
     )
 
 
-def with_wrecks(setup: Circumstances) -> Environment:
+def with_wrecks(setup: PaneSetup) -> Environment:
     """Return the map with the robots that failed as obstacles with names."""
     environment = setup.environment
     for number, place in setup.failed.items():
@@ -164,7 +164,7 @@ def with_wrecks(setup: Circumstances) -> Environment:
     return environment
 
 
-def _session_of(part: Part, setup: Circumstances, record: Record, dt: float) -> dict[str, Any]:
+def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
     """Return what ``run.json`` says of where the record comes from; nothing where there is nothing to say."""
     said: dict[str, Any] = {}
     if part.begin:
@@ -325,9 +325,9 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
     return np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8).reshape(size[1], size[0], 3)
 
 
-def _scene(pane: Lane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
+def _scene(pane: Pane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
     """Return what a frame shows of a pane."""
-    setup, snapshot = pane.circumstances, pane.simulation.snapshot
+    setup, snapshot = pane.setup, pane.simulation.snapshot
     known = [
         (begin + time, value)
         for begin, of, history in histories

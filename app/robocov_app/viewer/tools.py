@@ -86,7 +86,7 @@ class Tool:
 
 def edited(session: Session, environment: Environment, words: str) -> str:
     """Put a new map in place; return what to tell. StartError when there is no room for a robot any more."""
-    before, radius = session.environment, session.circumstances(session.lanes[0]).team.radius
+    before, radius = session.environment, session.setup(session.panes[0]).team.radius
     gone = set(before.starts) - set(environment.starts)
     pushed = session.edit(environment, words)
     if pushed:
@@ -139,7 +139,7 @@ class Hand(Tool):
         if self.robot is None or not self._drags:
             return
         # meanwhile it may have been taken out
-        if self.robot in {*session.numbers, *session.circumstances(session.lanes[0]).failed}:
+        if self.robot in {*session.numbers, *session.setup(session.panes[0]).failed}:
             session.grab(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:
@@ -448,7 +448,7 @@ def _add(session: Session, point: Point, reach: float, number: int | None) -> st
 def _fail(session: Session, point: Point, reach: float, number: int | None) -> str | None:
     if number is None:
         return None
-    if number in session.circumstances(session.lanes[0]).failed:
+    if number in session.setup(session.panes[0]).failed:
         session.revive_robot(number)
         return f"robot {number} works again"
     session.fail_robot(number)

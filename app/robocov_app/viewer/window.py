@@ -22,7 +22,7 @@ from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart
-from robocov_app.viewer.commands import GROUPS, REPEATS, Row, desk_commands, grouped, parameter_commands
+from robocov_app.viewer.commands import GROUPS, REPEATS, Row, grouped, parameter_commands, viewer_commands
 from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
@@ -59,7 +59,7 @@ class Window(BaseWindow):
 
     def __init__(
         self,
-        desk: Presenter,
+        viewer: Presenter,
         size: tuple[int, int],
         scale: float,
         *,
@@ -67,20 +67,20 @@ class Window(BaseWindow):
         screen: pygame.Surface | None = None,
     ) -> None:
         super().__init__(size, screen)
-        self.desk, self.scale = desk, scale
+        self.viewer, self.scale = viewer, scale
         self.help = False
         self.tour: LessonPlayer | None = None
         self.film: Film | None = None
         self.keeper = RunSaver()
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
-        self.canvas = ViewerCanvas(desk, theme_named(desk.theme))
-        self.chart = Chart(desk)
+        self.canvas = ViewerCanvas(viewer, theme_named(viewer.theme))
+        self.chart = Chart(viewer)
         self.dialogs = Dialogs()
-        listed = [*desk_commands(desk, self.titles), *self._own_commands()]
-        self.commands = Commands(listed, desk.attempt, lambda: parameter_commands(desk))
-        self.panel = Panel(desk, self.titles, self.commands, self.do)
-        self.pointer = Pointer(desk, self.canvas, self.chart, self.panel, self._leave_lesson)
+        listed = [*viewer_commands(viewer, self.titles), *self._own_commands()]
+        self.commands = Commands(listed, viewer.attempt, lambda: parameter_commands(viewer))
+        self.panel = Panel(viewer, self.titles, self.commands, self.do)
+        self.pointer = Pointer(viewer, self.canvas, self.chart, self.panel, self._leave_lesson)
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._reported: tuple[object, float] = None, 0.0
@@ -94,8 +94,8 @@ class Window(BaseWindow):
     def close(self) -> None:
         """End what is going on beside the window."""
         if self.film is not None:
-            self.desk.attempt(self.toggle_film)
-        self.desk.costs.close()
+            self.viewer.attempt(self.toggle_film)
+        self.viewer.costs.close()
 
     def update(self, seconds: float) -> None:
         """Let so many seconds pass, for the simulation, its cost and the panel."""
@@ -111,22 +111,22 @@ class Window(BaseWindow):
 
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
-        desk, session, tour = self.desk, self.desk.session, self.tour
+        viewer, session, tour = self.viewer, self.viewer.session, self.tour
         at_rest = session.settled and session.live and not session.environment.moves
         if (session.playing and not at_rest) or self.film is not None:
             return None
         return (
-            *(desk.version, desk.message, desk.trouble, session.time, session.serial, session.playing),
-            *(self._answers, desk.costs.state, self._arranged, self.panel.ui.stale),
+            *(viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing),
+            *(self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale),
             tour and (tour.state, tour.number, tour.progress),
         )
 
     def _pass_time(self, seconds: float) -> None:
-        desk, session = self.desk, self.desk.session
-        desk.pass_time(seconds)
-        desk.workspace.keep(desk.view)
+        viewer, session = self.viewer, self.viewer.session
+        viewer.pass_time(seconds)
+        viewer.workspace.keep(viewer.view)
         for words, trouble in self.keeper.poll():
-            desk.say(words, trouble=trouble)
+            viewer.say(words, trouble=trouble)
         if self.tour is not None:
             self.tour.advance(seconds)
             if self.tour.done:
@@ -135,56 +135,56 @@ class Window(BaseWindow):
         try:
             slices = max(round(seconds * FPS), 1) if self.resting else 1  # a long pause is many frames
             steps = sum(session.advance(seconds / slices) for _ in range(slices))
-            for lane in session.lanes:
-                session.snapshot(lane)  # what is decided belongs to the simulation, not to drawing
+            for pane in session.panes:
+                session.snapshot(pane)  # what is decided belongs to the simulation, not to drawing
         except RobocovError as error:
             steps = 0
-            desk.say(plain(str(error)), trouble=True)
+            viewer.say(plain(str(error)), trouble=True)
         if session.playing != playing:
-            desk.version += 1
+            viewer.version += 1
             if session.settled:
-                desk.say(f"settled at {session.time:.1f} s")
-            elif session.at_end_of_record and session.live and not desk.trouble:
-                desk.say("the record ends here; Space goes on from it, by simulating")
+                viewer.say(f"settled at {session.time:.1f} s")
+            elif session.at_end_of_record and session.live and not viewer.trouble:
+                viewer.say("the record ends here; Space goes on from it, by simulating")
         if seconds > 0:
             self._steps_rate += 0.1 * (steps / seconds - self._steps_rate)
-        desk.look_at_map()
+        viewer.look_at_map()
 
     def _ask_costs(self) -> None:
         """Ask for the cost of what is shown, and note the answers that tell of the present."""
-        desk, session = self.desk, self.desk.session
+        viewer, session = self.viewer, self.viewer.session
         if session.serial != self._serial:
             self._serial = session.serial
-            desk.costs.forget()
-        point = np.array(desk.cursor) if "path" in desk.shown and desk.cursor is not None else None
-        for lane in session.lanes:
-            positions, known = session.positions(lane), desk.costs.known.get(lane.number)
+            viewer.costs.forget()
+        point = np.array(viewer.cursor) if "path" in viewer.shown and viewer.cursor is not None else None
+        for pane in session.panes:
+            positions, known = session.positions(pane), viewer.costs.known.get(pane.number)
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
             if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
-                desk.costs.ask(lane.number, session.time, positions, point, speeds_of(session, lane))
-        for pane, known in desk.costs.poll():
+                viewer.costs.ask(pane.number, session.time, positions, point, speeds_of(session, pane))
+        for number, known in viewer.costs.poll():
             self._answers += 1
-            for lane in session.lanes:
-                if lane.number == pane and known.time <= lane.time + 1e-9:
-                    lane.curve.add(known.time, known.result.mean_distance)
+            for pane in session.panes:
+                if pane.number == number and known.time <= pane.time + 1e-9:
+                    pane.curve.add(known.time, known.result.mean_distance)
                     if known.travel_time is not None:
-                        lane.times.add(known.time, known.travel_time)
+                        pane.times.add(known.time, known.travel_time)
 
     def _arrange(self) -> None:
         """Lay the window out anew when its size, look or number of panes is another."""
-        desk, session = self.desk, self.desk.session
+        viewer, session = self.viewer, self.viewer.session
         size = self.screen.get_size()
-        panes = len(session.lanes)
+        panes = len(session.panes)
         rows = self.canvas.shared_rows() if panes > 1 and self._arranged else 1
         low_x, low_y, high_x, high_y = session.environment.region.bounds
         aspect = (high_x - low_x) / (high_y - low_y)
-        outer = (size, self.scale, desk.panel, desk.theme)
+        outer = (size, self.scale, viewer.panel, viewer.theme)
         key = (outer, panes, round(aspect, 3), max(rows, 1))
         if key == self._arranged:
             return
         before, self._arranged = self._arranged, key
-        theme = theme_named(desk.theme)
-        layout = laid_out(size, self.scale, panes, aspect, panel=desk.panel, legend_rows=max(rows, 1))
+        theme = theme_named(viewer.theme)
+        layout = laid_out(size, self.scale, panes, aspect, panel=viewer.panel, legend_rows=max(rows, 1))
         self.layout, self.theme = layout, theme
         self.canvas.arrange(layout, theme)
         self.chart.arrange(layout, theme)
@@ -193,13 +193,13 @@ class Window(BaseWindow):
 
     def draw(self) -> None:
         """Draw everything, and show it."""
-        layout, theme, desk = self.layout, self.theme, self.desk
+        layout, theme, viewer = self.layout, self.theme, self.viewer
         if len(layout.panes) > 1:
             self.screen.fill(theme.background, pygame.Rect(layout.arena))
         self.canvas.draw(self.screen)
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
-        line = facts(desk, self.rate, self._steps_rate, filmed)
+        line = facts(viewer, self.rate, self._steps_rate, filmed)
         draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
         if layout.panel[2] and self.tour is not None and self._lesson_shown:
             draw_tour(self.screen, layout, theme, self.tour)
@@ -208,11 +208,11 @@ class Window(BaseWindow):
         if self.tour is not None and self._lesson_shown and not layout.panel[2]:
             words = " ".join([self.tour.text, *self.tour.asks])
             draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
-        said = desk.message
+        said = viewer.message
         if not said and not self._patient and not self._lesson_shown:
-            said = suggestion(desk)
+            said = suggestion(viewer)
         draw_message(
-            self.screen, said, layout.arena, theme, layout.scale, bool(desk.message) and desk.trouble
+            self.screen, said, layout.arena, theme, layout.scale, bool(viewer.message) and viewer.trouble
         )
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
@@ -224,14 +224,14 @@ class Window(BaseWindow):
 
     def _inspect(self) -> None:
         """Let the inspector explain the robot that is asked, a few times a second while that is in sight."""
-        number, panel, session = self.desk.selected, self.panel, self.desk.session
+        number, panel, session = self.viewer.selected, self.panel, self.viewer.session
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
             return
-        shown, (before, at) = (number, session.time, session.serial, self.desk.version), self._reported
+        shown, (before, at) = (number, session.time, session.serial, self.viewer.version), self._reported
         if panel.report is None or (shown != before and self._now - at >= _ASKED_AGAIN):
             self._reported = shown, self._now
-            panel.report = report_on(self.desk, number)
+            panel.report = report_on(self.viewer, number)
 
     # doing
 
@@ -275,7 +275,7 @@ class Window(BaseWindow):
             ),
             *grouped(
                 "Keep",
-                Row("screenshot", "Screenshot", lambda: self.save_screenshot(self.desk.folder), "f12"),
+                Row("screenshot", "Screenshot", lambda: self.save_screenshot(self.viewer.folder), "f12"),
                 Row("film", "Record a film, or end it", self.toggle_film, "f9"),
                 Row("save:run", "Save the run", self._save_run, "ctrl+e"),
                 Row("open:file", "Open a session or a map", self._open_file, "ctrl+o"),
@@ -295,7 +295,7 @@ class Window(BaseWindow):
             return False
         self.tour.end()
         self.tour = None
-        self.desk.say("the lesson has ended; what was before it is there again")
+        self.viewer.say("the lesson has ended; what was before it is there again")
         return True
 
     def _middle(self) -> tuple[float, float]:
@@ -309,22 +309,22 @@ class Window(BaseWindow):
 
     def _open_palette(self) -> None:
         def told(words: str) -> None:
-            self.desk.attempt(lambda: words or None)
+            self.viewer.attempt(lambda: words or None)
             self.panel.report = None
 
         ghost = "Type a command, or  k_rep 0.5 · robots 12 · map office · speed 4"
         self.dialogs.ask(palette(self.commands, ghost, told))
 
     def _open_file(self) -> None:
-        recent = [path for name in self.desk.recent if (path := Path(name)).exists()]
+        recent = [path for name in self.viewer.recent if (path := Path(name)).exists()]
         endings = (SUFFIX, ".json")
         title = "Open a session or a map"
         self.dialogs.ask(
-            file_choice(title, self.desk.folder, self.desk.open_file, endings=endings, recent=recent)
+            file_choice(title, self.viewer.folder, self.viewer.open_file, endings=endings, recent=recent)
         )
 
     def _list_branches(self) -> None:
-        desk, session = self.desk, self.desk.session
+        viewer, session = self.viewer, self.viewer.session
         session.stow()  # the curve of the present with those of the others
 
         def lines() -> list[Option]:
@@ -334,7 +334,7 @@ class Window(BaseWindow):
                 found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
             return found
 
-        self.dialogs.ask(list_choice("Branches", lines, lambda option: desk.enter(int(str(option.value)))))
+        self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
         """Ask who is here for the first time whether to begin with the lesson."""
@@ -353,7 +353,7 @@ class Window(BaseWindow):
 
     def _start_tour(self) -> None:
         if self.tour is None:
-            self.tour = LessonPlayer(self.desk, self.canvas.fit, alone=self._patient)
+            self.tour = LessonPlayer(self.viewer, self.canvas.fit, alone=self._patient)
         elif self.tour.state == "left":
             self.tour.come_back()
         else:
@@ -361,7 +361,7 @@ class Window(BaseWindow):
 
     def start_lesson(self, path: Path) -> None:
         """Play a lesson of a file; MapError as `load_lesson`."""
-        self.tour = LessonPlayer(self.desk, self.canvas.fit, load_lesson(path), alone=self._patient)
+        self.tour = LessonPlayer(self.viewer, self.canvas.fit, load_lesson(path), alone=self._patient)
 
     @property
     def _lesson_shown(self) -> bool:
@@ -377,17 +377,17 @@ class Window(BaseWindow):
             self.tour.leave()
 
     def _save_run(self) -> str:
-        return self.keeper.save(self.desk.session, self.desk.folder, self.desk.map_name)
+        return self.keeper.save(self.viewer.session, self.viewer.folder, self.viewer.map_name)
 
     def toggle_film(self) -> str:
         """Begin to record what is in the window, or end it."""
         if self.film is None:
-            target = free_name(self.desk.folder, "robocov", ".mp4")
+            target = free_name(self.viewer.folder, "robocov", ".mp4")
             self.film = Film(target, self.screen.get_size(), patient=self._patient)
-            self.desk.filming = True
+            self.viewer.filming = True
             return f"recording {target}; F9 ends it"
         film, self.film = self.film, None
-        self.desk.filming = False
+        self.viewer.filming = False
         film.close()
         left_out = f", {film.left_out} frames left out" if film.left_out else ""
         return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
@@ -406,7 +406,7 @@ class Window(BaseWindow):
             return
         elif event.type == pygame.DROPFILE:
             path = Path(event.file)
-            self.desk.attempt(lambda: self.desk.open_file(path))
+            self.viewer.attempt(lambda: self.viewer.open_file(path))
         elif event.type == pygame.KEYDOWN and self._asked() and event.unicode in "1234" and event.unicode:
             assert self.tour is not None
             self.tour.reply(int(event.unicode))

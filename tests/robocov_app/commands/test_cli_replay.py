@@ -151,7 +151,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
     def run(window: Window) -> None:
         for _ in range(10):
             window.frame(1 / 30)
-        sessions.append(window.desk.session)
+        sessions.append(window.viewer.session)
         window.close()
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
@@ -164,15 +164,15 @@ def test_the_window_shows_a_run(run: Path, shown: list[Session]) -> None:
     assert main(["replay", str(run), "--size", "900x600", "--theme", "dark", "--hide", "cells"]) == 0
     (session,) = shown
     assert 0.0 < session.time < session.end == 1.0
-    assert len(session.lanes[0].curve) == 11
+    assert len(session.panes[0].curve) == 11
 
 
 def test_the_window_shows_a_comparison(both: Path, shown: list[Session]) -> None:
     assert main(["replay", str(both), "--size", "900x600"]) == 0
     (session,) = shown
-    assert [lane.law.name for lane in session.lanes] == ["rpf", "lloyd"]
+    assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
     assert session.numbers == (2, 3)
-    assert len(session.lanes[1].curve) == 11
+    assert len(session.panes[1].curve) == 11
 
 
 @pytest.mark.skipif("sys.platform != 'linux'", reason="elsewhere there is always one")

@@ -17,7 +17,7 @@ from robocov_app.replication.contenders import Contender
 from robocov_app.replication.outcomes import read_outcomes
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study_file import read_study
-from robocov_app.viewer.session.replayed import LostLaw
+from robocov_app.viewer.session.recorded import LostController
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -91,7 +91,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> list[Session]:
         for deed in ("live", "step", "restart", "first", "branch:here", "more", "save:run"):
             window.do(deed)
             window.frame(1 / 30)
-        sessions.append(window.desk.session)
+        sessions.append(window.viewer.session)
         window.close()
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
@@ -130,7 +130,7 @@ def test_no_command_runs_the_code_of_results(
     assert not (shared / "marker").exists()
     assert status == 0 or words[0] == "sweep"  # which may not take over a folder of another study
     for session in windows:
-        lost = [isinstance(lane.law, LostLaw) for lane in session.lanes]
+        lost = [isinstance(pane.law, LostController) for pane in session.panes]
         assert lost == ([False, True, True] if words[1] == "both" else [True])
 
 
@@ -160,7 +160,7 @@ def test_who_opens_a_run_may_load_its_controller(
     name = controller(tmp_path, "", "safe.py")
     assert main(["replay", str(shared / "run"), "--controller", name]) == 0
     (session,) = windows
-    assert session.lanes[0].law.name == name
+    assert session.panes[0].law.name == name
     assert session.live and session.end == 0.0, "it has begun anew"
     assert not (shared / "marker").exists()
     capsys.readouterr()

@@ -79,8 +79,8 @@ def test_every_action_of_the_menus_is_one(hands: Hands) -> None:
         Selection(vertices=frozenset({Vertex(3, 0, 0)})),
         Selection(vertices=vertex | {Vertex(0, 0, 2)}),
     ):
-        hands.desk.select(selection)
-        names = offered(hands.desk)
+        hands.editor.select(selection)
+        names = offered(hands.editor)
         assert {name for name in names if name} <= known
         assert names[0] and names[-1] and all(a or b for a, b in pairwise(names))
 
@@ -131,11 +131,11 @@ def test_walls_are_joined_split_and_extended(hands: Hands) -> None:
     (joined,) = [shape for shape in hands.shapes if isinstance(shape, WallObstacle)]
     assert joined.points == ((1, 8), (3, 8), (3, 9))
     key = next(item.key for item in hands.sketch.obstacles if item.shape is joined)
-    hands.desk.select(Selection(vertices=frozenset({Vertex(key, 0, 1)})))
+    hands.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 1)})))
     hands.key("shift+c")
     assert sum(isinstance(shape, WallObstacle) for shape in hands.shapes) == 2
     hands.key("ctrl+z")
-    hands.desk.select(Selection(vertices=frozenset({Vertex(key, 0, 2)})))
+    hands.editor.select(Selection(vertices=frozenset({Vertex(key, 0, 2)})))
     hands.go((5, 9))
     hands.key("shift+w")
     assert next(s for s in hands.shapes if isinstance(s, WallObstacle)).points[-1] == (5, 9)
@@ -149,15 +149,15 @@ def test_copies_go_through_the_clipboard_also_to_another_window(hands: Hands, tm
     assert len(hands.shapes) == 7
     hands.key("ctrl+x")
     assert len(hands.shapes) == 5
-    text = hands.desk.pasteboard.get()
+    text = hands.editor.pasteboard.get()
     with opened_editor(tmp_path) as other:
-        other.desk.pasteboard.put(text)
+        other.editor.pasteboard.put(text)
         other.key("ctrl+shift+v")
         assert len(other.shapes) == 2
-        other.desk.pasteboard.put("no map at all")
+        other.editor.pasteboard.put("no map at all")
         other.key("ctrl+v")
-        assert other.desk.trouble and len(other.shapes) == 2
-        other.desk.pasteboard.put("")
+        assert other.editor.trouble and len(other.shapes) == 2
+        other.editor.pasteboard.put("")
         other.key("ctrl+v")
         assert "empty" in other.said
 
@@ -169,7 +169,7 @@ def test_deleting_and_duplicating(hands: Hands) -> None:
     hands.key("delete")
     assert len(hands.shapes) == 5
     hands.key("delete")
-    assert hands.desk.trouble and "nothing is selected" in hands.said
+    assert hands.editor.trouble and "nothing is selected" in hands.said
     hands.key("ctrl+a")
     hands.key("backspace")
     assert hands.shapes == []
@@ -179,10 +179,10 @@ def test_tab_goes_round_all_things(hands: Hands) -> None:
     seen = []
     for _ in range(7):
         hands.key("tab")
-        seen.append(next(iter(hands.desk.selection.owners)))
+        seen.append(next(iter(hands.editor.selection.owners)))
     assert seen == [0, 1, 2, 3, 4, BOUNDARY, 0]
     hands.key("shift+tab")
-    assert hands.desk.selection.owners == {BOUNDARY}
+    assert hands.editor.selection.owners == {BOUNDARY}
 
 
 def test_an_obstacle_becomes_the_boundary_and_back(hands: Hands) -> None:
@@ -194,11 +194,11 @@ def test_an_obstacle_becomes_the_boundary_and_back(hands: Hands) -> None:
 def test_starts_are_chosen_and_ordered(tmp_path: Path) -> None:
     starts = (("one", DiscStart((2, 2), 1.0)), ("two", DiscStart((7, 7), 1.0)))
     with opened_editor(tmp_path, sheet(starts=starts)) as hands:
-        assert hands.desk.start_name == "one"
+        assert hands.editor.start_name == "one"
         hands.key("shift+n")
-        assert hands.desk.start_name == "two" and hands.desk.selection == Selection.of("two")
+        assert hands.editor.start_name == "two" and hands.editor.selection == Selection.of("two")
         hands.key("shift+d")
-        assert hands.desk.start_names == ["two", "one"]
+        assert hands.editor.start_names == ["two", "one"]
     with opened_editor(tmp_path, sheet()) as hands:
         hands.key("shift+n")
         assert "no start yet" in hands.said
@@ -242,19 +242,19 @@ def test_typed_commands_name_note_array_and_set(hands: Hands) -> None:
     assert hands.shapes[3].width == 0.3
     for text in ("grid 0.25", "angle 30", "radius 20cm", "robots 9", "seed 4", "wall 0.2"):
         hands.command(text)
-    desk = hands.desk
-    assert (desk.grid, desk.snap_angle, desk.radius, desk.robots) == (0.25, 30.0, 0.2, 9)
-    assert (desk.seed, desk.wall_width) == (4, 0.2)
+    editor = hands.editor
+    assert (editor.grid, editor.snap_angle, editor.radius, editor.robots) == (0.25, 30.0, 0.2, 9)
+    assert (editor.seed, editor.wall_width) == (4, 0.2)
 
 
 def test_commands_that_take_a_value_are_found_by_typing(hands: Hands) -> None:
     for word in TYPED:
         assert f"{word} " in [offer.fills for offer in hands.window.commands.offered(word)]
-    assert {command.name for command in typed_commands(hands.desk)} == set(TYPED)
+    assert {command.name for command in typed_commands(hands.editor)} == set(TYPED)
 
 
 def palette(hands: Hands) -> Choice:
-    asked = hands.desk.asked
+    asked = hands.editor.asked
     assert isinstance(asked, Choice)
     return asked
 
@@ -268,12 +268,12 @@ def test_a_command_chosen_from_the_palette_waits_for_its_value(tmp_path: Path) -
 
 
 def test_a_problem_is_mended_by_the_button_beside_it(hands: Hands) -> None:
-    hands.desk.change(create.drawn(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
+    hands.editor.change(create.drawn(hands.sketch, CircleObstacle((30.0, 5.0), 1.0, "lamp")))
     hands.settle()
     hands.key("ctrl+tab", times=3)
     hands.frames(3)
     hands.click(*hands.widget("option", "problem:0").rect.center)
-    assert hands.desk.problem is not None and hands.desk.problem.kind == "outside"
+    assert hands.editor.problem is not None and hands.editor.problem.kind == "outside"
     hands.wait()
     hands.push("mend:0")
     assert hands.said == "circle “lamp” deleted"

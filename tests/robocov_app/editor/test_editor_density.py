@@ -171,12 +171,12 @@ def test_with_the_mouse_and_by_typing(tmp_path):
         assert len(density_edits.features_of(hands.sketch)) == 2
         hands.wait()
         hands.click_at((6.0, 5.0))
-        assert hands.desk.tool.chosen == 0
+        assert hands.editor.tool.chosen == 0
         hands.key("escape")
-        assert hands.desk.tool.chosen is None and hands.desk.tool.preview(hands.desk).rings
+        assert hands.editor.tool.chosen is None and hands.editor.tool.preview(hands.editor).rings
         hands.command("floor 0.2")
         hands.command("weight 3")
-        assert hands.sketch.density.floor == 0.2 and hands.desk.tool.weight == 3.0
+        assert hands.sketch.density.floor == 0.2 and hands.editor.tool.weight == 3.0
         assert density_edits.density_label(hands.sketch.density) == "2 hot spots, floor 0.2"
         hands.command("density none")
         assert hands.sketch.density is None
@@ -191,10 +191,10 @@ def test_a_stroke_that_is_given_up_leaves_nothing(tmp_path):
         hands.key("d")
         hands.press(*hands.pixel((3, 3)))
         hands.move(*hands.pixel((5, 3)), held=1)
-        assert hands.desk.tool.change is not None
+        assert hands.editor.tool.change is not None
         hands.key("escape")
         hands.release()
-        assert hands.sketch.density is None and not hands.desk.document.history.past
+        assert hands.sketch.density is None and not hands.editor.document.history.past
 
 
 AREA = ((2.0, 2.0), (6.0, 2.0), (6.0, 6.0), (2.0, 6.0))
@@ -246,7 +246,7 @@ class TestAreas:
             hands.key("d")
             first = hands.sketch.density.areas[0]
             hands.click_at((5.5, 2.0))
-            assert hands.desk.tool.chosen == 0
+            assert hands.editor.tool.chosen == 0
             hands.type("6")
             hands.key("return")
             assert hands.sketch.density.areas[0].weight == 6.0

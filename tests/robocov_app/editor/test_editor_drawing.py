@@ -46,16 +46,16 @@ def test_escape_gives_up_and_backspace_takes_a_point_back(hands: Hands) -> None:
     assert hands.shapes == [PolygonObstacle(((2, 2), (4, 2), (4, 4)))]
     hands.click_all((6, 6), (7, 7))
     hands.key("escape")
-    assert len(hands.shapes) == 1 and not hands.desk.tool.busy and hands.desk.tool.name == "polygon"
+    assert len(hands.shapes) == 1 and not hands.editor.tool.busy and hands.editor.tool.name == "polygon"
     hands.key("escape")
-    assert hands.desk.tool.name == "select"
+    assert hands.editor.tool.name == "select"
 
 
 def test_too_few_points_are_told(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((2, 2), (4, 2))
     hands.key("return")
-    assert hands.desk.trouble and "2 of at least 3 points" in hands.said and not hands.shapes
+    assert hands.editor.trouble and "2 of at least 3 points" in hands.said and not hands.shapes
 
 
 def test_a_wall_takes_typed_lengths_and_coordinates(hands: Hands) -> None:
@@ -63,7 +63,7 @@ def test_a_wall_takes_typed_lengths_and_coordinates(hands: Hands) -> None:
     hands.click_all((1, 1))
     hands.go((1, 4))
     hands.type("2.5")
-    assert hands.desk.typed == "2.5"
+    assert hands.editor.typed == "2.5"
     hands.key("return")
     hands.type("@2<0")
     hands.key("return")
@@ -80,13 +80,13 @@ def test_what_is_typed_can_be_corrected_given_up_and_wrong(hands: Hands) -> None
     hands.type("29")
     hands.key("backspace")
     hands.key("return")
-    assert hands.desk.tool.points == [(1.0, 1.0), (1.0, 3.0)]
+    assert hands.editor.tool.points == [(1.0, 1.0), (1.0, 3.0)]
     hands.type("7")
     hands.key("escape")
-    assert hands.desk.typed == "" and hands.desk.tool.busy
+    assert hands.editor.typed == "" and hands.editor.tool.busy
     hands.type("1..2")
     hands.key("return")
-    assert hands.desk.trouble and len(hands.desk.tool.points) == 2
+    assert hands.editor.trouble and len(hands.editor.tool.points) == 2
 
 
 def test_the_width_of_walls_is_changed_by_brackets(hands: Hands) -> None:
@@ -182,7 +182,7 @@ def test_a_corner_that_is_typed_while_the_mouse_drags_ends_the_drag(hands: Hands
     hands.key("return")
     hands.frames(1)
     hands.release()
-    assert hands.desk.tool.points == [(1, 1), (9, 2)]
+    assert hands.editor.tool.points == [(1, 1), (9, 2)]
 
 
 def test_a_wall_is_one_drag_or_several_clicks(hands: Hands) -> None:
@@ -195,7 +195,7 @@ def test_a_wall_is_one_drag_or_several_clicks(hands: Hands) -> None:
     hands.press(*hands.pixel((6, 6)))
     hands.move(*(part + 5 for part in hands.pixel((6, 6))), held=1)
     hands.release()  # a hand that shakes has drawn no wall
-    assert len(hands.shapes) == 2 and len(hands.desk.tool.points) == 1
+    assert len(hands.shapes) == 2 and len(hands.editor.tool.points) == 1
 
 
 def test_doors_are_opened_by_a_click_and_by_dragging(hands: Hands) -> None:
@@ -214,7 +214,7 @@ def test_doors_are_opened_by_a_click_and_by_dragging(hands: Hands) -> None:
     assert [wall.points for wall in hands.shapes][2:] == [((6.6, 2), (7, 2)), ((8, 2), (9, 2))]
     hands.wait()
     hands.click_at((5, 8))
-    assert hands.desk.trouble and "in walls" in hands.said
+    assert hands.editor.trouble and "in walls" in hands.said
 
 
 def test_starts_are_discs_places_and_anywhere(hands: Hands) -> None:
@@ -234,14 +234,14 @@ def test_measuring_tells_and_changes_nothing(hands: Hands) -> None:
     before = hands.sketch
     hands.key("m")
     hands.drag_at((1, 1), (3, 3), (4, 5))
-    preview = hands.desk.tool.preview(hands.desk)
+    preview = hands.editor.tool.preview(hands.editor)
     assert preview.line == ((1, 1), (4, 5)) and "5.00 m" in preview.words
     assert "Δx 3.00  Δy 4.00" in preview.words
     hands.click_all((1, 1), (4, 1), (4, 5))
     hands.key("return")
-    assert "7.00 m in all" in hands.desk.tool.preview(hands.desk).words
+    assert "7.00 m in all" in hands.editor.tool.preview(hands.editor).words
     hands.key("escape")
-    assert hands.desk.tool.preview(hands.desk) is None and hands.sketch is before
+    assert hands.editor.tool.preview(hands.editor) is None and hands.sketch is before
 
 
 def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp
     hands.settle()
     laid = hands.sketch.background
     assert laid is not None and laid.pixels == (200, 100) and laid.scale == pytest.approx(10 / 200)
-    assert hands.desk.tool.name == "picture"
+    assert hands.editor.tool.name == "picture"
     hands.click_all((2, 2), (4, 2))
     hands.type("4")
     hands.key("return")
@@ -270,4 +270,4 @@ def test_a_picture_gets_its_scale_from_two_points_and_a_length(hands: Hands, tmp
 def test_two_points_for_a_picture_that_is_not_there(hands: Hands) -> None:
     hands.key("i")
     hands.click_all((2, 2))
-    assert hands.desk.trouble and "no picture" in hands.said
+    assert hands.editor.trouble and "no picture" in hands.said

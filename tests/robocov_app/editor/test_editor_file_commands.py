@@ -21,7 +21,7 @@ from robocov_app.editor.model.autosave import recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.launch import EditorOpening, offer
+from robocov_app.editor.ui.launch import EditorLauncher, offer
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER
@@ -34,20 +34,20 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 
 def asked(hands: Hands) -> str:
-    return hands.desk.asked.title if hands.desk.asked is not None else ""
+    return hands.editor.asked.title if hands.editor.asked is not None else ""
 
 
 def test_saving_asks_for_a_name_once(hands: Hands, tmp_path: Path) -> None:
     hands.key("ctrl+s")
-    assert asked(hands) == "Save as" and hands.desk.asked.text == "untitled.json"
+    assert asked(hands) == "Save as" and hands.editor.asked.text == "untitled.json"
     hands.key("ctrl+a")
     hands.type("plan")
     hands.key("return")
-    assert hands.desk.asked is None and load_map(tmp_path / "plan.json").obstacles
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    assert hands.editor.asked is None and load_map(tmp_path / "plan.json").obstacles
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
-    assert hands.desk.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
-    assert hands.desk.recent == [str(tmp_path / "plan.json")]
+    assert hands.editor.asked is None and len(load_map(tmp_path / "plan.json").obstacles) == 2
+    assert hands.editor.recent == [str(tmp_path / "plan.json")]
 
 
 def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path: Path) -> None:
@@ -68,7 +68,7 @@ def test_another_file_is_only_replaced_when_that_is_said(hands: Hands, tmp_path:
 
 
 def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.editor.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.window.frame(0.0)
     hands.key("ctrl+s")
     hands.key("return")
@@ -77,16 +77,16 @@ def test_a_draft_is_saved_and_called_one(hands: Hands, tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_not_there_is_told_and_nothing_lost(hands: Hands) -> None:
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+s")
     hands.key("ctrl+a")
     hands.type("nowhere/plan.json")
     hands.key("return")
-    assert "nowhere" in hands.refused() and hands.desk.document.unsaved
+    assert "nowhere" in hands.refused() and hands.editor.document.unsaved
 
 
 def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     assert asked(hands) == "Save the changes?"
     hands.key("escape")
@@ -101,18 +101,18 @@ def test_leaving_unsaved_work_asks_to_save_discard_or_stay(hands: Hands, tmp_pat
 
 
 def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path: Path) -> None:
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.key("d")
-    assert hands.shapes == [] and hands.desk.document.title == "Untitled"
+    assert hands.shapes == [] and hands.editor.document.title == "Untitled"
     assert recoverable(tmp_path / "drafts") == ()
 
 
 def test_answers_are_clicked_too(hands: Hands) -> None:
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+n")
     hands.answer("Cancel")
-    assert hands.desk.asked is None and len(hands.shapes) == 2
+    assert hands.editor.asked is None and len(hands.shapes) == 2
     hands.key("ctrl+n")
     hands.answer("Discard")
     assert hands.shapes == []
@@ -121,16 +121,16 @@ def test_answers_are_clicked_too(hands: Hands) -> None:
 def test_opening_a_map_a_bundled_one_and_something_else(hands: Hands, tmp_path: Path) -> None:
     save_map(load_map("l-shape"), tmp_path / "ell.json")
     hands.key("ctrl+o")
-    assert isinstance(hands.desk.asked, Choice)
+    assert isinstance(hands.editor.asked, Choice)
     hands.type("ell")
     hands.key("tab")
     hands.key("return")
-    assert hands.desk.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
+    assert hands.editor.document.path == tmp_path / "ell.json" and "opened: ell.json" in hands.said
     hands.key("ctrl+shift+o")
-    assert isinstance(hands.desk.asked, Choice)
+    assert isinstance(hands.editor.asked, Choice)
     hands.type("rooms")
     hands.key("return")
-    assert hands.desk.document.path is None and len(hands.shapes) == 18
+    assert hands.editor.document.path is None and len(hands.shapes) == 18
     hands.key("ctrl+o")
     hands.type("missing.txt")
     hands.key("return")
@@ -153,14 +153,14 @@ def test_a_file_that_changed_can_be_reloaded_or_kept(hands: Hands, tmp_path: Pat
     hands.window.frame(2.0)
     assert asked(hands) == "The file has changed"
     hands.key("r")
-    assert hands.shapes == [] and not hands.desk.document.unsaved
+    assert hands.shapes == [] and not hands.editor.document.unsaved
     hands.key("ctrl+z")
     assert len(hands.shapes) == 1
     touched(path, json.dumps({**document, "name": "Again"}))
     hands.window.frame(2.0)
     hands.window.frame(2.0)
     hands.key("k")
-    assert len(hands.shapes) == 1 and hands.desk.document.unsaved
+    assert len(hands.shapes) == 1 and hands.editor.document.unsaved
     hands.key("ctrl+s")
     assert len(load_map(path).obstacles) == 1
     path.unlink()
@@ -190,11 +190,11 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands: Hands, tmp_path: Path
 ) -> None:
     hands.key("ctrl+e")
-    assert hands.desk.asked.text == "untitled.svg"
+    assert hands.editor.asked.text == "untitled.svg"
     hands.key("return")
     first = (tmp_path / "untitled.svg").read_text()
-    assert "<svg" in first and "exported" in hands.said and hands.desk.document.path is None
-    hands.desk.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
+    assert "<svg" in first and "exported" in hands.said and hands.editor.document.path is None
+    hands.editor.change(create.circle_drawn(hands.sketch, (2, 2), 0.5))
     hands.key("ctrl+e")
     hands.key("return")
     assert asked(hands) == "Replace the file?" and (tmp_path / "untitled.svg").read_text() == first
@@ -205,9 +205,9 @@ def test_a_map_is_exported_by_its_suffix_and_nothing_is_replaced_unasked(
     hands.type("plan.xyz")
     hands.key("return")
     assert "unknown format" in hands.refused()
-    hands.desk.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
+    hands.editor.change(create.polygon_drawn(hands.sketch, ((2, 2), (4, 4), (4, 2), (2, 4))))
     hands.key("ctrl+e")
-    assert hands.desk.trouble and hands.desk.asked is None
+    assert hands.editor.trouble and hands.editor.asked is None
 
 
 def test_a_map_is_never_saved_under_another_formats_suffix(hands: Hands, tmp_path: Path) -> None:
@@ -229,40 +229,40 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def opening(folder: Path, path: Path | None = None, **more: object) -> EditorOpening:
-    return EditorOpening(path, folder, size=(900, 600), scale=1.0, **more)
+def opening(folder: Path, path: Path | None = None, **more: object) -> EditorLauncher:
+    return EditorLauncher(path, folder, size=(900, 600), scale=1.0, **more)
 
 
 def test_settings_are_remembered(places: Path) -> None:
     with opening(places).window() as window:
-        window.desk.theme = "dark"
-        window.desk.attempt(lambda: run_typed(window.desk, "grid 0.25"))
-        window.desk.snaps.discard("edges")
+        window.editor.theme = "dark"
+        window.editor.attempt(lambda: run_typed(window.editor, "grid 0.25"))
+        window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")
         window.documents.leaving = True
     with opening(places).window() as window:
-        desk = window.desk
-        assert (desk.theme, desk.grid, window.panel.tab) == ("dark", 0.25, "snap")
-        assert "edges" not in desk.snaps and desk.recent == [str(places / "x.json")]
+        editor = window.editor
+        assert (editor.theme, editor.grid, window.panel.tab) == ("dark", 0.25, "snap")
+        assert "edges" not in editor.snaps and editor.recent == [str(places / "x.json")]
 
 
 def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
     with opening(places, theme="dark").window() as window:
-        assert window.desk.theme == "dark"
+        assert window.editor.theme == "dark"
         window.documents.leaving = True
     with opening(places).window() as window:
-        assert window.desk.theme == "light"
+        assert window.editor.theme == "light"
         window.documents.leaving = True
 
 
 def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places: Path) -> None:
     Image.new("RGB", (40, 30)).save(places / "plan.png")
     with opening(places).window() as window:
-        window.desk.shown.discard("picture")
+        window.editor.shown.discard("picture")
         window.documents.leaving = True
     with opening(places, background=places / "plan.png").window() as window:
-        assert "picture" in window.desk.shown and window.desk.sketch.background is not None
+        assert "picture" in window.editor.shown and window.editor.sketch.background is not None
 
 
 def test_recent_files_are_found_from_every_folder(
@@ -270,7 +270,7 @@ def test_recent_files_are_found_from_every_folder(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     hands.window.documents.remember(Path("x.json"))
-    assert hands.desk.recent == [str(tmp_path / "x.json")]
+    assert hands.editor.recent == [str(tmp_path / "x.json")]
 
 
 def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> None:
@@ -280,12 +280,12 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     lost.flush()
     lost.close(discard=False)
     with opening(places).window() as window:
-        assert isinstance(window.desk.asked, Question) and "Recover" in window.desk.asked.title
+        assert isinstance(window.editor.asked, Question) and "Recover" in window.editor.asked.title
         Hands(window).key("r")
-        assert len(window.desk.sketch.obstacles) == 1 and window.desk.document.unsaved
+        assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.unsaved
     # the window went without a decision: it is offered again
     with opening(places).window() as window:
-        assert window.desk.asked is not None
+        assert window.editor.asked is not None
         Hands(window).key("l")
         offer(window, recoverable(places / "drafts"))
         Hands(window).key("d")
@@ -303,16 +303,16 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
     ):
         pass
     with opening(places).window() as window:
-        window.desk.attempt(lambda: window.documents.open(places / "plan.json"))
-        assert window.desk.trouble and "another editor" in window.desk.message
+        window.editor.attempt(lambda: window.documents.open(places / "plan.json"))
+        assert window.editor.trouble and "another editor" in window.editor.message
         window.documents.leaving = True
     document.close(discard=True)
 
 
 def test_a_new_name_is_a_new_map(places: Path) -> None:
     with opening(places, places / "fresh.json").window() as window:
-        assert window.desk.document.title == "fresh.json" and not window.desk.document.unsaved
-        window.desk.attempt(window.documents.save)
+        assert window.editor.document.title == "fresh.json" and not window.editor.document.unsaved
+        window.editor.attempt(window.documents.save)
         window.documents.leaving = True
     assert load_map(places / "fresh.json").area == 100.0
 
@@ -364,14 +364,14 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
     with opening(places, places / "flat.json").window() as window:
-        asked = window.desk.asked
+        asked = window.editor.asked
         assert isinstance(asked, ImportDialog) and asked.path.name == "flat.json"
         asked.accepted = True
         end = time.monotonic() + 60.0
-        while window.desk.asked is not None and time.monotonic() < end:
+        while window.editor.asked is not None and time.monotonic() < end:
             window.frame(0.01)
-        assert window.desk.document.path is None and window.desk.document.unsaved
-        assert window.desk.sketch.environment().free_area == 12.0
+        assert window.editor.document.path is None and window.editor.document.unsaved
+        assert window.editor.sketch.environment().free_area == 12.0
         window.documents.leaving = True
 
 
@@ -395,15 +395,15 @@ def test_a_draft_is_not_saved_over_a_valid_map_unasked(hands: Hands, tmp_path: P
     hands.key("ctrl+s")
     hands.key("return")
     (path,) = tmp_path.glob("*.json")
-    hands.desk.change(create.boundary_drawn(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
+    hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (5, 5), (5, 0), (0, 5)]))
     hands.key("ctrl+s")
-    assert hands.desk.asked is not None and "valid map" in hands.desk.asked.words
+    assert hands.editor.asked is not None and "valid map" in hands.editor.asked.words
     hands.key("c")
     load_map(path)
     hands.key("ctrl+s")
     hands.key("r")
     with pytest.raises(MapError):
         load_map(path)
-    hands.desk.change(create.boundary_drawn(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
+    hands.editor.change(create.boundary_drawn(hands.sketch, [(0, 0), (6, 6), (6, 0), (0, 6)]))
     hands.key("ctrl+s")
-    assert hands.desk.asked is None and not hands.desk.document.unsaved
+    assert hands.editor.asked is None and not hands.editor.document.unsaved

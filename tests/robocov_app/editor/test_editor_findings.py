@@ -26,7 +26,7 @@ def near(picture: np.ndarray, at: tuple[float, float], colour: tuple[int, int, i
 
 
 def without_message(hands: Hands) -> np.ndarray:
-    hands.desk.message = ""
+    hands.editor.message = ""
     hands.move(5, 590)
     hands.window.frame(0.0)
     return hands.picture()
@@ -36,7 +36,7 @@ def without_message(hands: Hands) -> np.ndarray:
 def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Path, theme: str) -> None:
     red = (LIGHT if theme == "light" else DARK).trajectory
     with opened_editor(tmp_path, sheet(*NARROW), theme=theme) as hands:
-        measurement = hands.desk.measurement
+        measurement = hands.editor.measurement
         assert measurement.gap.width == pytest.approx(0.15) and not measurement.impassable.is_empty
         at = hands.pixel((4.975, 5))
         assert near(without_message(hands), at, red, 6) > 15
@@ -50,8 +50,8 @@ def test_a_passage_that_is_too_narrow_is_hatched_and_its_gap_marked(tmp_path: Pa
 def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(WallObstacle(((0, 5), (10, 5)), 0.1))) as hands:
         hands.turn("map")
-        assert len(hands.desk.measurement.components) == 2
-        assert not hands.desk.measurement.sealed.is_empty
+        assert len(hands.editor.measurement.components) == 2
+        assert not hands.editor.measurement.sealed.is_empty
         words = [entry.text for entry in hands.window.arena.strips._entries]
         assert "cut off" in words
 
@@ -59,7 +59,7 @@ def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
 def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: Path) -> None:
     outside = CircleObstacle((30, 30), 1.0)
     with opened_editor(tmp_path, sheet(CROSSED, outside)) as hands:
-        problems = hands.desk.problems
+        problems = hands.editor.problems
         assert problems[0].grave and "cross" in problems[0].words
         hands.window.arena.fit()
         hands.frames(1)
@@ -68,27 +68,27 @@ def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: P
         at = x, y - STEM
         assert near(without_message(hands), at, LIGHT.trajectory, 6) > 40
         hands.click(*at)
-        assert hands.desk.problem is problems[0] and hands.said == problems[0].words
+        assert hands.editor.problem is problems[0] and hands.said == problems[0].words
         hands.turn("problems")
         hands.window.arena.zoom(8.0, (100.0, 100.0))
         hands.click(*hands.widget("option", f"problem:{len(problems) - 1}").rect.center)
-        assert hands.desk.problem is problems[-1]
+        assert hands.editor.problem is problems[-1]
         where = problems[-1].where.representative_point()
         assert hands.window.arena.over(hands.pixel((where.x, where.y)))
 
 
 def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(CROSSED)) as hands:
-        assert map_words(hands.desk).endswith("draft: 1 problem")
+        assert map_words(hands.editor).endswith("draft: 1 problem")
         hands.key("ctrl+a")
         hands.key("delete")
-        assert map_words(hands.desk).startswith("● Untitled   ·   0 obstacles")
+        assert map_words(hands.editor).startswith("● Untitled   ·   0 obstacles")
 
 
 def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
     with opened_editor(tmp_path, Sketch()) as hands:
-        assert "no boundary" in hands.desk.problems[0].words or hands.desk.problems[0].grave
-        for tool in hands.desk.tools:
+        assert "no boundary" in hands.editor.problems[0].words or hands.editor.problems[0].grave
+        for tool in hands.editor.tools:
             hands.window.do(f"tool:{tool}")
             hands.click_all((2, 2), (4, 2), (4, 4))
             hands.key("escape", times=3)
@@ -119,7 +119,7 @@ def test_lengths_stand_beside_the_cursor_and_what_is_typed_below_it(tmp_path: Pa
         x, y = (round(value) for value in hands.pixel((6, 5)))
         assert np.abs(after - before)[y + 10 : y + 45, x + 10 : x + 100].max() > 60
         # guides: an angle of 90° from the last corner
-        assert any(guide.kind == "angle" for guide in hands.desk.tool.guides)
+        assert any(guide.kind == "angle" for guide in hands.editor.tool.guides)
 
 
 def await_that(hands: Hands, seen: Callable[[], bool]) -> None:
@@ -144,12 +144,12 @@ def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> Non
 
 def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(CircleObstacle((5, 5), 1.0))) as hands:
-        assert not hands.desk.problems
+        assert not hands.editor.problems
         hands.press(*hands.pixel((5, 5)))
         hands.go((8, 5), (11.5, 5), held=1)
         hands.frames(2)
-        assert "outside" in hands.desk.problems[0].words
+        assert "outside" in hands.editor.problems[0].words
         hands.key("escape")
         hands.release()
         hands.frames(2)
-        assert not hands.desk.problems
+        assert not hands.editor.problems

@@ -203,13 +203,13 @@ def play(name: str, seed: int, tmp_path: Path, events: int) -> None:
             if step % 50 == 0:
                 sketch = hands.sketch
                 assert parse_sketch(sketch_text(sketch), "map") == renumbered(sketch)
-                assert hands.desk.selection.within(sketch) == hands.desk.selection
+                assert hands.editor.selection.within(sketch) == hands.editor.selection
         # and back to the beginning, exactly
         pygame.event.clear()
         if hands.window.trial is not None:
             hands.window.trial.ended = True
             hands.window.frame(0.0)
-        history = hands.desk.document.history
+        history = hands.editor.document.history
         last = history.sketch
         undone = 0
         while history.undo() is not None:

@@ -126,8 +126,8 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 def shown(hands: Hands) -> tuple[ImportDialog, Any]:
     """Return the dialog, and its widgets by kind and name."""
     hands.frames(2)
-    assert isinstance(hands.desk.asked, ImportDialog)
-    return hands.desk.asked, hands.window.dialogs._ui.shown
+    assert isinstance(hands.editor.asked, ImportDialog)
+    return hands.editor.asked, hands.window.dialogs._ui.shown
 
 
 def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, plan: Path) -> None:
@@ -144,11 +144,11 @@ def test_a_click_into_the_map_keeps_that_part_and_enter_takes_it(hands: Hands, p
     hands.click(*asked.cameras[0].to_pixels(np.array((15.0, 3.0))).tolist())
     hands.key("return")
     hands.frames(2)
-    assert hands.desk.asked is None
+    assert hands.editor.asked is None
     assert (
-        hands.desk.document.unsaved
-        and hands.desk.document.path is None
-        and hands.desk.document.title == "plan"
+        hands.editor.document.unsaved
+        and hands.editor.document.path is None
+        and hands.editor.document.title == "plan"
     )
     assert hands.sketch.environment().free_area == pytest.approx(56)
     assert hands.said == "imported: plan.png, not saved yet"
@@ -176,7 +176,7 @@ def test_widgets_of_options_and_buttons(hands: Hands, plan: Path) -> None:
     assert "unknown" not in asked.given, "an option without a default can be left again"
     before = hands.sketch
     hands.click(*view["button:cancel"].rect.center)
-    assert hands.desk.asked is None and hands.sketch is before
+    assert hands.editor.asked is None and hands.sketch is before
 
 
 def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path) -> None:
@@ -184,23 +184,23 @@ def test_what_cannot_be_imported_is_told_and_not_taken(hands: Hands, plan: Path)
     asked, _ = shown(hands)
     hands.key("return")
     hands.frames(2)
-    assert hands.desk.asked is asked and "--cell" in asked.trouble
+    assert hands.editor.asked is asked and "--cell" in asked.trouble
     hands.type("0.1")
     hands.frames(2)
-    assert hands.desk.asked is asked, "an old Enter counts no more"
+    assert hands.editor.asked is asked, "an old Enter counts no more"
     hands.key("escape")
-    assert hands.desk.asked is None
+    assert hands.editor.asked is None
 
 
 def test_what_is_open_is_not_lost(hands: Hands, plan: Path) -> None:
-    hands.desk.change(titled(hands.sketch, "mine"))
+    hands.editor.change(titled(hands.sketch, "mine"))
     hands.post(pygame.DROPFILE, file=str(plan))
     hands.settle()
     shown(hands)
     hands.type("0.1")
     hands.key("return")
     hands.frames(2)
-    assert isinstance(hands.desk.asked, Question) and hands.desk.asked.title == "Save the changes?"
+    assert isinstance(hands.editor.asked, Question) and hands.editor.asked.title == "Save the changes?"
     hands.key("escape")
     assert hands.sketch.name == "mine"
 
@@ -210,7 +210,7 @@ def test_closing_the_window_leaves_it(hands: Hands, plan: Path) -> None:
     shown(hands)
     hands.post(pygame.QUIT)
     hands.settle()
-    assert hands.desk.asked is None and hands.window.closed
+    assert hands.editor.asked is None and hands.window.closed
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720)])

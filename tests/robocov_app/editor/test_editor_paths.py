@@ -100,7 +100,7 @@ def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path)
     motion_path.way_point_at(broken.path, (0.0, 0.0), 1.0)
     assert motion_path.leg_at(broken.path, (9.0, 9.0), 0.1) is None
     with opened_editor(tmp_path, sheet(broken)) as hands:
-        hands.desk.select(Selection.of(0))
+        hands.editor.select(Selection.of(0))
         hands.key("l")
         hands.key("o")
         hands.frames(3)
@@ -138,13 +138,13 @@ def test_it_is_kept_in_the_file() -> None:
 
 def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(CART, DESK)) as hands:
-        desk = hands.desk
-        desk.snaps = set()
+        editor = hands.editor
+        editor.snaps = set()
         hands.key("o")
         hands.click_all((4.0, 4.0))
-        assert "click the obstacle" in desk.message
+        assert "click the obstacle" in editor.message
         hands.click_all((2.0, 2.0), (2.1, 2.1))
-        assert desk.selection == Selection.of(0) and motion_path.moving(hands.sketch) == ()
+        assert editor.selection == Selection.of(0) and motion_path.moving(hands.sketch) == ()
         hands.click_all((6.0, 2.0), (6.0, 5.0))
         points = np.array(led(hands.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
@@ -176,10 +176,10 @@ def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
         assert motion_path.moving(hands.sketch) == (0, 1)
         assert led(hands.sketch) == ROUND
         hands.key("return")
-        assert not hands.desk.selection and hands.desk.tool.name == "path"
+        assert not hands.editor.selection and hands.editor.tool.name == "path"
         hands.click_all((6.0, 7.3))
         hands.key("escape")
-        assert hands.desk.tool is hands.desk.selector and hands.desk.selection == Selection.of(1)
+        assert hands.editor.tool is hands.editor.selector and hands.editor.selection == Selection.of(1)
         hands.key("alt+o")
         assert motion_path.moving(hands.sketch) == (0,)
 
@@ -189,41 +189,41 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
     still = sheet(CART)
     with opened_editor(tmp_path, still, theme=theme) as hands:
         hands.key("l")
-        assert "no obstacle moves" in hands.desk.message
-        hands.desk.message = ""
+        assert "no obstacle moves" in hands.editor.message
+        hands.editor.message = ""
         hands.frames(2)
         before = hands.picture()
         change = motion_path.way_point_added(hands.sketch, 0, (8.0, 2.0))
-        hands.desk.change(replace(change, selection=Selection(), words=""))
-        hands.desk.message = ""
+        hands.editor.change(replace(change, selection=Selection(), words=""))
+        hands.editor.message = ""
         hands.frames(2)
         with_path = hands.picture()
         x, y = map(round, hands.pixel((5.0, 2.0)))
         assert (with_path[y - 8 : y + 9, x - 30 : x + 30] != before[y - 8 : y + 9, x - 30 : x + 30]).any()
         hands.key("l")
-        hands.desk.message = ""
+        hands.editor.message = ""
         hands.frames(1, 4.0)
-        (shift,) = [led(hands.sketch).shift(hands.desk.now - hands.desk.moves_since)]
+        (shift,) = [led(hands.sketch).shift(hands.editor.now - hands.editor.moves_since)]
         assert shift[0] > 1.0
         x, y = map(round, hands.pixel((2.0 + float(shift[0]), 2.2)))
         assert (hands.picture()[y, x] != with_path[y, x]).any()
         hands.key("l")
-        assert hands.desk.moves_since is None
+        assert hands.editor.moves_since is None
 
 
 def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     with opened_editor(tmp_path, sheet(CART)) as hands:
-        hands.desk.change(motion_path.way_point_added(hands.sketch, 0, (8.0, 2.0)))
-        hands.desk.document.save(path)
+        hands.editor.change(motion_path.way_point_added(hands.sketch, 0, (8.0, 2.0)))
+        hands.editor.document.save(path)
     environment = load_map(path)
     assert environment.at(4.0).obstacles[0].center == pytest.approx((4.0, 2.0))
 
 
 def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING)) as hands:
-        hands.desk.select(Selection.of(0))
-        run_typed(hands.desk, "speed 0.75")
+        hands.editor.select(Selection.of(0))
+        run_typed(hands.editor, "speed 0.75")
         assert led(hands.sketch).speed == 0.75
         hands.push("tab:object")
         hands.push("path:repeat")

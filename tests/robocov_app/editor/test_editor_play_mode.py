@@ -29,18 +29,18 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         hands.key("v")
         hands.window.arena.zoom(2.0, (200.0, 200.0))
         hands.window.frame(0.0)
-        before, camera, selection = hands.sketch, hands.window.arena.camera, hands.desk.selection
+        before, camera, selection = hands.sketch, hands.window.arena.camera, hands.editor.selection
         picture = hands.picture()
         trial = tried(hands)
-        assert trial.desk.session.environment == before.environment()
-        assert trial.desk.session.scenario.start_name == "s"
+        assert trial.viewer.session.environment == before.environment()
+        assert trial.viewer.session.scenario.start_name == "s"
         hands.frames(10)
-        assert trial.desk.session.time > 0.0
+        assert trial.viewer.session.time > 0.0
         hands.key("f5")
         assert hands.window.trial is None
         assert hands.sketch is before and hands.window.arena.camera == camera
-        assert hands.desk.selection == selection
-        hands.desk.message = ""
+        assert hands.editor.selection == selection
+        hands.editor.message = ""
         hands.window.frame(0.0)
         arena = np.s_[40:500, :500]
         apart = np.abs(hands.picture() - picture)[arena].max(axis=2)
@@ -67,19 +67,19 @@ def test_a_draft_says_why_it_cannot_be_run(tmp_path: Path) -> None:
     crossed = PolygonObstacle(((2, 2), (4, 4), (4, 2), (2, 4)))
     with opened_editor(tmp_path, sheet(crossed)) as hands:
         hands.key("f5")
-        assert hands.window.trial is None and hands.desk.trouble and hands.said
+        assert hands.window.trial is None and hands.editor.trouble and hands.said
     with opened_editor(tmp_path, Sketch(boundary=None)) as hands:
         hands.key("f5")
-        assert hands.window.trial is None and hands.desk.trouble
+        assert hands.window.trial is None and hands.editor.trouble
     with opened_editor(tmp_path, sheet(starts=(("tight", DiscStart((5, 5), 0.11)),))) as hands:
-        hands.desk.robots = 50
+        hands.editor.robots = 50
         hands.key("f5")
         assert hands.window.trial is None and "room for about" in hands.said
 
 
 def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(PILLAR)) as hands:
-        hands.desk.change(properties.noted(hands.sketch, Selection.of(0), "old oak"))
+        hands.editor.change(properties.noted(hands.sketch, Selection.of(0), "old oak"))
         trial = tried(hands)
         hands.key("c")
         x, y = trial.canvas.to_pixel((3.0, 3.0))
@@ -94,14 +94,14 @@ def test_what_is_drawn_while_trying_comes_along_as_one_edit(tmp_path: Path) -> N
 def test_another_map_opened_while_trying_is_left_behind(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(PILLAR)) as hands:
         trial = tried(hands)
-        trial.desk.attempt(lambda: trial.desk.open_map("square"))
-        assert trial.desk.elsewhere and "Untitled" in trial.desk.maps()
+        trial.viewer.attempt(lambda: trial.viewer.open_map("square"))
+        assert trial.viewer.elsewhere and "Untitled" in trial.viewer.maps()
         hands.key("f5")
         assert hands.shapes == [PILLAR]
         trial = tried(hands)
-        trial.desk.attempt(lambda: trial.desk.open_map("rooms"))
-        trial.desk.attempt(lambda: trial.desk.open_map("Untitled"))
-        assert not trial.desk.elsewhere and len(trial.desk.session.environment.obstacles) == 1
+        trial.viewer.attempt(lambda: trial.viewer.open_map("rooms"))
+        trial.viewer.attempt(lambda: trial.viewer.open_map("Untitled"))
+        assert not trial.viewer.elsewhere and len(trial.viewer.session.environment.obstacles) == 1
         hands.key("escape")
 
 
@@ -113,7 +113,7 @@ def test_closing_the_window_while_trying_asks_about_what_is_unsaved(tmp_path: Pa
         hands.post(pygame.QUIT)
         hands.settle()
         hands.settle()
-        assert hands.window.trial is None and hands.desk.asked is not None and not hands.window.closed
+        assert hands.window.trial is None and hands.editor.asked is not None and not hands.window.closed
         hands.key("d")
         assert hands.window.closed
 
@@ -123,7 +123,7 @@ def test_light_and_dark_come_back_too(tmp_path: Path) -> None:
         tried(hands)
         hands.key("t")
         hands.key("f5")
-        assert hands.desk.theme == "dark"
+        assert hands.editor.theme == "dark"
 
 
 def test_nothing_is_brought_back_where_nothing_was_changed() -> None:

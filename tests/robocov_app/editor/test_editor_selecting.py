@@ -26,44 +26,44 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 def handle(hands: Hands, kind: str, side: tuple[int, int] = (0, 0)) -> tuple[float, float]:
     """Return the pixel of a handle."""
-    (found,) = (each for each in hands.desk.handles if each.kind == kind and each.side == side)
+    (found,) = (each for each in hands.editor.handles if each.kind == kind and each.side == side)
     return hands.pixel(found.at)
 
 
 def test_a_click_selects_shift_adds_and_takes_away_and_the_floor_clears(hands: Hands) -> None:
     hands.click_all((3, 3))
-    assert hands.desk.selection == Selection.of(0)
+    assert hands.editor.selection == Selection.of(0)
     hands.hold("shift")
     hands.click_all((7, 7))
-    assert hands.desk.selection == Selection.of(0, 1)
+    assert hands.editor.selection == Selection.of(0, 1)
     hands.click_all((3, 3))
     hands.hold()
-    assert hands.desk.selection == Selection.of(1)
+    assert hands.editor.selection == Selection.of(1)
     hands.click_all((9, 5))
-    assert not hands.desk.selection
+    assert not hands.editor.selection
     hands.click_all((1, 8.5))
-    assert hands.desk.selection == Selection.of("corner")
+    assert hands.editor.selection == Selection.of("corner")
     hands.click_all((10, 5))
-    assert hands.desk.selection == Selection.of(BOUNDARY)
+    assert hands.editor.selection == Selection.of(BOUNDARY)
 
 
 def test_a_box_takes_what_lies_in_it_and_leftwards_what_it_touches(hands: Hands) -> None:
     hands.drag_at((1.5, 1.5), (3, 3), (5, 5))
-    assert hands.desk.selection == Selection.of(0)
+    assert hands.editor.selection == Selection.of(0)
     hands.key("escape")
     hands.drag_at((3, 1.5), (4, 4), (7.5, 5))
-    assert hands.desk.selection == Selection()
+    assert hands.editor.selection == Selection()
     hands.drag_at((7.5, 5), (4, 4), (3, 1.5))
-    assert hands.desk.selection == Selection.of(0, 2)
+    assert hands.editor.selection == Selection.of(0, 2)
 
 
 def test_dragging_moves_and_can_be_undone_as_one(hands: Hands) -> None:
     hands.drag_at((3, 3), (3.5, 3.2), (4, 3.5), (5, 3))
     assert hands.shapes[0].vertices == ((4, 2), (6, 2), (6, 4), (4, 4))
-    assert hands.shapes[0].name == "box" and hands.desk.selection == Selection.of(0)
+    assert hands.shapes[0].name == "box" and hands.editor.selection == Selection.of(0)
     hands.key("ctrl+z")
     assert hands.shapes[0] == SQUARE
-    assert not hands.desk.document.history.past
+    assert not hands.editor.document.history.past
     hands.key("ctrl+y")
     assert hands.shapes[0].vertices[0] == (4, 2)
 
@@ -72,11 +72,11 @@ def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(hands: Hands) -> No
     before = hands.sketch
     hands.press(*hands.pixel((3, 3)))
     hands.go((4, 4), (5, 5), held=1)
-    assert hands.desk.pending is not None
+    assert hands.editor.pending is not None
     hands.key("escape")
     hands.go((6, 6), held=1)
     hands.release()
-    assert hands.sketch is before and hands.desk.pending is None
+    assert hands.sketch is before and hands.editor.pending is None
 
 
 def test_alt_drag_copies(hands: Hands) -> None:
@@ -84,7 +84,7 @@ def test_alt_drag_copies(hands: Hands) -> None:
     hands.drag_at((7, 7), (7.5, 5), (9, 5))
     hands.hold()
     assert hands.shapes[1] == PILLAR and hands.shapes[3] == CircleObstacle((9, 5), 1.0)
-    assert hands.desk.selection == Selection(items=frozenset({hands.sketch.obstacles[3].key}))
+    assert hands.editor.selection == Selection(items=frozenset({hands.sketch.obstacles[3].key}))
 
 
 def test_a_drag_takes_a_typed_distance(hands: Hands) -> None:
@@ -100,11 +100,11 @@ def test_a_vertex_is_dragged_alone_and_several_together(hands: Hands) -> None:
     hands.click_all((3, 3))
     hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
     assert hands.shapes[0].vertices == ((2, 2), (4, 2), (5, 5), (2, 4))
-    assert hands.desk.selection.vertices == {Vertex(0, 0, 2)}
+    assert hands.editor.selection.vertices == {Vertex(0, 0, 2)}
     hands.hold("shift")
     hands.click_all((4, 2))
     hands.hold()
-    assert len(hands.desk.selection.vertices) == 2
+    assert len(hands.editor.selection.vertices) == 2
     hands.drag_at((4, 2), (4.5, 2), (5, 2))
     assert hands.shapes[0].vertices == ((2, 2), (5, 2), (6, 5), (2, 4))
 
@@ -129,9 +129,9 @@ def test_corners_are_cut_off_and_rounded(hands: Hands) -> None:
 def test_a_box_around_some_vertices_of_what_is_selected_takes_them(hands: Hands) -> None:
     hands.click_all((3, 3))
     hands.drag_at((4.6, 1.4), (4.2, 3), (3.6, 4.6))
-    assert hands.desk.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
+    assert hands.editor.selection.vertices == {Vertex(0, 0, 1), Vertex(0, 0, 2)}
     hands.key("escape")
-    assert hands.desk.selection == Selection.of(0)
+    assert hands.editor.selection == Selection.of(0)
 
 
 def test_the_rim_of_a_circle_and_of_a_start_are_dragged(hands: Hands) -> None:
@@ -214,11 +214,11 @@ def test_clicking_again_goes_to_what_lies_below(tmp_path: Path) -> None:
     )
     with opened_editor(tmp_path, sheet(lower, upper)) as hands:
         hands.click_all((3.5, 2.5))
-        assert hands.desk.selection == Selection.of(1)
+        assert hands.editor.selection == Selection.of(1)
         hands.click_all((3.5, 2.5))
-        assert hands.desk.selection == Selection.of(0)
+        assert hands.editor.selection == Selection.of(0)
         hands.click_all((3.5, 2.5))
-        assert hands.desk.selection == Selection.of(1)
+        assert hands.editor.selection == Selection.of(1)
 
 
 def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path) -> None:
@@ -231,7 +231,7 @@ def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path
         hands.select(0, 1)
         hands.press(*hands.pixel((3, 3)))
         hands.go((3.5, 3.2), (4, 3.5), held=1)
-        assert hands.desk.pending is None and hands.desk.selector.drag.offset == pytest.approx((1.0, 0.5))
+        assert hands.editor.pending is None and hands.editor.selector.drag.offset == pytest.approx((1.0, 0.5))
         hands.release()
         assert hands.shapes == [item.shape for item in wanted.obstacles]
 
@@ -248,16 +248,16 @@ def test_grips_know_whose_vertices_are_shown(hands: Hands) -> None:
 
 
 def test_the_cursor_tells_what_a_press_would_do(hands: Hands) -> None:
-    selector = hands.desk.selector
+    selector = hands.editor.selector
     hands.go((9, 5))
-    assert selector.shape_of_cursor(hands.desk) == "arrow"
+    assert selector.shape_of_cursor(hands.editor) == "arrow"
     hands.go((3, 3))
-    assert selector.shape_of_cursor(hands.desk) == "hand"
+    assert selector.shape_of_cursor(hands.editor) == "hand"
     hands.select(0)
     hands.go((3, 3.01))
-    assert selector.shape_of_cursor(hands.desk) == "move"
+    assert selector.shape_of_cursor(hands.editor) == "move"
     hands.move(*handle(hands, "scale", (1, 1)))
-    assert selector.shape_of_cursor(hands.desk) == "rising"
+    assert selector.shape_of_cursor(hands.editor) == "rising"
 
 
 def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_what_is_small_on_the_screen_is_dragged_itself_not_its_vertices(tmp_path
     with opened_editor(tmp_path, wide) as hands:
         hands.key("f")
         hands.click_at((5.2, 5.2))
-        assert hands.desk.selection == Selection.of(0)
+        assert hands.editor.selection == Selection.of(0)
         hands.wait()
         hands.hold("ctrl")
         hands.drag_at((5.2, 5.2), (15, 15), (25.2, 25.2))

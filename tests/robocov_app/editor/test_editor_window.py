@@ -36,12 +36,12 @@ def hands(tmp_path: Path) -> Iterator[Hands]:
 
 def test_every_button_does_what_its_action_does(hands: Hands) -> None:
     hands.push("tool:wall")
-    assert hands.desk.tool.name == "wall"
+    assert hands.editor.tool.name == "wall"
     hands.push("tool:select")
     hands.select(0)
     hands.turn("object")
     hands.push("rotate:left")
-    assert hands.desk.document.history.past
+    assert hands.editor.document.history.past
     hands.push("undo")
     assert hands.shapes[0] == BOX
     hands.push("help")
@@ -55,14 +55,14 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
     assert hands.sketch.name == "Our office"
     hands.write("radius", "0.25")
     hands.key("return")
-    assert hands.desk.radius == 0.25 and hands.desk.measurement.radius == 0.25
+    assert hands.editor.radius == 0.25 and hands.editor.measurement.radius == 0.25
     hands.write("robots", "nine")
     hands.key("return")
-    assert hands.desk.trouble and hands.desk.robots == 6
+    assert hands.editor.trouble and hands.editor.robots == 6
     hands.push("more")
-    assert hands.desk.robots == 7
+    assert hands.editor.robots == 7
     hands.tick("show:robots")
-    assert "robots" in hands.desk.shown
+    assert "robots" in hands.editor.shown
 
 
 def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
@@ -84,7 +84,7 @@ def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
     hands.select("door")
     hands.write("name", "entrance")
     hands.key("return")
-    assert hands.desk.start_names == ["entrance"]
+    assert hands.editor.start_names == ["entrance"]
 
 
 def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
@@ -100,34 +100,34 @@ def test_every_kind_of_selection_has_its_page(hands: Hands) -> None:
         Selection(vertices=vertex),
         Selection(vertices=vertex | {Vertex(0, 0, 2)}),
     ):
-        hands.desk.select(selection)
+        hands.editor.select(selection)
         hands.frames(2, 0.2)
 
 
 def test_the_list_of_vertices_selects_and_scrolls(hands: Hands) -> None:
     ring = tuple((5 + np.cos(a), 5 + np.sin(a)) for a in np.arange(0, 6.2, 0.1))
-    hands.desk.change(polygon_drawn(hands.sketch, ring))
+    hands.editor.change(polygon_drawn(hands.sketch, ring))
     hands.turn("object")
     hands.click(*hands.widget("option", "vertex:1").rect.center)
-    assert hands.desk.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
+    assert hands.editor.selection.vertices == {Vertex(hands.sketch.obstacles[-1].key, 0, 1)}
     assert hands.find("option", "vertex:61") is None, "what is out of sight is not laid out"
     at = hands.widget("option", "vertex:3").rect.center
     for _ in range(8):
         hands.wheel(*at, -5)
     hands.click(*hands.widget("option", "vertex:61").rect.center)
-    (vertex,) = hands.desk.selection.vertices
+    (vertex,) = hands.editor.selection.vertices
     assert vertex.index == 61
 
 
 def test_the_snap_page_switches_and_sets(hands: Hands) -> None:
     hands.turn("snap")
     hands.tick("snap:grid")
-    assert "grid" not in hands.desk.snaps
+    assert "grid" not in hands.editor.snaps
     hands.tick("show:names")
-    assert "names" not in hands.desk.shown
+    assert "names" not in hands.editor.shown
     hands.write("grid", "0.5")
     hands.key("return")
-    assert hands.desk.grid == 0.5
+    assert hands.editor.grid == 0.5
 
 
 def test_pages_are_turned_by_keys(hands: Hands) -> None:
@@ -148,13 +148,13 @@ def test_pages_are_turned_by_keys(hands: Hands) -> None:
 def test_keys_go_into_fields_and_not_to_actions_while_typing(hands: Hands) -> None:
     hands.turn("map")
     hands.write("title", "wall")
-    assert hands.desk.tool.name == "select" and hands.window.panel.ui.typing
+    assert hands.editor.tool.name == "select" and hands.window.panel.ui.typing
     hands.key("escape")
     assert not hands.window.panel.ui.typing and hands.sketch.name == "Untitled"
 
 
 def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Hands) -> None:
-    hands.desk.change(circle_drawn(hands.sketch, (5, 5), 0.2))
+    hands.editor.change(circle_drawn(hands.sketch, (5, 5), 0.2))
     drawn = hands.sketch
     hands.turn("map")
     hands.write("title", "ab")
@@ -170,7 +170,7 @@ def test_what_is_typed_into_a_field_is_undone_there_and_not_in_the_map(hands: Ha
 
 def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
     for radius in (0.2, 0.3, 0.4):
-        hands.desk.change(circle_drawn(hands.sketch, (5, 5), radius))
+        hands.editor.change(circle_drawn(hands.sketch, (5, 5), radius))
     hands.turn("history")
 
     def lines() -> list[tuple[str, bool]]:
@@ -242,7 +242,7 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
 def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((3, 3), button=3)
     menu = hands.window.menu
-    assert menu is not None and hands.desk.selection == Selection.of(0)
+    assert menu is not None and hands.editor.selection == Selection.of(0)
     hands.window.draw()
     names = [action.name if action else "" for action in menu.commands]
     row = names.index("duplicate")
@@ -251,10 +251,10 @@ def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     assert len(hands.shapes) == 3 and hands.window.menu is None
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
-    assert not hands.desk.selection
+    assert not hands.editor.selection
     assert "paste" in [action.name for action in hands.window.menu.commands if action]
     hands.click(*hands.window.menu._ui.shown["option:select:all"].rect.center)
-    assert hands.window.menu is None and hands.desk.selection
+    assert hands.window.menu is None and hands.editor.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
     assert hands.window.menu is None
@@ -275,13 +275,13 @@ def test_the_palette_does_actions_and_commands(hands: Hands) -> None:
     hands.key("ctrl+k")
     hands.type("mirror left")
     hands.key("return")
-    assert hands.desk.document.history.past
+    assert hands.editor.document.history.past
     hands.command("rotate 90")
     assert "turned" in hands.said or "rotated" in hands.said
     hands.key("/")
-    assert isinstance(hands.desk.asked, Choice) and hands.desk.asked.text == ""
+    assert isinstance(hands.editor.asked, Choice) and hands.editor.asked.text == ""
     hands.key("escape")
-    assert hands.desk.asked is None
+    assert hands.editor.asked is None
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((1280, 720), 1.0), ((1920, 1080), 1.5)])
@@ -325,10 +325,10 @@ def test_a_screenshot_is_saved(hands: Hands, tmp_path: Path) -> None:
 def test_the_status_line_says_where_what_and_how(hands: Hands) -> None:
     hands.go((3, 3))
     hands.select(0)
-    said = facts(hands.desk, 60.0, None)
+    said = facts(hands.editor, 60.0, None)
     assert said[0].startswith("(3.0") and any("box" in each for each in said) and "60 fps" in said
     hands.key("w")
-    assert any(each.startswith("Wall: click its points") for each in facts(hands.desk, 60.0, None))
+    assert any(each.startswith("Wall: click its points") for each in facts(hands.editor, 60.0, None))
 
 
 def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
@@ -359,7 +359,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
     sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).added(shapes)[0]
     with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
         window, sheet = hands.window, hands.window.arena.sheet
-        hands.desk.snapper.patient = False
+        hands.editor.snapper.patient = False
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
         hands.press(x, y)
@@ -368,7 +368,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
             window.frame(1 / 60)
-        assert hands.desk.pending is not None
+        assert hands.editor.pending is not None
         assert sheet.full == full
 
 
@@ -397,12 +397,12 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     hands.select(0)
     hands.key("ctrl+h")
     hands.key("ctrl+tab")
-    hands.desk.select(Selection())
+    hands.editor.select(Selection())
     hands.frames(2)
     lines = [each for each in hands.window.panel.ui.shown.values() if each.key.startswith("thing:")]
     assert lines[-1].text == "boundary" and len(lines) == len(hands.shapes) + 1 + len(hands.sketch.starts)
     hands.click(*hands.widget("option", "thing:0").rect.center)
-    assert hands.desk.selection.items == {0}
+    assert hands.editor.selection.items == {0}
 
 
 def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path, monkeypatch) -> None:
@@ -423,7 +423,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
     with opened_editor(tmp_path) as hands:
         hands.move(300, 300)
         hands.frames(3)
-        hands.desk.message = ""
+        hands.editor.message = ""
         hands.frames(60)
         drawn: list[int] = []
         monkeypatch.setattr(pygame.display, "flip", lambda: drawn.append(1))
@@ -431,7 +431,7 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         assert not drawn
         hands.move(310, 300)
         assert drawn
-        hands.desk.say("something new")
+        hands.editor.say("something new")
         drawn.clear()
         hands.frames(1)
         assert drawn

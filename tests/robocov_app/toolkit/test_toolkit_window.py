@@ -90,7 +90,7 @@ def test_full_screen_and_back(window: Counting, tmp_path: Path) -> None:
 
 def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        window, desk = driver.window, driver.desk
+        window, viewer = driver.window, driver.viewer
         drawn: list[bool] = []
         draw = window.draw
         window.draw = lambda: (drawn.append(True), draw())  # type: ignore[method-assign, func-returns-value]
@@ -98,7 +98,7 @@ def test_a_paused_window_is_drawn_when_its_cost_or_words_change_only(tmp_path: P
         drawn.clear()
         driver.frames(20)
         assert window.resting and not drawn
-        desk.say("something")
+        viewer.say("something")
         driver.frames(5)
         assert len(drawn) == 1
         driver.session.playing = True

@@ -40,7 +40,7 @@ def play(driver: Driver) -> None:
 def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left = tmp_path / "left"
     with opened(tmp_path, RAPF, environment=ROOM, robots=4) as driver:
-        driver.desk.workspace = Workspace(driver.session, left)
+        driver.viewer.workspace = Workspace(driver.session, left)
         play(driver)
         driver.key("w")
         driver.click_at((3.0, 0.02))
@@ -52,13 +52,13 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         driver.key("shift+d")
         play(driver)
         failed = state(driver.session)
-        driver.desk.look_at(0.3)  # before it failed
+        driver.viewer.look_at(0.3)  # before it failed
         driver.key("b")
         play(driver)
         driver.key("k")  # compare: all begin anew
         play(driver)
         compared = state(driver.session)
-        assert [len(driver.session.branches), len(driver.session.lanes)] == [2, 2]
+        assert [len(driver.session.branches), len(driver.session.panes)] == [2, 2]
         undone = 0
         while driver.session.can_undo:
             driver.key("ctrl+z")
@@ -68,14 +68,14 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
             driver.key("ctrl+y")
         assert_same(state(driver.session), compared)
         driver.key("ctrl+s")
-        file = driver.desk.workspace.path
+        file = driver.viewer.workspace.path
         assert file is not None
         play(driver)
         driver.click(*driver.robot(1))
         driver.key("shift+d")
         play(driver)
         last = state(driver.session)
-        workspace = driver.desk.workspace
+        workspace = driver.viewer.workspace
         workspace._when = -1e9
         workspace.keep({})
         assert workspace._autosaver.flush()

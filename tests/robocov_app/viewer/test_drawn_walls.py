@@ -25,7 +25,9 @@ def test_a_wall_drawn_nearly_from_wall_to_wall_closes_the_room_and_says_what_is_
         driver.key("return")
         assert len(driver.session.environment.free.geoms) == 2
         assert driver.session.environment.obstacles[-1].points == ((5.0, 0.0), (5.0, 6.0))
-        assert driver.desk.message.startswith("wall drawn; ") and driver.desk.message.endswith(" m² cut off")
+        assert driver.viewer.message.startswith("wall drawn; ") and driver.viewer.message.endswith(
+            " m² cut off"
+        )
 
 
 def test_what_is_far_from_walls_stays_where_it_is_drawn(tmp_path: Path) -> None:
@@ -36,7 +38,7 @@ def test_what_is_far_from_walls_stays_where_it_is_drawn(tmp_path: Path) -> None:
         driver.key("return")
         wall = driver.session.environment.obstacles[-1]
         assert np.allclose(wall.points, ((5.0, 1.0), (5.0, 4.0)), atol=0.02)
-        assert driver.desk.message == "wall drawn"
+        assert driver.viewer.message == "wall drawn"
 
 
 def test_a_wall_is_drawn_by_a_drag_too_and_snaps(tmp_path: Path) -> None:

@@ -16,13 +16,13 @@ from robocov_app.render.fonts import text_width
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
-from robocov_app.viewer import opening
-from robocov_app.viewer.opening import Opening
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer import launch as opening
+from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.settings import Settings
 from robocov_app.viewer.status import cursor_words, facts, suggestion
 
-FOUR = (RAPF, Law("rpf"), Law("lloyd"), Law("geodesic-lloyd"))
+FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def words(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, words: list[str]) -> None:
-    with opened(tmp_path, RAPF, Law("rpf")) as driver:
+    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         session = driver.session
         driver.frames(2)
         driver.window._ask_costs = lambda: None  # type: ignore[method-assign]  # no answer comes any more
@@ -48,30 +48,30 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
             session.step()
         words.clear()
         driver.settle()
-        for lane in session.lanes:
-            value = f"{lane.curve.value[-1]:.3f}"
-            assert session.end - lane.curve.last_time > 1.0
-            caption = f"mean distance {value} m at {lane.curve.last_time:.1f} s"
+        for pane in session.panes:
+            value = f"{pane.curve.value[-1]:.3f}"
+            assert session.end - pane.curve.last_time > 1.0
+            caption = f"mean distance {value} m at {pane.curve.last_time:.1f} s"
             assert caption in words and any(value in each and each != caption for each in words)
 
 
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
-    with opened(tmp_path, RAPF, Law("rpf")) as driver:
-        other = driver.session.lanes[1]
+    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+        other = driver.session.panes[1]
         other.simulation = other.simulation.changed(positions=other.simulation.positions + [0.3, 0.0])
-        driver.desk.costs.forget()
+        driver.viewer.costs.forget()
         said = []
         for pane in (0, 1):
             driver.move(*driver.pixel(MIDDLE, pane))
             driver.frames(2)
-            assert driver.desk.active == 0
-            said.append(cursor_words(driver.desk))
+            assert driver.viewer.active == 0
+            said.append(cursor_words(driver.viewer))
         assert said[0] != said[1]
-        before = driver.desk.cursor
-        driver.desk.open_map("square")
+        before = driver.viewer.cursor
+        driver.viewer.open_map("square")
         driver.frames(2)
-        assert driver.desk.cursor != before  # the same pixel is another place there
-        assert driver.desk.cursor == driver.window.canvas.to_world(driver.at, 1)
+        assert driver.viewer.cursor != before  # the same pixel is another place there
+        assert driver.viewer.cursor == driver.window.canvas.to_world(driver.at, 1)
 
 
 @pytest.mark.parametrize("size", [(900, 600), (1280, 720), (1600, 640), (2560, 1440)])
@@ -81,14 +81,14 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         driver.frames(2)
         words.clear()
         driver.settle()
-        for lane in driver.session.lanes:
-            value = f"{lane.curve.at(0.0):.3f} m"
+        for pane in driver.session.panes:
+            value = f"{pane.curve.at(0.0):.3f} m"
             assert any(value in each for each in words), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
         (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
         room = left + width - driver.window.chart._span[1] - 9 * scale
-        name = max((lane.law.label for lane in driver.session.lanes), key=len)
+        name = max((pane.law.label for pane in driver.session.panes), key=len)
         assert (
             text_width(f"{name}  8.888  +88.8 %", round(driver.window.theme.small_text * scale), True) <= room
         )
@@ -97,17 +97,17 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
-        slow, fast = facts(driver.desk, 9.0, 60.0, None), facts(driver.desk, 60.0, 60.0, None)
-        assert slow.index("9 fps") < slow.index(cursor_words(driver.desk))
-        assert fast.index("60 fps") > fast.index(cursor_words(driver.desk))
+        slow, fast = facts(driver.viewer, 9.0, 60.0, None), facts(driver.viewer, 60.0, 60.0, None)
+        assert slow.index("9 fps") < slow.index(cursor_words(driver.viewer))
+        assert fast.index("60 fps") > fast.index(cursor_words(driver.viewer))
 
 
 def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        desk, session = driver.desk, driver.session
-        assert suggestion(desk) == ""
+        viewer, session = driver.viewer, driver.session
+        assert suggestion(viewer) == ""
         session.settled = True
-        assert suggestion(desk).startswith(
+        assert suggestion(viewer).startswith(
             "The team has settled. Try:\ndraw a wall in a doorway (W) · drag a robot"
         )
         before = driver.picture()
@@ -115,20 +115,20 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         driver.settle()
         assert not driver.same(before)
         session.fail_robot(2)
-        assert suggestion(desk) == ""  # something is going on again
+        assert suggestion(viewer) == ""  # something is going on again
         session.settled = True
-        assert "fail" not in suggestion(desk)  # that is known now
+        assert "fail" not in suggestion(viewer)  # that is known now
         session.look_at(0.0)
         driver.window.do("suggestions")
         session.look_at(session.end)
-        assert suggestion(desk) == ""
+        assert suggestion(viewer) == ""
 
 
-def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Opening:
+def opened_for_a_person(monkeypatch: pytest.MonkeyPatch, folder: Path, **options: object) -> Launcher:
     """Return how a window opens that somebody would watch, on a display that nobody sees."""
     monkeypatch.setenv(FOLDER, str(folder))
     monkeypatch.setattr(opening, "display", lambda headless, otherwise: display(headless=True))
-    return Opening(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
+    return Launcher(begun(RAPF), "hall", folder, lattice=8, **options)  # type: ignore[arg-type]
 
 
 def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
@@ -164,15 +164,15 @@ def test_a_scale_takes_the_window_that_it_needs_or_says_so(
         assert window.layout.scale == 1.5 and window.screen.get_size() == (1350, 900)
     with opened_for_a_person(monkeypatch, tmp_path, scale=2.0).window() as window:
         assert window.layout.scale == 1.625
-        assert window.desk.message == "scale 2 needs a window of 1800 × 1200: 1.625 it is"
+        assert window.viewer.message == "scale 2 needs a window of 1800 × 1200: 1.625 it is"
 
 
 def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        desk = driver.desk
+        viewer = driver.viewer
         save_map(HALL, tmp_path / "other.json")
-        desk.save_session(tmp_path / "first.robocov")
-        desk.save_session(tmp_path / "second.robocov")
+        viewer.save_session(tmp_path / "first.robocov")
+        viewer.save_session(tmp_path / "second.robocov")
         (tmp_path / "notes.txt").touch()
         driver.key("ctrl+o")
         asked = driver.window.dialogs.asked
@@ -182,12 +182,12 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         assert offered[2:] == ["first.robocov", "other.json", "second.robocov", "../"]
         driver.type("oth")
         driver.key("return")
-        assert not driver.window.dialogs.open and desk.map_name == str(tmp_path / "other.json")
+        assert not driver.window.dialogs.open and viewer.map_name == str(tmp_path / "other.json")
         driver.key("ctrl+o")
         driver.key("down")
         driver.key("return")
-        assert desk.workspace.path == tmp_path / "first.robocov"
-        assert desk.recent[0] == str(tmp_path / "first.robocov")
+        assert viewer.workspace.path == tmp_path / "first.robocov"
+        assert viewer.recent[0] == str(tmp_path / "first.robocov")
         driver.key("ctrl+o")
         driver.type("nothing.robocov")
         driver.key("return")  # an error stays in the dialog, with what was typed
@@ -198,23 +198,23 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
 
 def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        window.desk.save_session(tmp_path / "mine.robocov")
-        window.desk.suggests = False
+        window.viewer.save_session(tmp_path / "mine.robocov")
+        window.viewer.suggests = False
     settings, _ = loaded(Settings, settings_file())
     assert settings.recent == (str(tmp_path / "mine.robocov"),) and not settings.suggests
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
-        assert window.desk.recent == [str(tmp_path / "mine.robocov")] and not window.desk.suggests
+        assert window.viewer.recent == [str(tmp_path / "mine.robocov")] and not window.viewer.suggests
 
 
 def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
-        desk, session = driver.desk, driver.session
+        viewer, session = driver.viewer, driver.session
         session.playing = True
         driver.frames(20)
         session.fail_robot(2)
         driver.frames(20)
         failed = session.head
-        desk.look_at(0.2)
+        viewer.look_at(0.2)
         session.fail_robot(3)
         driver.frames(20)
         driver.key("ctrl+b")
@@ -223,7 +223,7 @@ def test_branches_are_listed_with_their_costs_and_entered(tmp_path: Path) -> Non
         lines = asked.options("")
         assert [line.text for line in lines][-1].endswith("robot 3 failed  (here)")
         assert all("RAPF" in line.aside and " m" in line.aside for line in lines)
-        ends = np.array([lane.curve.at(session.end) for lane in session.lanes])
+        ends = np.array([pane.curve.at(session.end) for pane in session.panes])
         assert lines[-1].aside == f"{session.end:.1f} s · RAPF {ends[0]:.3f} m"
         driver.type("robot 2")
         driver.key("return")

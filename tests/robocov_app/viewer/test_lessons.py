@@ -62,30 +62,30 @@ def test_every_chapter_of_the_lesson_ends() -> None:
 def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, capsys) -> None:
     with opened(tmp_path) as driver:
         stepped(driver.session, 10).fail_robot(3)
-        before = driver.desk.session
+        before = driver.viewer.session
         driver.window._patient = False
         driver.window.start_lesson(short(tmp_path))
-        lesson, desk = driver.window.tour, driver.desk
-        assert lesson is not None and lesson.title == "1  Failure" and desk.session is not before
+        lesson, viewer = driver.window.tour, driver.viewer
+        assert lesson is not None and lesson.title == "1  Failure" and viewer.session is not before
         driver.frames(6)
-        assert desk.session.numbers == (1, 2, 3)
+        assert viewer.session.numbers == (1, 2, 3)
         driver.frames(30)
-        assert desk.session.numbers == (1, 3), "at its step, however long frames take"
-        assert lesson.state == "ended" and not desk.session.playing
+        assert viewer.session.numbers == (1, 3), "at its step, however long frames take"
+        assert lesson.state == "ended" and not viewer.session.playing
         lesson.skip(1)
         assert lesson.state == "asks" and lesson.asks == ["What now?", "1  Nothing", "2  Much"]
         driver.frames(10)
-        assert desk.session.time == 0.0, "it waits for an answer"
+        assert viewer.session.time == 0.0, "it waits for an answer"
         driver.key("1")
         assert lesson.state == "plays" and lesson.answer == 1
         driver.frames(30)
         assert lesson.state == "task" and lesson.asks == ["Now you: drag robot 1."]
-        desk.session.place(1, (1.0, 1.0))
+        viewer.session.place(1, (1.0, 1.0))
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
         driver.key("escape")
-        assert driver.window.tour is None and desk.session is before and before.numbers == (1, 2)
+        assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
 
 
 def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
@@ -94,13 +94,13 @@ def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
         driver.window.start_lesson(short(tmp_path))
         lesson = driver.window.tour
         driver.key("space")
-        assert lesson.state == "plays" and not driver.desk.session.playing
+        assert lesson.state == "plays" and not driver.viewer.session.playing
         driver.frames(60)
-        assert lesson.number == 0 and driver.desk.session.time < 0.1
+        assert lesson.number == 0 and driver.viewer.session.time < 0.1
         driver.key("n")
         assert lesson.state == "left" and driver.window.tour is lesson
         driver.key("f2")
-        assert lesson.state == "plays" and driver.desk.session.time == 0.0
+        assert lesson.state == "plays" and driver.viewer.session.time == 0.0
         driver.key("right")
         assert lesson.number == 1
         driver.key("left")
@@ -144,7 +144,7 @@ def test_a_script_goes_the_same_way_bit_for_bit() -> None:
         session.advance(1 / 60)
     session.release()
     stepped(session, 10)
-    end, went = session.step_now, session.lanes[0].simulation.positions.copy()
+    end, went = session.step_now, session.panes[0].simulation.positions.copy()
     twin = Session(session.document.nodes[0].scenario)
     twin.document, twin.head = session.document, session.document.nodes[0]
     twin.enter(twin.head, 0)
@@ -152,4 +152,4 @@ def test_a_script_goes_the_same_way_bit_for_bit() -> None:
     twin.follow(session.head)
     while twin.step_now < end:
         twin.step()
-    np.testing.assert_array_equal(twin.lanes[0].simulation.positions, went)
+    np.testing.assert_array_equal(twin.panes[0].simulation.positions, went)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driven_window import do, typed
-from touched_run import HALL, LLOYD, RAPF, RPF, all_told, desk_of
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, viewer_of
 
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.viewer.session.clock import SPEEDS
@@ -18,294 +18,294 @@ from robocov_app.viewer.session.scenario import MOST_ROBOTS
 
 
 def test_pausing_playing_and_single_steps() -> None:
-    desk = desk_of()
-    do(desk, "pause")
-    assert desk.session.playing
-    do(desk, "step")
-    assert not desk.session.playing and desk.session.end == pytest.approx(desk.session.scenario.dt)
+    viewer = viewer_of()
+    do(viewer, "pause")
+    assert viewer.session.playing
+    do(viewer, "step")
+    assert not viewer.session.playing and viewer.session.end == pytest.approx(viewer.session.scenario.dt)
 
 
 def test_settling_plays_until_asked_again() -> None:
-    desk = desk_of()
-    do(desk, "settle")
-    assert desk.session.playing and desk.session.stop_when_settled
-    do(desk, "pause")
-    assert not desk.session.playing and not desk.session.stop_when_settled
-    do(desk, "settle")
-    do(desk, "settle")
-    assert desk.session.playing and not desk.session.stop_when_settled
+    viewer = viewer_of()
+    do(viewer, "settle")
+    assert viewer.session.playing and viewer.session.stop_when_settled
+    do(viewer, "pause")
+    assert not viewer.session.playing and not viewer.session.stop_when_settled
+    do(viewer, "settle")
+    do(viewer, "settle")
+    assert viewer.session.playing and not viewer.session.stop_when_settled
 
 
 def test_speeds_go_by_steps_and_stop_at_both_ends() -> None:
-    desk = desk_of()
-    seen = [desk.session.clock.speed]
+    viewer = viewer_of()
+    seen = [viewer.session.clock.speed]
     for _ in SPEEDS:
-        do(desk, "faster")
-        seen.append(desk.session.clock.speed)
+        do(viewer, "faster")
+        seen.append(viewer.session.clock.speed)
     assert seen[:2] == [1.0, 2.0] and seen[-2:] == [math.inf, math.inf]
-    assert desk.message == "speed max"
+    assert viewer.message == "speed max"
     for _ in SPEEDS:
-        do(desk, "slower")
-    assert desk.session.clock.speed == SPEEDS[0]
+        do(viewer, "slower")
+    assert viewer.session.clock.speed == SPEEDS[0]
 
 
 def test_a_typed_speed_between_the_steps_goes_on_to_the_next_of_them() -> None:
-    desk = desk_of()
-    typed(desk, "speed 3.3")
-    assert desk.session.clock.speed == 3.3
-    do(desk, "faster")
-    assert desk.session.clock.speed == 8.0
+    viewer = viewer_of()
+    typed(viewer, "speed 3.3")
+    assert viewer.session.clock.speed == 3.3
+    do(viewer, "faster")
+    assert viewer.session.clock.speed == 8.0
 
 
 def test_restarting_keeps_controller_and_gains() -> None:
-    desk = desk_of()
-    typed(desk, "k_rep 2")
-    do(desk, "step")
-    do(desk, "restart")
-    assert desk.session.end == 0.0 and desk.lane.law.value("k_rep") == 2.0
+    viewer = viewer_of()
+    typed(viewer, "k_rep 2")
+    do(viewer, "step")
+    do(viewer, "restart")
+    assert viewer.session.end == 0.0 and viewer.pane.law.value("k_rep") == 2.0
 
 
 def test_another_seed_gives_other_starts_and_another_start_too() -> None:
-    desk = desk_of()
-    places = [desk.session.positions(desk.lane).copy()]
+    viewer = viewer_of()
+    places = [viewer.session.positions(viewer.pane).copy()]
     for action in ("seed:next", "start:next", "start:next"):
-        do(desk, action)
-        places.append(desk.session.positions(desk.lane).copy())
+        do(viewer, action)
+        places.append(viewer.session.positions(viewer.pane).copy())
         assert not np.allclose(places[-1], places[-2])
-    assert desk.session.scenario.start_name == "spread"
+    assert viewer.session.scenario.start_name == "spread"
     for _ in range(2):
-        do(desk, "start:next")
-    assert desk.session.scenario.start_name == "corner"
+        do(viewer, "start:next")
+    assert viewer.session.scenario.start_name == "corner"
 
 
 def test_a_start_that_an_obstacle_has_covered_is_still_named_and_left_by_going_on() -> None:
-    desk = desk_of(start="far")
-    desk.tools["circle"].press(desk.session, (5.2, 3.2), 0.1, None)
-    desk.attempt(lambda: desk.tools["circle"].release(desk.session, (5.2, 3.75)))
-    assert desk.message.endswith("it covers the start far") and "far" not in desk.starts()
-    assert desk.session.scenario.start_name == "far"
-    do(desk, "start:next")
-    assert not desk.trouble and desk.session.scenario.start_name == "corner"
+    viewer = viewer_of(start="far")
+    viewer.tools["circle"].press(viewer.session, (5.2, 3.2), 0.1, None)
+    viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (5.2, 3.75)))
+    assert viewer.message.endswith("it covers the start far") and "far" not in viewer.starts()
+    assert viewer.session.scenario.start_name == "far"
+    do(viewer, "start:next")
+    assert not viewer.trouble and viewer.session.scenario.start_name == "corner"
 
 
 def test_more_and_fewer_robots() -> None:
-    desk = desk_of(robots=2)
-    do(desk, "more")
-    assert desk.session.scenario.robots == 3 and len(desk.session.numbers) == 3
+    viewer = viewer_of(robots=2)
+    do(viewer, "more")
+    assert viewer.session.scenario.robots == 3 and len(viewer.session.numbers) == 3
     for _ in range(3):
-        do(desk, "fewer")
-    assert desk.session.scenario.robots == 1 and desk.trouble
-    assert desk.message == f"robots: 0, but a whole number from 1 to {MOST_ROBOTS} was wanted"
+        do(viewer, "fewer")
+    assert viewer.session.scenario.robots == 1 and viewer.trouble
+    assert viewer.message == f"robots: 0, but a whole number from 1 to {MOST_ROBOTS} was wanted"
 
 
 def test_robots_without_room_are_told_and_nothing_changes() -> None:
-    desk = desk_of()
-    before = all_told(desk.session)
-    desk.attempt(lambda: typed(desk, "robots 900"))
-    assert desk.trouble and "room" in desk.message
-    assert all_told(desk.session) == before
+    viewer = viewer_of()
+    before = all_told(viewer.session)
+    viewer.attempt(lambda: typed(viewer, "robots 900"))
+    assert viewer.trouble and "room" in viewer.message
+    assert all_told(viewer.session) == before
 
 
 # maps
 
 
 def test_maps_are_turned_through_both_ways() -> None:
-    desk = desk_of()
-    typed(desk, "map rooms")
+    viewer = viewer_of()
+    typed(viewer, "map rooms")
     names = list(bundled_maps())
-    do(desk, "map:next")
-    assert desk.map_name == names[names.index("rooms") + 1] and desk.session.environment.name != HALL.name
-    do(desk, "map:previous")
-    assert desk.map_name == "rooms" and desk.session.scenario.start_name == "corridor"
+    do(viewer, "map:next")
+    assert viewer.map_name == names[names.index("rooms") + 1] and viewer.session.environment.name != HALL.name
+    do(viewer, "map:previous")
+    assert viewer.map_name == "rooms" and viewer.session.scenario.start_name == "corridor"
 
 
 def test_a_map_that_is_no_map_is_told_and_the_old_one_stays(tmp_path: Path) -> None:
-    desk = desk_of()
+    viewer = viewer_of()
     (tmp_path / "x.json").write_text("{")
     for name in ("nowhere", str(tmp_path / "x.json"), str(tmp_path)):
-        desk.attempt(lambda name=name: desk.open_map(name))
-        assert desk.trouble and desk.message and desk.map_name == "hall"
-        assert desk.session.environment is HALL
-        desk.trouble = False
+        viewer.attempt(lambda name=name: viewer.open_map(name))
+        assert viewer.trouble and viewer.message and viewer.map_name == "hall"
+        assert viewer.session.environment is HALL
+        viewer.trouble = False
 
 
 def test_an_own_map_is_offered_beside_the_bundled_ones() -> None:
-    desk = desk_of()
-    assert desk.maps() == [*bundled_maps(), "hall"]
-    typed(desk, "map square")
-    assert desk.maps() == list(bundled_maps())
+    viewer = viewer_of()
+    assert viewer.maps() == [*bundled_maps(), "hall"]
+    typed(viewer, "map square")
+    assert viewer.maps() == list(bundled_maps())
 
 
 def test_a_saved_map_can_be_opened_and_has_what_was_drawn(tmp_path: Path) -> None:
-    desk = desk_of(folder=tmp_path)
-    desk.tools["circle"].press(desk.session, (1.0, 3.0), 0.1, None)
-    desk.attempt(lambda: desk.tools["circle"].release(desk.session, (1.3, 3.0)))
-    assert desk.message.startswith("circle drawn")
-    do(desk, "save:map")
+    viewer = viewer_of(folder=tmp_path)
+    viewer.tools["circle"].press(viewer.session, (1.0, 3.0), 0.1, None)
+    viewer.attempt(lambda: viewer.tools["circle"].release(viewer.session, (1.3, 3.0)))
+    assert viewer.message.startswith("circle drawn")
+    do(viewer, "save:map")
     first = tmp_path / "hall-1.json"
-    assert desk.message == f"map saved: {first}" and desk.map_name == str(first)
-    assert load_map(str(first)).obstacles == desk.session.environment.obstacles
-    do(desk, "save:map")
+    assert viewer.message == f"map saved: {first}" and viewer.map_name == str(first)
+    assert load_map(str(first)).obstacles == viewer.session.environment.obstacles
+    do(viewer, "save:map")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hall-1.json", "hall-2.json"]
 
 
 def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    desk = desk_of(folder=tmp_path / "file")
-    do(desk, "save:map")
-    assert desk.trouble and desk.map_name == "hall"
+    viewer = viewer_of(folder=tmp_path / "file")
+    do(viewer, "save:map")
+    assert viewer.trouble and viewer.map_name == "hall"
 
 
 # time
 
 
 def test_looking_back_and_forth() -> None:
-    desk = desk_of()
+    viewer = viewer_of()
     for _ in range(120):
-        do(desk, "step")
-    session = desk.session
-    do(desk, "back")
+        do(viewer, "step")
+    session = viewer.session
+    do(viewer, "back")
     assert session.time == pytest.approx(119 / 60) and not session.live
-    do(desk, "back:second")
+    do(viewer, "back:second")
     assert session.time == pytest.approx(59 / 60, abs=1e-6)
-    do(desk, "forward:second")
-    do(desk, "forward")
+    do(viewer, "forward:second")
+    do(viewer, "forward")
     assert session.live
-    do(desk, "first")
+    do(viewer, "first")
     assert session.time == 0.0
-    do(desk, "live")
+    do(viewer, "live")
     assert session.live and session.time == pytest.approx(2.0)
 
 
 def test_branching_goes_on_from_the_past_and_at_the_present_says_how() -> None:
-    desk = desk_of()
+    viewer = viewer_of()
     for _ in range(30):
-        do(desk, "step")
-    do(desk, "branch:here")
-    assert "go back first" in desk.message and not desk.session.playing
-    do(desk, "first")
-    do(desk, "branch:here")
-    assert desk.session.playing and desk.session.end == 0.0 and "ghost" in desk.message
+        do(viewer, "step")
+    do(viewer, "branch:here")
+    assert "go back first" in viewer.message and not viewer.session.playing
+    do(viewer, "first")
+    do(viewer, "branch:here")
+    assert viewer.session.playing and viewer.session.end == 0.0 and "ghost" in viewer.message
 
 
 # panes
 
 
 def test_panes_come_with_controllers_that_are_not_there_yet_and_go() -> None:
-    desk = desk_of(RPF)
+    viewer = viewer_of(RPF)
     for count in (2, 3, 4):
-        do(desk, "pane:add")
-        assert len(desk.session.lanes) == count and desk.active == count - 1
-    names = [lane.law.name for lane in desk.session.lanes]
+        do(viewer, "pane:add")
+        assert len(viewer.session.panes) == count and viewer.active == count - 1
+    names = [pane.law.name for pane in viewer.session.panes]
     assert names[0] == "rpf" and len(set(names)) == 4
-    do(desk, "pane:add")
-    assert desk.trouble and "4" in desk.message
-    do(desk, "pane:next")
-    assert desk.active == 0
+    do(viewer, "pane:add")
+    assert viewer.trouble and "4" in viewer.message
+    do(viewer, "pane:next")
+    assert viewer.active == 0
     for count in (3, 2, 1):
-        do(desk, "pane:remove")
-        assert len(desk.session.lanes) == count
-    desk.trouble = False
-    do(desk, "pane:remove")
-    assert desk.trouble and len(desk.session.lanes) == 1
+        do(viewer, "pane:remove")
+        assert len(viewer.session.panes) == count
+    viewer.trouble = False
+    do(viewer, "pane:remove")
+    assert viewer.trouble and len(viewer.session.panes) == 1
 
 
 def test_the_chosen_pane_is_one_that_there_is() -> None:
-    desk = desk_of(RAPF, RPF)
-    desk.active = 1
-    desk.session.remove_pane(desk.session.lanes[1])
-    assert desk.lane is desk.session.lanes[0] and desk.active == 0
+    viewer = viewer_of(RAPF, RPF)
+    viewer.active = 1
+    viewer.session.remove_pane(viewer.session.panes[1])
+    assert viewer.pane is viewer.session.panes[0] and viewer.active == 0
 
 
 def test_controllers_take_turns() -> None:
-    desk = desk_of()
+    viewer = viewer_of()
     seen = []
-    for _ in range(len(desk.laws)):
-        seen.append(desk.lane.law.name)
-        do(desk, "law")
-    assert sorted(seen) == sorted(desk.laws) and desk.lane.law.name == seen[0]
+    for _ in range(len(viewer.laws)):
+        seen.append(viewer.pane.law.name)
+        do(viewer, "law")
+    assert sorted(seen) == sorted(viewer.laws) and viewer.pane.law.name == seen[0]
 
 
 def test_choosing_the_controller_that_is_there_keeps_its_gains() -> None:
-    desk = desk_of(RAPF, RPF)
-    typed(desk, "k_rep 2")
-    desk.set_law(0, "rapf")
-    assert desk.session.lanes[0].law.value("k_rep") == 2.0
-    desk.set_law(1, "lloyd")
-    assert desk.active == 1 and desk.lane.law == LLOYD
+    viewer = viewer_of(RAPF, RPF)
+    typed(viewer, "k_rep 2")
+    viewer.set_law(0, "rapf")
+    assert viewer.session.panes[0].law.value("k_rep") == 2.0
+    viewer.set_law(1, "lloyd")
+    assert viewer.active == 1 and viewer.pane.law == LLOYD
 
 
 # robots
 
 
 def test_asking_goes_round_all_robots_also_those_that_failed() -> None:
-    desk = desk_of()
-    desk.session.fail_robot(2)
+    viewer = viewer_of()
+    viewer.session.fail_robot(2)
     seen = []
     for _ in range(4):
-        do(desk, "robot:next")
-        seen.append(desk.selected)
+        do(viewer, "robot:next")
+        seen.append(viewer.selected)
     assert seen == [1, 2, 3, 1]
-    do(desk, "robot:previous")
-    assert desk.selected == 3
+    do(viewer, "robot:previous")
+    assert viewer.selected == 3
 
 
 def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
-    desk = desk_of()
+    viewer = viewer_of()
     for action in ("robot:fail", "robot:remove"):
-        desk.trouble = False
-        do(desk, action)
-        assert desk.trouble and "no robot is chosen" in desk.message
-    desk.hand.selected = 2
-    do(desk, "robot:fail")
-    assert desk.session.numbers == (1, 3) and desk.selected == 2
-    do(desk, "robot:fail")
-    assert desk.session.numbers == (1, 2, 3)
-    do(desk, "robot:remove")
-    assert desk.session.numbers == (1, 3) and desk.selected is None
+        viewer.trouble = False
+        do(viewer, action)
+        assert viewer.trouble and "no robot is chosen" in viewer.message
+    viewer.hand.selected = 2
+    do(viewer, "robot:fail")
+    assert viewer.session.numbers == (1, 3) and viewer.selected == 2
+    do(viewer, "robot:fail")
+    assert viewer.session.numbers == (1, 2, 3)
+    do(viewer, "robot:remove")
+    assert viewer.session.numbers == (1, 3) and viewer.selected is None
 
 
 def test_undo_and_redo_say_what_they_did() -> None:
-    desk = desk_of()
-    do(desk, "undo")
-    assert desk.message == "nothing to undo"
-    do(desk, "redo")
-    assert desk.message == "nothing to redo"
-    desk.session.add_robot((5.0, 3.0))
-    do(desk, "undo")
-    assert desk.message == "undone: robot 4 joined; back at 0.0 s" and desk.session.numbers == (1, 2, 3)
-    do(desk, "redo")
-    assert desk.message == "done again: robot 4 joined" and desk.session.numbers == (1, 2, 3, 4)
+    viewer = viewer_of()
+    do(viewer, "undo")
+    assert viewer.message == "nothing to undo"
+    do(viewer, "redo")
+    assert viewer.message == "nothing to redo"
+    viewer.session.add_robot((5.0, 3.0))
+    do(viewer, "undo")
+    assert viewer.message == "undone: robot 4 joined; back at 0.0 s" and viewer.session.numbers == (1, 2, 3)
+    do(viewer, "redo")
+    assert viewer.message == "done again: robot 4 joined" and viewer.session.numbers == (1, 2, 3, 4)
 
 
 # tools
 
 
 def test_another_tool_gives_up_what_was_begun_and_says_how_it_works() -> None:
-    desk = desk_of()
-    do(desk, "tool:polygon")
-    assert desk.message == f"Polygon: {desk.tool.hint}"
-    desk.tool.press(desk.session, (1.0, 3.0), 0.1, None)
-    assert desk.tool.preview(desk.session) is not None
-    do(desk, "tool:wall")
-    assert desk.tools["polygon"].preview(desk.session) is None
-    do(desk, "cancel")
-    assert desk.tool is desk.hand
+    viewer = viewer_of()
+    do(viewer, "tool:polygon")
+    assert viewer.message == f"Polygon: {viewer.tool.hint}"
+    viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
+    assert viewer.tool.preview(viewer.session) is not None
+    do(viewer, "tool:wall")
+    assert viewer.tools["polygon"].preview(viewer.session) is None
+    do(viewer, "cancel")
+    assert viewer.tool is viewer.hand
 
 
 def test_cancelling_first_gives_up_then_puts_the_tool_away() -> None:
-    desk = desk_of()
-    do(desk, "tool:wall")
-    desk.tool.press(desk.session, (1.0, 3.0), 0.1, None)
-    do(desk, "cancel")
-    assert desk.tool.name == "wall" and desk.tool.preview(desk.session) is None
-    do(desk, "cancel")
-    assert desk.tool is desk.hand
+    viewer = viewer_of()
+    do(viewer, "tool:wall")
+    viewer.tool.press(viewer.session, (1.0, 3.0), 0.1, None)
+    do(viewer, "cancel")
+    assert viewer.tool.name == "wall" and viewer.tool.preview(viewer.session) is None
+    do(viewer, "cancel")
+    assert viewer.tool is viewer.hand
 
 
 def test_walls_become_wider_and_narrower() -> None:
-    desk = desk_of()
-    do(desk, "wider")
-    assert desk.message == "walls are 0.125 m wide"
-    do(desk, "narrower")
-    assert desk.message == "walls are 0.1 m wide"
+    viewer = viewer_of()
+    do(viewer, "wider")
+    assert viewer.message == "walls are 0.125 m wide"
+    do(viewer, "narrower")
+    assert viewer.message == "walls are 0.1 m wide"

@@ -22,10 +22,10 @@ from robocov.mapfile import load_map
 from robocov_app.viewer.session import session as module
 from robocov_app.viewer.session.file import dumped, load_session, save_session, session_json, session_schema
 from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 from robocov_app.viewer.session.session import Session
 
-ATLAS = Law("atlas")
+ATLAS = ControllerChoice("atlas")
 points = st.tuples(st.floats(0.2, 5.8), st.floats(0.2, 3.8))
 touches = st.lists(
     st.tuples(
@@ -72,9 +72,9 @@ def touched(session: Session, kind: str, point: tuple[float, float], k: int) -> 
         elif kind == "leave":
             session.remove_robot(numbers[k % len(numbers)])
         elif kind == "gain":
-            session.set_law(session.lanes[0], session.lanes[0].law.with_gain("k_rep", k / 5))
+            session.set_law(session.panes[0], session.panes[0].law.with_gain("k_rep", k / 5))
         elif kind == "limits":
-            session.set_limits(Limits(max_speed=k / 5))
+            session.set_limits(TeamSpec(max_speed=k / 5))
         elif kind == "paint":
             session.paint((point,), 0.7, lowers=k % 2 == 0, stroke=k)
         elif kind == "past":
@@ -150,7 +150,7 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
     """Dabs add up; robots that were slowed down by a limit do not become faster with the next."""
     session = stepped(begun(RAPF), 25)
     for speed in (1.0, 0.05, 1.0):
-        session.set_limits(Limits(max_speed=speed, radius=0.11))
+        session.set_limits(TeamSpec(max_speed=speed, radius=0.11))
     for x in (1.0, 2.0, 3.0):
         session.paint(((x, 2.0),), 0.7, lowers=False, stroke=1)
     stepped(session, 20)
@@ -160,7 +160,7 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
 
 def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resumed() -> None:
     session = stepped(begun(LLOYD), 5)
-    session.set_limits(Limits(max_speed=0.5))
+    session.set_limits(TeamSpec(max_speed=0.5))
     stepped(session, 10)
     session.look_at(7 / 60)
     session.branch()
@@ -190,12 +190,12 @@ def test_it_is_the_same_with_conditions_and_in_another_process(tmp_path: Path) -
         "from robocov_app.viewer.session.file import load_session\n"
         "from robocov_app.viewer.session.session import Session\n"
         "session = Session.opened(load_session(Path(sys.argv[1])))\n"
-        "sys.stdout.write(session.lanes[0].simulation.positions.tobytes().hex())\n"
+        "sys.stdout.write(session.panes[0].simulation.positions.tobytes().hex())\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True
     )
-    assert done.stdout.endswith(session.lanes[0].simulation.positions.tobytes().hex())
+    assert done.stdout.endswith(session.panes[0].simulation.positions.tobytes().hex())
 
 
 def test_branches_are_a_tree_that_can_be_walked() -> None:
@@ -211,10 +211,10 @@ def test_branches_are_a_tree_that_can_be_walked() -> None:
     assert ghost.node == failed.number and ghost.time[-1] == pytest.approx(29 / 60)
     session.enter(session.document.nodes[ghost.node])
     assert session.numbers == (2, 3) and session.time == 30 / 60
-    assert session.lanes[0].curve.last_time == pytest.approx(29 / 60), "its curve is there again"
+    assert session.panes[0].curve.last_time == pytest.approx(29 / 60), "its curve is there again"
     assert [ghost.node for ghost in session.ghosts] == [2]
     session.look_at(5 / 60)
-    session.set_law(session.lanes[0], LLOYD)
+    session.set_law(session.panes[0], LLOYD)
     assert len(session.branches) == 3, "nothing is lost by a touch in the past"
 
 
@@ -304,7 +304,7 @@ def test_a_controller_of_ones_own_is_never_run_because_a_file_says_so(tmp_path: 
         "class Mine(rc.Lloyd):\n    label = 'Mine'\n"
     )
     name = f"{mine}:Mine"
-    session = stepped(begun(Law(name)), 5)
+    session = stepped(begun(ControllerChoice(name)), 5)
     path = tmp_path / "story.robocov"
     save_session(path, session.document, session.head, session.step_now, {})
     with pytest.raises(InputError, match=f"open the session with --controller .*{mine.name}:Mine"):

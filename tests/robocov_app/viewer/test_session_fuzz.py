@@ -15,7 +15,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import RobocovError
 from robocov_app.viewer.session.file import dumped, session_json, session_of
 from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 from robocov_app.viewer.session.session import Session
 
 KINDS = (
@@ -29,7 +29,7 @@ class Monkey:
 
     def __init__(self, seed: int) -> None:
         self.random = r = random.Random(seed)
-        laws = r.choice([(RAPF,), (LLOYD, RAPF), (Law("atlas"),)])
+        laws = r.choice([(RAPF,), (LLOYD, RAPF), (ControllerChoice("atlas"),)])
         conditions = [
             *(None, Conditions(position_noise=0.02, seed=seed), Conditions(delay=0.1, loss=0.2, seed=seed)),
             Conditions(failures=(Failure(2, 0.4),), seed=seed),
@@ -67,7 +67,7 @@ class Monkey:
         elif kind == "draw":
             s.edit(with_obstacle(s.environment, CircleObstacle(self.point(), 0.2)), "drawn")
         elif kind == "revive":
-            s.revive_robot(r.choice([*s.circumstances(s.lanes[0]).failed, 9]))
+            s.revive_robot(r.choice([*s.setup(s.panes[0]).failed, 9]))
         elif kind == "enter":
             branch = r.choice(s.branches)
             s.enter(branch.node, r.randint(branch.node.begin, branch.node.end))
@@ -81,14 +81,14 @@ class Monkey:
                 "join": lambda: s.add_robot(self.point()),
                 "leave": lambda: s.remove_robot(r.choice(s.numbers)),
                 "place": lambda: s.place(r.choice(s.numbers), self.point()),
-                "gain": lambda: s.set_law(s.lanes[0], s.lanes[0].law.with_gain("k_rep", r.uniform(0, 2))),
-                "limits": lambda: s.set_limits(Limits(max_speed=r.uniform(0.2, 2))),
+                "gain": lambda: s.set_law(s.panes[0], s.panes[0].law.with_gain("k_rep", r.uniform(0, 2))),
+                "limits": lambda: s.set_limits(TeamSpec(max_speed=r.uniform(0.2, 2))),
                 "paint": self.paint,
                 "undo": s.undo,
                 "redo": s.redo,
                 "restart": lambda: s.restart(seed=r.randint(0, 9)),
                 "pane": lambda: s.add_pane(LLOYD),
-                "drop": lambda: s.remove_pane(s.lanes[-1]),
+                "drop": lambda: s.remove_pane(s.panes[-1]),
             }
             deeds[kind]()
 
@@ -114,6 +114,6 @@ def test_a_random_story_is_made_again_bit_for_bit(seed: int) -> None:
 
 
 def compare(one: Session, other: Session) -> None:
-    assert one.hand == other.hand and len(one.lanes) == len(other.lanes)
+    assert one.hand == other.hand and len(one.panes) == len(other.panes)
     for mine, theirs in zip(positions_of(one), positions_of(other), strict=True):
         np.testing.assert_array_equal(mine, theirs)

@@ -65,7 +65,7 @@ def test_a_story_is_saved_with_its_parts_costs_and_film(
     assert [part["words"] for part in answer["parts"]] == ["begun", "circle drawn", "robot 4 joined"]
     assert [part["from_s"] for part in answer["parts"]] == pytest.approx([0.0, 0.2, 0.4])
     last = Record.load(out / "03-robot-4-joined" / "lloyd")
-    np.testing.assert_array_equal(last.positions[-1], session.lanes[1].simulation.positions)
+    np.testing.assert_array_equal(last.positions[-1], session.panes[1].simulation.positions)
     assert len(last.team) == 4 and last.session["began_at_s"] == pytest.approx(0.4)
     rows = (out / "cost.csv").read_text().splitlines()
     assert rows[0].startswith("controller,time_s,") and {row.split(",")[0] for row in rows[1:]} == {
@@ -145,7 +145,7 @@ def test_what_was_plotted_is_there_again(tmp_path: Path) -> None:
     session.fail_robot(1)
     with_curves(session, 30)
     again = Session.opened(load_session(Path(saved(session, tmp_path))))
-    curve = again.lanes[0].curve
+    curve = again.panes[0].curve
     assert 30 < len(curve) <= 61 and curve.last_time == pytest.approx(229 / 60, abs=1e-3)
     assert curve.at(2.0) == pytest.approx(1.0, abs=1e-3)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from driven_window import opened
-from touched_run import begun, desk_of, positions_of, stepped
+from touched_run import begun, positions_of, stepped, viewer_of
 
 from robocov.errors import MapError
 from robocov_app.viewer.presenter import Presenter
@@ -68,29 +68,29 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
         stepped(driver.session, 10).fail_robot(2)
         stepped(driver.session, 10)
         driver.key("ctrl+z")
-        assert driver.desk.message.startswith("undone: robot 2 failed; back at 0.2 s")
+        assert driver.viewer.message.startswith("undone: robot 2 failed; back at 0.2 s")
         driver.session.fail_robot(1)
         driver.key("ctrl+s")
         (path,) = tmp_path.glob("*.robocov")
-        assert str(path) in driver.desk.message
+        assert str(path) in driver.viewer.message
         driver.key("alt+left")
-        assert driver.desk.message == "branch 1 of 2: robot 2 failed" and driver.session.numbers == (1, 3)
+        assert driver.viewer.message == "branch 1 of 2: robot 2 failed" and driver.session.numbers == (1, 3)
         driver.key("alt+right")
         assert driver.session.numbers == (2, 3)
         driver.window.commands.typed(f"open {path}")
         driver.frames(2)
-        assert driver.desk.session.numbers == (2, 3) and len(driver.desk.session.branches) == 2
+        assert driver.viewer.session.numbers == (2, 3) and len(driver.viewer.session.branches) == 2
         driver.window.commands.typed("branch 1")
-        assert driver.desk.session.numbers == (1, 3)
+        assert driver.viewer.session.numbers == (1, 3)
 
 
 def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
-    desk: Presenter = desk_of(folder=tmp_path)
+    viewer: Presenter = viewer_of(folder=tmp_path)
     (tmp_path / "no.robocov").write_text("{}")
-    before = desk.session
+    before = viewer.session
     with pytest.raises(MapError, match="format: missing"):
-        desk.open_session(tmp_path / "no.robocov")
-    assert desk.session is before
+        viewer.open_session(tmp_path / "no.robocov")
+    assert viewer.session is before
 
 
 def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
@@ -105,6 +105,7 @@ def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
         x, y = points[-1].tolist()
         driver.click(x, y + driver.window.layout.chart[1])
         assert (
-            driver.desk.message == "branch 1 of 2: robot 2 failed" or "robot 2 failed" in driver.desk.message
+            driver.viewer.message == "branch 1 of 2: robot 2 failed"
+            or "robot 2 failed" in driver.viewer.message
         )
         assert driver.session.head.number == node and driver.session.numbers == (1, 3)

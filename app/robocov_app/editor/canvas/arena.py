@@ -70,12 +70,12 @@ EMPTY = (0.0, 0.0, 10.0, 10.0)
 
 
 class Arena:
-    """Draws what is on a desk, and finds what is under the cursor."""
+    """Draws what is in the editor, and finds what is under the cursor."""
 
-    def __init__(self, desk: Editor) -> None:
-        self.desk = desk
+    def __init__(self, editor: Editor) -> None:
+        self.editor = editor
         self.sheet = Sheet()
-        self.strips = Strips(desk)
+        self.strips = Strips(editor)
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.at: tuple[float, float] | None = None
@@ -106,13 +106,13 @@ class Arena:
 
     def fit(self) -> None:
         """Show the whole map."""
-        self._show(self.desk.sketch.bounds or EMPTY)
+        self._show(self.editor.sketch.bounds or EMPTY)
 
     def fit_selection(self) -> None:
         """Show what is selected, or all."""
         from robocov_app.editor.edits.transform import bounds_of
 
-        self._show(bounds_of(self.desk.sketch, self.desk.selection) or self.desk.sketch.bounds or EMPTY)
+        self._show(bounds_of(self.editor.sketch, self.editor.selection) or self.editor.sketch.bounds or EMPTY)
 
     def _show(self, bounds: tuple[float, float, float, float]) -> None:
         low_x, low_y, high_x, high_y = bounds
@@ -135,7 +135,7 @@ class Arena:
 
     def zoom(self, factor: float, at: tuple[float, float]) -> None:
         """Magnify what is under a pixel of the window."""
-        low_x, low_y, high_x, high_y = self.desk.sketch.bounds or EMPTY
+        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
         factor = float(np.clip(self.camera.zoom * factor, 20.0 / whole, 2e4)) / self.camera.zoom
@@ -144,7 +144,7 @@ class Arena:
     def pan(self, dx: float, dy: float) -> None:
         """Move the sheet by so many pixels; the map stays within reach."""
         camera = self.camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self.desk.sketch.bounds or EMPTY
+        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
         x = float(np.clip(camera.center[0], low_x - far_x, high_x + far_x))
         y = float(np.clip(camera.center[1], low_y - far_y, high_y + far_y))
@@ -152,7 +152,7 @@ class Arena:
 
     def _look(self, camera: Camera) -> None:
         self._camera = camera
-        self.desk.pixel = self.layout.scale / camera.zoom
+        self.editor.pixel = self.layout.scale / camera.zoom
 
     # what is where
 
@@ -178,9 +178,9 @@ class Arena:
 
     def problem_at(self, pixel: tuple[float, float]) -> Problem | None:
         """Return the problem whose badge is under a pixel."""
-        if "problems" not in self.desk.shown:
+        if "problems" not in self.editor.shown:
             return None
-        for problem, at in badge_places(self.desk.problems, self._view()):
+        for problem, at in badge_places(self.editor.problems, self._view()):
             if distance(at, pixel) < 10 * self.layout.scale:
                 return problem
         return None
@@ -188,31 +188,31 @@ class Arena:
     # drawing
 
     def _view(self) -> View:
-        desk = self.desk
-        folder = desk.document.path.parent if desk.document.path is not None else desk.folder
+        editor = self.editor
+        folder = editor.document.path.parent if editor.document.path is not None else editor.folder
         return View(
             self.camera,
             self.theme,
             self.layout.scale,
             self.layout.size,
-            frozenset(desk.shown),
-            desk.grid,
+            frozenset(editor.shown),
+            editor.grid,
             Path(folder),
         )
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw all of it."""
-        desk, shown = self.desk, self.desk.shown
+        editor, shown = self.editor, self.editor.shown
         wide = pygame.Surface((self.layout.arena[2], 1))
         self.strips.update(self._view().canvas(wide), self.team)
         if self.camera.view != self._view_box():
             self._look(self.camera.within(self._view_box()))
         view = self._view()
-        pending = desk.pending
-        base, now = desk.sketch, pending.sketch if pending is not None else desk.sketch
-        moved = getattr(desk.tools["picture"], "moved", None)
-        weighed = getattr(desk.tool, "change", None)
-        drag = desk.selector.drag
+        pending = editor.pending
+        base, now = editor.sketch, pending.sketch if pending is not None else editor.sketch
+        moved = getattr(editor.tools["picture"], "moved", None)
+        weighed = getattr(editor.tool, "change", None)
+        drag = editor.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
         lifted = self._lifted(base, now) if carried is None else _kept_keys(carried)
         under = now if now.boundary is not base.boundary else base
@@ -237,22 +237,22 @@ class Arena:
         elif now is not base:
             new = [item for item in now.obstacles if item.key not in base.places]
             self.sheet.draw_items(canvas, new, mix(self.theme.obstacle, accent(self.theme), 0.22))
-        if "impassable" in shown and desk.measurement is not None:
-            self._hatching.draw(screen, view, desk.measurement)
-            if desk.measurement.gap is not None:
-                draw_gap(canvas, desk.measurement.gap, desk.measurement.radius)
+        if "impassable" in shown and editor.measurement is not None:
+            self._hatching.draw(screen, view, editor.measurement)
+            if editor.measurement.gap is not None:
+                draw_gap(canvas, editor.measurement.gap, editor.measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         self._draw_starts(canvas, now)
         if self.team is not None and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
-            chosen = pending.selection if pending is not None else desk.selection
+            chosen = pending.selection if pending is not None else editor.selection
             self._draw_selection(screen, view, canvas, now, chosen)
-        if "impassable" in shown and desk.measurement is not None and desk.measurement.gap is not None:
-            busy = desk.tool is not desk.selector or drag is not None
-            tag_gap(canvas, desk.measurement.gap, desk.measurement.radius, self.at if busy else None)
+        if "impassable" in shown and editor.measurement is not None and editor.measurement.gap is not None:
+            busy = editor.tool is not editor.selector or drag is not None
+            tag_gap(canvas, editor.measurement.gap, editor.measurement.radius, self.at if busy else None)
         if "problems" in shown:
-            draw_problems(canvas, view, desk.problems, desk.problem, self.hovered)
+            draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
         self._draw_tool(canvas)
         screen.set_clip(None)
         self.strips.draw(screen, canvas, self.layout.arena)
@@ -274,7 +274,7 @@ class Arena:
         if self._carried is None or self._carried[0] is not drag or self._carried[1] != view.camera:
             page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
             own = view.canvas(page)
-            sketch = self.desk.sketch
+            sketch = self.editor.sketch
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
             fill = mix(self.theme.obstacle, accent(self.theme), 0.22)
             self.sheet.draw_items(own, there, fill, accent(self.theme))
@@ -289,20 +289,20 @@ class Arena:
 
     def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
-        theme, since = canvas.theme, self.desk.moves_since
+        theme, since = canvas.theme, self.editor.moves_since
         for key in moving(sketch):
             item = sketch.item(key)
             path = item.shape.path
             assert path is not None
-            chosen = key in self.desk.selection.items
+            chosen = key in self.editor.selection.items
             draw_path(canvas, path, accent(theme) if chosen else mix(theme.background, theme.ink, 0.6))
             if since is not None and goes(path):
-                shift = path.shift(self.desk.now - since)
+                shift = path.shift(self.editor.now - since)
                 draw_ghost(canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by))
 
     def _draw_starts(self, canvas: Canvas, sketch: Sketch) -> None:
         for k, (name, spec) in enumerate(sketch.starts):
-            draw_start(canvas, spec, name, chosen=name in self.desk.selection.starts, first=k == 0)
+            draw_start(canvas, spec, name, chosen=name in self.editor.selection.starts, first=k == 0)
 
     def _draw_team(self, canvas: Canvas, team: Team) -> None:
         if not team.places:
@@ -326,11 +326,11 @@ class Arena:
     def _draw_selection(
         self, screen: pygame.Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
     ) -> None:
-        desk, theme = self.desk, self.theme
-        selector = desk.selector
+        editor, theme = self.editor, self.theme
+        selector = editor.selector
         selection = selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
-        hovered = selector.hovered if desk.tool is selector and not selector.busy and self.at else None
+        hovered = selector.hovered if editor.tool is selector and not selector.busy and self.at else None
         if hovered is not None and hovered not in owners:
             self._draw_owner(canvas, sketch, hovered, mix(theme.background, accent(theme), 0.7), 1.5)
         if len(owners) > MANY:
@@ -345,12 +345,12 @@ class Arena:
         else:
             for owner in owners:
                 self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
-        if "handles" not in desk.shown or desk.tool is not selector or not selection:
+        if "handles" not in editor.shown or editor.tool is not selector or not selection:
             return
-        box = frame_of(sketch, selection, desk.pixel)
+        box = frame_of(sketch, selection, editor.pixel)
         if box is not None:
             draw_box(canvas, box, mix(theme.background, accent(theme), 0.6))
-        found = desk.handles if sketch is desk.sketch else handles(sketch, selection, desk.pixel)
+        found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
         draw_grips(canvas, found, frozenset(selection.vertices), selector.near, KNOB * canvas.scale)
 
     def _draw_owner(
@@ -366,15 +366,15 @@ class Arena:
             draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
 
     def _draw_tool(self, canvas: Canvas) -> None:
-        desk = self.desk
+        editor = self.editor
         at = self.at
-        draw_guides(canvas, desk.tool.guides)
-        preview = desk.tool.preview(desk)
+        draw_guides(canvas, editor.tool.guides)
+        preview = editor.tool.preview(editor)
         if preview is not None:
             draw_preview(canvas, preview, at)
-        if desk.typed:
+        if editor.typed:
             left, top, width, height = self.camera.view
-            draw_typed(canvas, desk.typed, at or (left + width / 2, top + height / 2))
+            draw_typed(canvas, editor.typed, at or (left + width / 2, top + height / 2))
 
 
 def _kept_keys(drag: Moving) -> frozenset[int]:

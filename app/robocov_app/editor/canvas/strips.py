@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 class Strips:
     """Draws the strips, and says what they leave to the sheet."""
 
-    def __init__(self, desk: Editor) -> None:
-        self._desk = desk
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
         self._entries: list[LegendEntry] = []
         self._rows = 1
         self._rows_for: object = None
@@ -43,7 +43,7 @@ class Strips:
     def room(self, arena: Box, scale: float) -> tuple[float, float, float, float]:
         """Return what of the arena is left: left, top, width and height, px."""
         left, top, width, height = arena
-        above = round((10 + LEGEND_ROW * self._rows) * scale) if "legend" in self._desk.shown else 0
+        above = round((10 + LEGEND_ROW * self._rows) * scale) if "legend" in self._editor.shown else 0
         return (
             float(left),
             float(top + above),
@@ -56,22 +56,22 @@ class Strips:
 
         The legend does not become lower again while things come and go: the map is not to jump.
         """
-        desk = self._desk
+        editor = self._editor
         self._entries = self._found(team)
         rows = max(len(legend_rows(canvas, self._entries)), 1)
-        key = (canvas.surface.get_width(), canvas.scale, desk.document, "legend" in desk.shown)
+        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
         self._rows = max(rows, self._rows) if key == self._rows_for else rows
         self._rows_for = key
 
     def _found(self, team: Team | None) -> list[LegendEntry]:
-        sketch, shown = self._desk.sketch, self._desk.shown
+        sketch, shown = self._editor.sketch, self._editor.shown
         if "legend" not in shown:
             return []
         if self._unfree[0] is not sketch.boundary:
             geometry = beyond(sketch)
             self._unfree = sketch.boundary, geometry is not None and geometry.area > 1e-6
         standing = "robots" in shown and team is not None and bool(team.places)
-        measurement = self._desk.measurement if "impassable" in shown else None
+        measurement = self._editor.measurement if "impassable" in shown else None
         found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary:
@@ -96,16 +96,16 @@ class Strips:
         draw_scale_bar(own)
         taken = (EDGE + 90) * canvas.scale + bar_length(own) * canvas.camera.zoom
         size = canvas.text_size(canvas.theme.text)
-        words = shortened(map_words(self._desk), size, width - taken - EDGE * canvas.scale)
+        words = shortened(map_words(self._editor), size, width - taken - EDGE * canvas.scale)
         own.text(words, (width - EDGE * canvas.scale, high / 2), anchor="right")
 
 
-def map_words(desk: Editor) -> str:
+def map_words(editor: Editor) -> str:
     """Return what the strip below the sheet says: whose map it is, and what it is like."""
-    sketch, measurement = desk.sketch, desk.measurement
+    sketch, measurement = editor.sketch, editor.measurement
     count = len(sketch.obstacles)
     said = [
-        f"{'● ' if desk.document.unsaved else ''}{desk.document.title}",
+        f"{'● ' if editor.document.unsaved else ''}{editor.document.title}",
         f"{count} obstacle{'' if count == 1 else 's'}",
     ]
     if measurement is not None:

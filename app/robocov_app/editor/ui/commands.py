@@ -67,17 +67,17 @@ class Typed(NamedTuple):
 
 def edited(edit: Callable[..., Change], *rest: object, single: bool = False) -> Callable[[Editor], None]:
     """Return what makes an edit of the selected things; with `single`, of single vertices if some are."""
-    return lambda desk: _do(desk, edit, *rest, single=single)
+    return lambda editor: _do(editor, edit, *rest, single=single)
 
 
-def _do(desk: Editor, edit: Callable[..., Change], *rest: object, single: bool = False) -> None:
+def _do(editor: Editor, edit: Callable[..., Change], *rest: object, single: bool = False) -> None:
     """Make an edit of whole things; with `single`, of single vertices where some are selected."""
-    selection = desk.selection
+    selection = editor.selection
     if not (single and selection.vertices):
         selection = whole(selection)
     if not selection:
         raise MapError("nothing is selected: click something first, or press Ctrl A")
-    desk.change(edit(desk.sketch, selection, *rest))
+    editor.change(edit(editor.sketch, selection, *rest))
 
 
 def whole(selection: Selection) -> Selection:
@@ -85,206 +85,207 @@ def whole(selection: Selection) -> Selection:
     return selection.without_vertices().plus(Selection.of(*{vertex.of for vertex in selection.vertices}))
 
 
-def play(desk: Editor) -> str:
+def play(editor: Editor) -> str:
     """Show where obstacles that move get to, or show them no more."""
-    if desk.moves_since is not None:
-        desk.moves_since = None
+    if editor.moves_since is not None:
+        editor.moves_since = None
         return "obstacles stand as they are at time zero"
-    if not motion_path.moving(desk.sketch):
+    if not motion_path.moving(editor.sketch):
         raise MapError("no obstacle moves: the tool Path gives one a path")
-    desk.moves_since = desk.now
+    editor.moves_since = editor.now
     return "obstacles move as they will; L ends it"
 
 
-def back(desk: Editor) -> None:
+def back(editor: Editor) -> None:
     """Take the last point back, else delete what is selected."""
-    if not desk.tool.back(desk) and not desk.tool.busy and desk.selection:
-        delete(desk)
+    if not editor.tool.back(editor) and not editor.tool.busy and editor.selection:
+        delete(editor)
 
 
-def delete(desk: Editor) -> None:
+def delete(editor: Editor) -> None:
     """Delete the selected vertices, or else the selected things."""
-    selection = desk.selection
+    selection = editor.selection
     if not selection:
         raise MapError("nothing is selected: click something first")
     act = vertices.deleted if selection.vertices else properties.deleted
     single = Selection(vertices=selection.vertices)
-    desk.change(act(desk.sketch, single if selection.vertices else selection))
+    editor.change(act(editor.sketch, single if selection.vertices else selection))
 
 
-def copy(desk: Editor) -> str:
+def copy(editor: Editor) -> str:
     """Copy what is selected to the clipboard."""
-    selection = whole(desk.selection)
-    desk.pasteboard.put(copied(desk.sketch, selection))
-    return f"copied: {selection.words(desk.sketch)}"
+    selection = whole(editor.selection)
+    editor.pasteboard.put(copied(editor.sketch, selection))
+    return f"copied: {selection.words(editor.sketch)}"
 
 
-def cut(desk: Editor) -> None:
+def cut(editor: Editor) -> None:
     """Copy what is selected, and delete it."""
-    copy(desk)
-    desk.change(properties.deleted(desk.sketch, whole(desk.selection)))
+    copy(editor)
+    editor.change(properties.deleted(editor.sketch, whole(editor.selection)))
 
 
-def paste(desk: Editor, at: Point | None) -> None:
+def paste(editor: Editor, at: Point | None) -> None:
     """Paste what is in the clipboard, its middle at a place."""
-    text = desk.pasteboard.get()
+    text = editor.pasteboard.get()
     if not text.strip():
         raise MapError("the clipboard is empty")
-    grid = desk.grid if "grid" in desk.snaps else None
-    desk.change(pasted(desk.sketch, text, at, grid))
+    grid = editor.grid if "grid" in editor.snaps else None
+    editor.change(pasted(editor.sketch, text, at, grid))
 
 
 def nudge(x: int, y: int) -> Callable[[Editor], None]:
     """Return what moves the selection by so many spacings of the grid."""
 
-    def run(desk: Editor) -> None:
-        selection = desk.selection
+    def run(editor: Editor) -> None:
+        selection = editor.selection
         if not selection:
             raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
         act = vertices.moved if selection.vertices else transform.moved
         single = Selection(vertices=selection.vertices) if selection.vertices else selection
-        desk.change(act(desk.sketch, single, x * desk.grid, y * desk.grid), drag=("nudge", selection))
+        editor.change(act(editor.sketch, single, x * editor.grid, y * editor.grid), drag=("nudge", selection))
 
     return run
 
 
-def cancel(desk: Editor) -> None:
+def cancel(editor: Editor) -> None:
     """Give up what is half done, else put the tool away, else select nothing."""
-    if desk.typed:
-        desk.typed = ""
-    elif not desk.tool.cancel(desk) and desk.tool is not desk.selector:
-        desk.choose("select", tell=False)
+    if editor.typed:
+        editor.typed = ""
+    elif not editor.tool.cancel(editor) and editor.tool is not editor.selector:
+        editor.choose("select", tell=False)
 
 
-def select_next(desk: Editor, by: int) -> None:
+def select_next(editor: Editor, by: int) -> None:
     """Select the next obstacle, start or boundary, in the order of the map."""
     order: list[Owner] = [
-        *(item.key for item in desk.sketch.obstacles if not item.hidden),
-        *(name for name, _ in desk.sketch.starts),
+        *(item.key for item in editor.sketch.obstacles if not item.hidden),
+        *(name for name, _ in editor.sketch.starts),
     ]
-    if desk.sketch.boundary is not None:
+    if editor.sketch.boundary is not None:
         order.append(BOUNDARY)
     if not order:
         return
-    now = [order.index(each) for each in whole(desk.selection).owners if each in order]
+    now = [order.index(each) for each in whole(editor.selection).owners if each in order]
     place = (max(now) + by if by > 0 else min(now) + by) if now else (0 if by > 0 else -1)
-    desk.select(Selection.of(order[place % len(order)]))
+    editor.select(Selection.of(order[place % len(order)]))
 
 
-def one_vertex(desk: Editor) -> Vertex:
+def one_vertex(editor: Editor) -> Vertex:
     """Return the one vertex that is selected."""
-    if len(desk.selection.vertices) != 1:
+    if len(editor.selection.vertices) != 1:
         raise MapError("select one vertex first: click an obstacle, then one of its corners")
-    (vertex,) = desk.selection.vertices
+    (vertex,) = editor.selection.vertices
     return vertex
 
 
-def corners(desk: Editor) -> Selection:
+def corners(editor: Editor) -> Selection:
     """Return the selected corners."""
-    if not desk.selection.vertices:
+    if not editor.selection.vertices:
         raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
-    return Selection(vertices=desk.selection.vertices)
+    return Selection(vertices=editor.selection.vertices)
 
 
-def bevel(desk: Editor, length: float) -> None:
+def bevel(editor: Editor, length: float) -> None:
     """Cut the selected corners off."""
-    desk.change(vertices.bevelled(desk.sketch, corners(desk), length))
+    editor.change(vertices.bevelled(editor.sketch, corners(editor), length))
 
 
-def round_corners(desk: Editor, radius: float) -> None:
+def round_corners(editor: Editor, radius: float) -> None:
     """Round the selected corners."""
-    desk.change(vertices.rounded_off(desk.sketch, corners(desk), radius))
+    editor.change(vertices.rounded_off(editor.sketch, corners(editor), radius))
 
 
-def simplify_outlines(desk: Editor, tolerance: float) -> None:
+def simplify_outlines(editor: Editor, tolerance: float) -> None:
     """Leave vertices out of what is selected."""
-    _do(desk, simplify.simplified, tolerance)
+    _do(editor, simplify.simplified, tolerance)
 
 
-def extend(desk: Editor) -> None:
+def extend(editor: Editor) -> None:
     """Go on with a wall from the vertex that is selected, to where the cursor is."""
-    if desk.cursor is None:
+    if editor.cursor is None:
         raise MapError("move the mouse to where the wall is to go on to")
-    vertex = one_vertex(desk)
-    to = desk.snapped(desk.cursor, FINGER * desk.pixel, place_of(desk.sketch, vertex)).point
-    desk.change(vertices.extended(desk.sketch, vertex, to))
+    vertex = one_vertex(editor)
+    to = editor.snapped(editor.cursor, FINGER * editor.pixel, place_of(editor.sketch, vertex)).point
+    editor.change(vertices.extended(editor.sketch, vertex, to))
 
 
-def fill(desk: Editor) -> None:
+def fill(editor: Editor) -> None:
     """Fill the hole whose vertex is selected."""
-    vertex = one_vertex(desk)
+    vertex = one_vertex(editor)
     if not isinstance(vertex.of, int) or vertex.ring == 0:
         raise MapError("select a vertex of the hole first")
-    desk.change(vertices.hole_filled(desk.sketch, vertex.of, vertex.ring))
+    editor.change(vertices.hole_filled(editor.sketch, vertex.of, vertex.ring))
 
 
-def widen(desk: Editor, factor: float) -> None:
+def widen(editor: Editor, factor: float) -> None:
     """Make the selected walls wider or narrower, and those that are drawn."""
-    walls = {key: desk.sketch.item(key).shape for key in whole(desk.selection).items}
+    walls = {key: editor.sketch.item(key).shape for key in whole(editor.selection).items}
     widths = [shape.width for shape in walls.values() if isinstance(shape, WallObstacle)]
-    width = round(max((widths[0] if widths else desk.wall_width) * factor, 0.01), 3)
-    if widths and not desk.tool.busy:
-        desk.change(
-            properties.widened(desk.sketch, whole(desk.selection), width), drag=("width", desk.selection)
+    width = round(max((widths[0] if widths else editor.wall_width) * factor, 0.01), 3)
+    if widths and not editor.tool.busy:
+        editor.change(
+            properties.widened(editor.sketch, whole(editor.selection), width),
+            drag=("width", editor.selection),
         )
-    desk.set_wall_width(width)
-    desk.say(f"walls are {width:g} m wide")
+    editor.set_wall_width(width)
+    editor.say(f"walls are {width:g} m wide")
 
 
-def next_start(desk: Editor) -> None:
+def next_start(editor: Editor) -> None:
     """Show the team at the next start."""
-    names = desk.start_names
+    names = editor.start_names
     if not names:
         raise MapError("the map has no start yet: S draws one")
-    now = desk.start_name
+    now = editor.start_name
     name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
-    desk.start = name
-    desk.select(Selection.of(name))
-    desk.say(f"start “{name}”")
+    editor.start = name
+    editor.select(Selection.of(name))
+    editor.say(f"start “{name}”")
 
 
-def make_default(desk: Editor) -> None:
+def make_default(editor: Editor) -> None:
     """Make the selected start the map's default."""
-    if len(desk.selection.starts) != 1:
+    if len(editor.selection.starts) != 1:
         raise MapError("select one start first")
-    (name,) = desk.selection.starts
-    desk.change(properties.start_first(desk.sketch, name))
+    (name,) = editor.selection.starts
+    editor.change(properties.start_first(editor.sketch, name))
 
 
-def density_weight(desk: Editor) -> float:
+def density_weight(editor: Editor) -> float:
     """Return the weight of what is drawn next with the tool Density."""
-    tool = desk.tools["density"]
+    tool = editor.tools["density"]
     return tool.weight if isinstance(tool, DensityTool) else 1.0
 
 
-def fix_problem(desk: Editor) -> None:
+def fix_problem(editor: Editor) -> None:
     """Mend the problem that is shown, or the first that can be."""
-    found = [desk.problem] if desk.problem is not None else list(desk.problems)
+    found = [editor.problem] if editor.problem is not None else list(editor.problems)
     for problem in found:
-        change = fixes.fixed(desk.sketch, problem, desk.radius)
+        change = fixes.fixed(editor.sketch, problem, editor.radius)
         if change is not None:
-            desk.change(change)
+            editor.change(change)
             return
     raise MapError("there is nothing that can be mended by itself")
 
 
-def next_problem(desk: Editor) -> None:
+def next_problem(editor: Editor) -> None:
     """Show the next problem with its words."""
-    found = desk.problems
+    found = editor.problems
     if not found:
-        desk.problem = None
-        desk.say("nothing is wrong with the map" if desk.measurement is not None else "not looked at yet")
+        editor.problem = None
+        editor.say("nothing is wrong with the map" if editor.measurement is not None else "not looked at yet")
         return
-    place = found.index(desk.problem) + 1 if desk.problem in found else 0
-    desk.problem = found[place % len(found)]
-    desk.say(desk.problem.words, trouble=desk.problem.grave)
+    place = found.index(editor.problem) + 1 if editor.problem in found else 0
+    editor.problem = found[place % len(found)]
+    editor.say(editor.problem.words, trouble=editor.problem.grave)
 
 
 # values that are typed
 
 
-def _selected(desk: Editor) -> Selection:
-    selection = whole(desk.selection)
+def _selected(editor: Editor) -> Selection:
+    selection = whole(editor.selection)
     if not selection:
         raise MapError("nothing is selected: click something first, or press Ctrl A")
     return selection
@@ -297,70 +298,72 @@ def _whole_number(word: str, text: str) -> int:
         raise MapError(f"{word}: {text!r}, but a whole number was wanted") from None
 
 
-def _set_angle(desk: Editor, text: str) -> None:
+def _set_angle(editor: Editor, text: str) -> None:
     angle = angle_of(text)
     if not 0.1 <= angle <= 90.0:
         raise MapError(f"angle: {angle:g}°, but 0.1° to 90° was wanted")
-    desk.snap_angle = angle
-    desk.say(f"angles snap to multiples of {angle:g}°")
+    editor.snap_angle = angle
+    editor.say(f"angles snap to multiples of {angle:g}°")
 
 
-def _set_seed(desk: Editor, text: str) -> None:
-    desk.seed = max(_whole_number("seed", text), 0)
+def _set_seed(editor: Editor, text: str) -> None:
+    editor.seed = max(_whole_number("seed", text), 0)
 
 
 def _edit_to(edit: Callable[..., Change], read: Callable[[str], object]) -> Callable[[Editor, str], None]:
     """Return what makes an edit of the selected things to a typed value."""
-    return lambda desk, text: desk.change(edit(desk.sketch, _selected(desk), read(text)))
+    return lambda editor, text: editor.change(edit(editor.sketch, _selected(editor), read(text)))
 
 
-def _move(desk: Editor, text: str) -> None:
+def _move(editor: Editor, text: str) -> None:
     text = text.strip()
     dx, dy = point_of(text if text[0] in "+@" else f"@{text}", last=(0.0, 0.0))
-    selection = desk.selection
+    selection = editor.selection
     if not selection:
-        _selected(desk)
+        _selected(editor)
     act = vertices.moved if selection.vertices else transform.moved
-    desk.change(act(desk.sketch, selection, dx, dy))
+    editor.change(act(editor.sketch, selection, dx, dy))
 
 
-def _place(desk: Editor, text: str) -> None:
-    selection = _selected(desk)
-    bounds = bounds_of(desk.sketch, selection)
+def _place(editor: Editor, text: str) -> None:
+    selection = _selected(editor)
+    bounds = bounds_of(editor.sketch, selection)
     x, y = point_of(text, last=bounds[:2] if bounds else None)
-    desk.change(transform.placed(desk.sketch, selection, x, y))
+    editor.change(transform.placed(editor.sketch, selection, x, y))
 
 
-def _scale(desk: Editor, text: str) -> None:
-    selection = _selected(desk)
-    bounds = bounds_of(desk.sketch, selection)
+def _scale(editor: Editor, text: str) -> None:
+    selection = _selected(editor)
+    bounds = bounds_of(editor.sketch, selection)
     if bounds is None:
         raise MapError("there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
-    desk.change(transform.scaled(desk.sketch, selection, factor))
+    editor.change(transform.scaled(editor.sketch, selection, factor))
 
 
-def _size(desk: Editor, text: str) -> None:
+def _size(editor: Editor, text: str) -> None:
     width, height = size_of(text)
-    desk.change(transform.resized(desk.sketch, _selected(desk), width, height))
+    editor.change(transform.resized(editor.sketch, _selected(editor), width, height))
 
 
-def _name(desk: Editor, text: str) -> None:
-    owners = sorted(whole(desk.selection).owners, key=str)
+def _name(editor: Editor, text: str) -> None:
+    owners = sorted(whole(editor.selection).owners, key=str)
     if len(owners) != 1:
         raise MapError("select one obstacle or start first")
-    desk.change(properties.renamed(desk.sketch, owners[0], text))
+    editor.change(properties.renamed(editor.sketch, owners[0], text))
 
 
-def _offset(desk: Editor, text: str) -> None:
+def _offset(editor: Editor, text: str) -> None:
     sign = -1.0 if text.strip().startswith("-") else 1.0
-    desk.change(boolean.offset(desk.sketch, _selected(desk), sign * length_of(text.strip().lstrip("+-"))))
+    editor.change(
+        boolean.offset(editor.sketch, _selected(editor), sign * length_of(text.strip().lstrip("+-")))
+    )
 
 
-def _set_density(desk: Editor, text: str) -> None:
+def _set_density(editor: Editor, text: str) -> None:
     if text.strip() != "none":
         raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
-    desk.change(density_edits.density_removed(desk.sketch))
+    editor.change(density_edits.density_removed(editor.sketch))
 
 
 def _number(word: str, text: str) -> float:
@@ -370,13 +373,13 @@ def _number(word: str, text: str) -> float:
         raise MapError(f"{word}: {text!r}, but a number was wanted") from None
 
 
-def _array(desk: Editor, text: str) -> None:
+def _array(editor: Editor, text: str) -> None:
     parts = text.replace("x", " ").split()
     if len(parts) != 4:
         raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
     columns, rows = (_whole_number("array", each) for each in parts[:2])
     dx, dy = (length_of(each.lstrip("-")) * (-1.0 if each.startswith("-") else 1.0) for each in parts[2:])
-    desk.change(transform.arrayed(desk.sketch, _selected(desk), columns, rows, dx, dy))
+    editor.change(transform.arrayed(editor.sketch, _selected(editor), columns, rows, dx, dy))
 
 
 # the lists
@@ -426,7 +429,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "background:none",
             "Take the picture under the map away",
             "",
-            lambda desk: desk.change(properties.underlaid(desk.sketch, None)),
+            lambda editor: editor.change(properties.underlaid(editor.sketch, None)),
         ),
         Row("reload", "Read the file again", "ctrl+r"),
         Row("try", "Try it in the demo, and back", "f5"),
@@ -438,25 +441,35 @@ _ROWS: dict[str, tuple[Row, ...]] = {
         Row("redo", "Redo", "ctrl+y, ctrl+shift+z", Editor.redo, repeats=True),
         Row("cut", "Cut", "ctrl+x", cut),
         Row("copy", "Copy", "ctrl+c", copy),
-        Row("paste", "Paste at the cursor", "ctrl+v", lambda desk: paste(desk, desk.cursor), repeats=True),
-        Row("paste:there", "Paste in the same place", "ctrl+shift+v", lambda desk: paste(desk, None)),
+        Row(
+            "paste",
+            "Paste at the cursor",
+            "ctrl+v",
+            lambda editor: paste(editor, editor.cursor),
+            repeats=True,
+        ),
+        Row("paste:there", "Paste in the same place", "ctrl+shift+v", lambda editor: paste(editor, None)),
         Row(
             "duplicate",
             "Duplicate",
             "ctrl+d",
-            lambda desk: _do(desk, transform.duplicated, desk.grid * FAR / 2, -desk.grid * FAR / 2),
+            lambda editor: _do(editor, transform.duplicated, editor.grid * FAR / 2, -editor.grid * FAR / 2),
             repeats=True,
         ),
         Row("delete", "Delete", "delete, x", delete),
-        Row("select:all", "Select all", "ctrl+a", lambda desk: desk.select(Selection.all(desk.sketch))),
+        Row("select:all", "Select all", "ctrl+a", lambda editor: editor.select(Selection.all(editor.sketch))),
         Row(
-            "select:next", "Select the next obstacle", "tab", lambda desk: select_next(desk, 1), repeats=True
+            "select:next",
+            "Select the next obstacle",
+            "tab",
+            lambda editor: select_next(editor, 1),
+            repeats=True,
         ),
         Row(
             "select:previous",
             "Select the previous obstacle",
             "shift+tab",
-            lambda desk: select_next(desk, -1),
+            lambda editor: select_next(editor, -1),
             repeats=True,
         ),
         Row("name", "Name what is selected", "f2"),
@@ -468,7 +481,9 @@ _ROWS: dict[str, tuple[Row, ...]] = {
         Row("right:far", "", "shift+right", nudge(10, 0), repeats=True),
         Row("up:far", "", "shift+up", nudge(0, 10), repeats=True),
         Row("down:far", "", "shift+down", nudge(0, -10), repeats=True),
-        Row("finish", "Finish what is being drawn", "return, enter", lambda desk: desk.tool.finish(desk)),
+        Row(
+            "finish", "Finish what is being drawn", "return, enter", lambda editor: editor.tool.finish(editor)
+        ),
         Row("back", "Take the last point back, or delete", "backspace", back, repeats=True),
         Row("cancel", "Give up; select nothing; close", "escape", cancel),
         Row("menu", "What can be done here (right click)", "menu, shift+f10"),
@@ -503,7 +518,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "release",
             "Unlock and show all",
             "ctrl+shift+l",
-            lambda desk: desk.change(properties.released(desk.sketch)),
+            lambda editor: editor.change(properties.released(editor.sketch)),
         ),
     ),
     "Combine": (
@@ -515,7 +530,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "clip",
             "Cut off outside the boundary",
             "alt+b",
-            lambda desk: desk.change(boolean.clipped(desk.sketch, desk.selection.without_vertices())),
+            lambda editor: editor.change(boolean.clipped(editor.sketch, editor.selection.without_vertices())),
         ),
         Row("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
         Row("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
@@ -525,23 +540,23 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "density:area",
             "Make it an area that counts more",
             "",
-            lambda desk: _do(desk, density_edits.areas_made, density_weight(desk)),
+            lambda editor: _do(editor, density_edits.areas_made, density_weight(editor)),
         ),
         Row(
             "fill:unreachable",
             "Fill all that robots cannot reach",
             "",
-            lambda desk: desk.change(fixes.unreachable_filled(desk.sketch, desk.radius)),
+            lambda editor: editor.change(fixes.unreachable_filled(editor.sketch, editor.radius)),
         ),
     ),
     "Vertices": (
-        Row("bevel", "Cut corners off", "shift+b", lambda desk: bevel(desk, 2 * desk.grid)),
-        Row("round", "Round corners", "shift+r", lambda desk: round_corners(desk, 2 * desk.grid)),
+        Row("bevel", "Cut corners off", "shift+b", lambda editor: bevel(editor, 2 * editor.grid)),
+        Row("round", "Round corners", "shift+r", lambda editor: round_corners(editor, 2 * editor.grid)),
         Row(
             "split",
             "Cut a wall in two here",
             "shift+c",
-            lambda desk: desk.change(vertices.split(desk.sketch, one_vertex(desk))),
+            lambda editor: editor.change(vertices.split(editor.sketch, one_vertex(editor))),
         ),
         Row("extend", "Go on with the wall from here", "shift+w", extend),
         Row("fill", "Fill the hole", "shift+f", fill),
@@ -549,7 +564,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "simplify",
             "Leave needless vertices out",
             "shift+p",
-            lambda desk: simplify_outlines(desk, TOLERANCE),
+            lambda editor: simplify_outlines(editor, TOLERANCE),
         ),
         Row("straighten", "Make edges straight that nearly are", "shift+l", edited(simplify.straightened)),
         Row(
@@ -559,13 +574,15 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             edited(motion_path.path_turned),
         ),
         Row("path:none", "Take an obstacle's path away", "alt+o", edited(motion_path.path_removed)),
-        Row("wider", "Wider walls", "]", lambda desk: widen(desk, WIDER), repeats=True),
-        Row("narrower", "Narrower walls", "[", lambda desk: widen(desk, 1.0 / WIDER), repeats=True),
+        Row("wider", "Wider walls", "]", lambda editor: widen(editor, WIDER), repeats=True),
+        Row("narrower", "Narrower walls", "[", lambda editor: widen(editor, 1.0 / WIDER), repeats=True),
     ),
     "Snap": (
-        Row("grid:finer", "Finer grid", "-", lambda desk: desk.change_grid(-1), repeats=True),
-        Row("grid:coarser", "Coarser grid", "=, +", lambda desk: desk.change_grid(1), repeats=True),
-        Row("snap:all", "Snap to everything, or to nothing", "0", lambda desk: desk.switch("snap", "all")),
+        Row("grid:finer", "Finer grid", "-", lambda editor: editor.change_grid(-1), repeats=True),
+        Row("grid:coarser", "Coarser grid", "=, +", lambda editor: editor.change_grid(1), repeats=True),
+        Row(
+            "snap:all", "Snap to everything, or to nothing", "0", lambda editor: editor.switch("snap", "all")
+        ),
     ),
     "View": (
         Row("fit", "Show the whole map", "f"),
@@ -590,7 +607,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "start:uniform",
             "A start anywhere in the free space",
             "shift+u",
-            lambda desk: desk.change(create.uniform_start_added(desk.sketch)),
+            lambda editor: editor.change(create.uniform_start_added(editor.sketch)),
         ),
         Row("start:next", "Next start of the map", "shift+n", next_start),
         Row("start:default", "Make it the default start", "shift+d", make_default),
@@ -598,14 +615,14 @@ _ROWS: dict[str, tuple[Row, ...]] = {
             "more",
             "One robot more",
             "shift+=, shift++",
-            lambda desk: desk.set_robots(min(desk.robots + 1, 1000)),
+            lambda editor: editor.set_robots(min(editor.robots + 1, 1000)),
             repeats=True,
         ),
         Row(
             "fewer",
             "One robot fewer",
             "shift+-",
-            lambda desk: desk.set_robots(max(desk.robots - 1, 1)),
+            lambda editor: editor.set_robots(max(editor.robots - 1, 1)),
             repeats=True,
         ),
     ),
@@ -613,20 +630,20 @@ _ROWS: dict[str, tuple[Row, ...]] = {
 }
 
 
-def editor_commands(desk: Editor, of_window: Mapping[str, Callable[[], object]]) -> list[Command]:
+def editor_commands(editor: Editor, of_window: Mapping[str, Callable[[], object]]) -> list[Command]:
     """Return every command, those of the tools and of what is snapped to or shown among them."""
 
     def command(group: str, row: Row) -> Command:
-        run = of_window[row.name] if row.run is None else partial(row.run, desk)
+        run = of_window[row.name] if row.run is None else partial(row.run, editor)
         keys = tuple(row.keys.split(", ")) if row.keys else ()
         return Command(row.name, row.title, group, run, keys, repeats=row.repeats, hidden=not row.title)
 
     def switch(kind: str, name: str, title: str, group: str, key: str) -> Command:
-        return Command(f"{kind}:{name}", title, group, partial(desk.switch, kind, name), (key,))
+        return Command(f"{kind}:{name}", title, group, partial(editor.switch, kind, name), (key,))
 
     found = [command(group, row) for group, rows in _ROWS.items() for row in rows]
-    for tool in desk.tools.values():
-        run, keys = partial(desk.choose, tool.name), (_TOOL_KEYS[tool.name],)
+    for tool in editor.tools.values():
+        run, keys = partial(editor.choose, tool.name), (_TOOL_KEYS[tool.name],)
         found.append(Command(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", "Tools", run, keys))
     for k, (name, (title, _)) in enumerate(SNAPS.items(), 1):
         found.append(switch("snap", name, f"Snap to {title.lower()}", "Snap", str(k)))
@@ -634,11 +651,11 @@ def editor_commands(desk: Editor, of_window: Mapping[str, Callable[[], object]])
     return found
 
 
-def typed_commands(desk: Editor) -> list[Command]:
+def typed_commands(editor: Editor) -> list[Command]:
     """Return the commands with a value after them."""
 
     def run(word: str, text: str) -> None:
-        desk.carry_out(lambda: run_typed(desk, f"{word} {text}"))
+        editor.carry_out(lambda: run_typed(editor, f"{word} {text}"))
 
     return [
         Command(word, f"{word} {typed.example}", "", partial(run, word), takes=Takes(typed.example))
@@ -648,15 +665,18 @@ def typed_commands(desk: Editor) -> list[Command]:
 
 TYPED: dict[str, Typed] = {
     "grid": Typed(
-        "0.25: distance of the grid's lines", lambda desk, text: desk.set_grid(length_of(text, now=desk.grid))
+        "0.25: distance of the grid's lines",
+        lambda editor, text: editor.set_grid(length_of(text, now=editor.grid)),
     ),
     "angle": Typed("15: lines snap to multiples of it", _set_angle),
-    "radius": Typed("0.2: of a robot", lambda desk, text: desk.set_radius(length_of(text, now=desk.radius))),
-    "robots": Typed("8: of the team", lambda desk, text: desk.set_robots(_whole_number("robots", text))),
+    "radius": Typed(
+        "0.2: of a robot", lambda editor, text: editor.set_radius(length_of(text, now=editor.radius))
+    ),
+    "robots": Typed("8: of the team", lambda editor, text: editor.set_robots(_whole_number("robots", text))),
     "seed": Typed("3: of the team's places", _set_seed),
     "wall": Typed(
         "0.1: width of walls that are drawn",
-        lambda desk, text: desk.set_wall_width(length_of(text, now=desk.wall_width)),
+        lambda editor, text: editor.set_wall_width(length_of(text, now=editor.wall_width)),
     ),
     "move": Typed("1 0.5: what is selected", _move),
     "place": Typed("2 3: lower left corner", _place),
@@ -665,17 +685,17 @@ TYPED: dict[str, Typed] = {
     "size": Typed("3 x 2: width and height", _size),
     "width": Typed("0.2: of walls", _edit_to(properties.widened, length_of)),
     "circle": Typed("0.5: radius of circles", _edit_to(properties.sized, length_of)),
-    "bevel": Typed("0.3: cut corners off", lambda desk, text: bevel(desk, length_of(text))),
-    "round": Typed("0.3: round corners", lambda desk, text: round_corners(desk, length_of(text))),
+    "bevel": Typed("0.3: cut corners off", lambda editor, text: bevel(editor, length_of(text))),
+    "round": Typed("0.3: round corners", lambda editor, text: round_corners(editor, length_of(text))),
     "simplify": Typed(
         "0.05: leave vertices out, to a tolerance",
-        lambda desk, text: simplify_outlines(desk, length_of(text)),
+        lambda editor, text: simplify_outlines(editor, length_of(text)),
     ),
     "floor": Typed(
         "0.1: density away from hot spots",
-        lambda desk, text: desk.change(density_edits.floor_set(desk.sketch, _number("floor", text))),
+        lambda editor, text: editor.change(density_edits.floor_set(editor.sketch, _number("floor", text))),
     ),
-    "weight": Typed("2: of a hot spot", lambda desk, text: desk.tools["density"].enter(desk, text)),
+    "weight": Typed("2: of a hot spot", lambda editor, text: editor.tools["density"].enter(editor, text)),
     "density": Typed("none: takes it away", _set_density),
     "speed": Typed("0.5: along a path, m/s", _edit_to(motion_path.path_paced, motion_path.speed_of)),
     "offset": Typed("0.2: grow, or shrink with -", _offset),
@@ -683,28 +703,28 @@ TYPED: dict[str, Typed] = {
     "name": Typed("pillar: of what is selected", _name),
     "note": Typed("words: on what is selected", _edit_to(properties.noted, str)),
     "title": Typed(
-        "Hall: of the map", lambda desk, text: desk.change(properties.titled(desk.sketch, name=text))
+        "Hall: of the map", lambda editor, text: editor.change(properties.titled(editor.sketch, name=text))
     ),
 }
 """What can be typed, each with a value after it."""
 
 
-def run_typed(desk: Editor, text: str) -> None:
+def run_typed(editor: Editor, text: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
     word, rest = parted(text)
     if word not in TYPED:
         raise MapError(unknown_name("command", word, TYPED))
     if not rest:
         raise MapError(f"{word}: a value was wanted after it")
-    TYPED[word].run(desk, rest)
+    TYPED[word].run(editor, rest)
 
 
 # the menu at the cursor
 
 
-def offered(desk: Editor) -> list[str]:
+def offered(editor: Editor) -> list[str]:
     """Return the names of the actions that apply to what is selected, with an empty one between groups."""
-    selection = desk.selection
+    selection = editor.selection
     if not selection:
         return [
             *("paste", "select:all", _SEPARATE),
@@ -720,8 +740,8 @@ def offered(desk: Editor) -> list[str]:
             *("fit", "background", "try"),
         ]
     if selection.vertices:
-        return _of_vertices(desk)
-    shapes = [desk.sketch.item(key).shape for key in selection.items if key in desk.sketch.places]
+        return _of_vertices(editor)
+    shapes = [editor.sketch.item(key).shape for key in selection.items if key in editor.sketch.places]
     names = ["cut", "copy", "duplicate", "delete", _SEPARATE]
     if len(selection.owners) == 1 and not selection.boundary:
         names += ["name", "fit:selection", _SEPARATE]
@@ -743,7 +763,7 @@ def offered(desk: Editor) -> list[str]:
         names += ["simplify", "straighten"]
     if len(shapes) == 1 and isinstance(shapes[0], PolygonObstacle) and len(selection.owners) == 1:
         names.append("boundary:of")
-    if any(problem.of in selection.owners and problem.grave for problem in desk.problems):
+    if any(problem.of in selection.owners and problem.grave for problem in editor.problems):
         names.append("repair")
     if selection.boundary and not shapes:
         names = ["fit", "simplify", "straighten", "repair", _SEPARATE, "tool:boundary"]
@@ -752,12 +772,12 @@ def offered(desk: Editor) -> list[str]:
     return _tidy(names)
 
 
-def _of_vertices(desk: Editor) -> list[str]:
-    selection = desk.selection
+def _of_vertices(editor: Editor) -> list[str]:
+    selection = editor.selection
     names = ["delete", "bevel", "round"]
     if len(selection.vertices) == 1:
         (vertex,) = selection.vertices
-        shape = desk.sketch.item(vertex.of).shape if isinstance(vertex.of, int) and vertex.of >= 0 else None
+        shape = editor.sketch.item(vertex.of).shape if isinstance(vertex.of, int) and vertex.of >= 0 else None
         if isinstance(shape, WallObstacle):
             names.append("extend" if vertex.index in (0, len(shape.points) - 1) else "split")
         if vertex.ring:

@@ -1,4 +1,4 @@
-"""The editor's desk: what is open, selected and shown, and how every change is made. Knows no pygame."""
+"""The editor: what is open, selected and shown, and how every change is made. Knows no pygame."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ class Editor:
         self._changed()
 
     def put(self, document: Document) -> None:
-        """Put another document on the desk."""
+        """Put another document in the editor."""
         self.document = document
         self.measurement, self._about = None, None
         self.selector.cancel(self)

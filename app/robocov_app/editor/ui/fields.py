@@ -54,13 +54,13 @@ def coordinate(text: str, now: float) -> float:
     )
 
 
-def _corner(desk: Editor) -> Point:
+def _corner(editor: Editor) -> Point:
     """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
-    sketch, selection = desk.preview
+    sketch, selection = editor.preview
     if len(selection.vertices) == 1:
         (vertex,) = selection.vertices
         return place_of(sketch, vertex)
-    center = _center(desk)
+    center = _center(editor)
     if center is not None:
         return center
     bounds = bounds_of(sketch, whole(selection))
@@ -69,8 +69,8 @@ def _corner(desk: Editor) -> Point:
     return bounds[0], bounds[1]
 
 
-def _center(desk: Editor) -> Point | None:
-    sketch, selection = desk.preview
+def _center(editor: Editor) -> Point | None:
+    sketch, selection = editor.preview
     if selection.vertices or len(selection.owners) != 1:
         return None
     (owner,) = selection.owners
@@ -83,73 +83,73 @@ def _center(desk: Editor) -> Point | None:
     return shape.center if isinstance(shape, CircleObstacle) else None
 
 
-def _put(desk: Editor, axis: int, text: str) -> None:
+def _put(editor: Editor, axis: int, text: str) -> None:
     """Put what is selected at a typed coordinate."""
-    now = _corner(desk)
+    now = _corner(editor)
     by = coordinate(text, now[axis]) - now[axis]
-    selection = desk.selection
+    selection = editor.selection
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
     act = vertices.moved if selection.vertices else transform.moved
-    desk.change(act(desk.sketch, selection, dx, dy))
+    editor.change(act(editor.sketch, selection, dx, dy))
 
 
-def _size(desk: Editor, axis: int) -> str:
-    sketch, selection = desk.preview
+def _size(editor: Editor, axis: int) -> str:
+    sketch, selection = editor.preview
     bounds = bounds_of(sketch, whole(selection))
     return "" if bounds is None else number(bounds[axis + 2] - bounds[axis])
 
 
-def _resize(desk: Editor, axis: int, text: str) -> None:
+def _resize(editor: Editor, axis: int, text: str) -> None:
     """Give what is selected a typed width or height; the other stays, but of circles."""
-    selection = whole(desk.selection)
-    bounds = bounds_of(desk.sketch, selection)
+    selection = whole(editor.selection)
+    bounds = bounds_of(editor.sketch, selection)
     if bounds is None:
         raise MapError("nothing is selected")
     now = bounds[2] - bounds[0], bounds[3] - bounds[1]
     to = length_of(text, now=now[axis])
     wide, high = (to, now[1]) if axis == 0 else (now[0], to)
-    desk.change(transform.resized(desk.sketch, selection, wide or None, high or None))
+    editor.change(transform.resized(editor.sketch, selection, wide or None, high or None))
 
 
-def _shown_name(desk: Editor) -> str:
-    owners = whole(desk.selection).owners
+def _shown_name(editor: Editor) -> str:
+    owners = whole(editor.selection).owners
     if len(owners) != 1:
         return ""
     (owner,) = owners
     if isinstance(owner, str):
         return owner
-    return desk.sketch.item(owner).shape.name or "" if owner in desk.sketch.places else ""
+    return editor.sketch.item(owner).shape.name or "" if owner in editor.sketch.places else ""
 
 
-def _rename(desk: Editor, text: str) -> None:
-    (owner,) = whole(desk.selection).owners
-    if text.strip() != _shown_name(desk):
-        desk.change(properties.renamed(desk.sketch, owner, text.strip()))
+def _rename(editor: Editor, text: str) -> None:
+    (owner,) = whole(editor.selection).owners
+    if text.strip() != _shown_name(editor):
+        editor.change(properties.renamed(editor.sketch, owner, text.strip()))
 
 
-def _shown_note(desk: Editor) -> str:
-    notes = {desk.sketch.item(key).note for key in desk.selection.items if key in desk.sketch.places}
+def _shown_note(editor: Editor) -> str:
+    notes = {editor.sketch.item(key).note for key in editor.selection.items if key in editor.sketch.places}
     return notes.pop() if len(notes) == 1 else ""
 
 
-def _note(desk: Editor, text: str) -> None:
-    desk.change(properties.noted(desk.sketch, whole(desk.selection), text.strip()))
+def _note(editor: Editor, text: str) -> None:
+    editor.change(properties.noted(editor.sketch, whole(editor.selection), text.strip()))
 
 
-def _wall_width(desk: Editor) -> str:
-    shapes = [desk.sketch.item(key).shape for key in desk.selection.items if key in desk.sketch.places]
+def _wall_width(editor: Editor) -> str:
+    shapes = [editor.sketch.item(key).shape for key in editor.selection.items if key in editor.sketch.places]
     widths = {shape.width for shape in shapes if isinstance(shape, WallObstacle)}
     return number(widths.pop()) if len(widths) == 1 else ""
 
 
-def _set_width(desk: Editor, text: str) -> None:
-    now = _wall_width(desk)
+def _set_width(editor: Editor, text: str) -> None:
+    now = _wall_width(editor)
     width = length_of(text, now=float(now) if now else None)
-    desk.change(properties.widened(desk.sketch, whole(desk.selection), width))
+    editor.change(properties.widened(editor.sketch, whole(editor.selection), width))
 
 
-def _radius(desk: Editor) -> str:
-    sketch, selection = desk.preview
+def _radius(editor: Editor) -> str:
+    sketch, selection = editor.preview
     for owner in selection.owners:
         if isinstance(owner, str):
             spec = dict(sketch.starts).get(owner)
@@ -162,44 +162,44 @@ def _radius(desk: Editor) -> str:
     return ""
 
 
-def _set_radius(desk: Editor, text: str) -> None:
-    now = _radius(desk)
+def _set_radius(editor: Editor, text: str) -> None:
+    now = _radius(editor)
     radius = length_of(text, now=float(now) if now else None)
-    desk.change(properties.sized(desk.sketch, whole(desk.selection), radius))
+    editor.change(properties.sized(editor.sketch, whole(editor.selection), radius))
 
 
-def _picture(desk: Editor) -> Background:
-    if desk.sketch.background is None:
+def _picture(editor: Editor) -> Background:
+    if editor.sketch.background is None:
         raise MapError("there is no picture under the map: Ctrl B takes one")
-    return desk.sketch.background
+    return editor.sketch.background
 
 
-def _set_scale(desk: Editor, text: str) -> None:
-    laid = _picture(desk)
+def _set_scale(editor: Editor, text: str) -> None:
+    laid = _picture(editor)
     scale = length_of(text, now=laid.scale)
     if not scale > 0.0:
         raise MapError("a pixel must be larger than 0 m")
-    desk.change(underlaid(desk.sketch, replace(laid, scale=scale)))
+    editor.change(underlaid(editor.sketch, replace(laid, scale=scale)))
 
 
-def _set_turn(desk: Editor, text: str) -> None:
-    desk.change(underlaid(desk.sketch, replace(_picture(desk), turn=angle_of(text))))
+def _set_turn(editor: Editor, text: str) -> None:
+    editor.change(underlaid(editor.sketch, replace(_picture(editor), turn=angle_of(text))))
 
 
-def _set_opacity(desk: Editor, text: str) -> None:
-    laid = _picture(desk)
+def _set_opacity(editor: Editor, text: str) -> None:
+    laid = _picture(editor)
     part = min(max(float(text), 0.0), 1.0)
-    desk.change(underlaid(desk.sketch, replace(laid, opacity=round(part, 2))), drag="opacity")
+    editor.change(underlaid(editor.sketch, replace(laid, opacity=round(part, 2))), drag="opacity")
 
 
-def _on_picture(desk: Editor, words: Callable[[Background], str]) -> str:
-    return words(desk.sketch.background) if desk.sketch.background is not None else ""
+def _on_picture(editor: Editor, words: Callable[[Background], str]) -> str:
+    return words(editor.sketch.background) if editor.sketch.background is not None else ""
 
 
 def _or_empty(text: Callable[[Editor], str]) -> Callable[[Editor], str]:
-    def shown(desk: Editor) -> str:
+    def shown(editor: Editor) -> str:
         try:
-            return text(desk)
+            return text(editor)
         except (MapError, LookupError):
             return ""
 
@@ -208,67 +208,67 @@ def _or_empty(text: Callable[[Editor], str]) -> Callable[[Editor], str]:
 
 FIELDS: dict[str, Field] = {
     "title": Field(
-        lambda desk: desk.sketch.name,
-        lambda desk, text: desk.change(properties.titled(desk.sketch, name=text.strip())),
+        lambda editor: editor.sketch.name,
+        lambda editor, text: editor.change(properties.titled(editor.sketch, name=text.strip())),
         "The map's name, for people",
     ),
     "description": Field(
-        lambda desk: desk.sketch.description,
-        lambda desk, text: desk.change(properties.titled(desk.sketch, description=text.strip())),
+        lambda editor: editor.sketch.description,
+        lambda editor, text: editor.change(properties.titled(editor.sketch, description=text.strip())),
         "A sentence about the map",
     ),
     "radius": Field(
-        lambda desk: number(desk.radius),
-        lambda desk, text: run_typed(desk, f"radius {text}"),
+        lambda editor: number(editor.radius),
+        lambda editor, text: run_typed(editor, f"radius {text}"),
         "Radius of a robot: what is too narrow for it is hatched",
     ),
     "robots": Field(
-        lambda desk: str(desk.robots),
-        lambda desk, text: run_typed(desk, f"robots {text}"),
+        lambda editor: str(editor.robots),
+        lambda editor, text: run_typed(editor, f"robots {text}"),
         "Robots of the team that is shown at a start, and tried with F5",
     ),
     "grid": Field(
-        lambda desk: number(desk.grid),
-        lambda desk, text: run_typed(desk, f"grid {text}"),
+        lambda editor: number(editor.grid),
+        lambda editor, text: run_typed(editor, f"grid {text}"),
         "Distance of the grid's lines; arrows move by it",
     ),
     "angle": Field(
-        lambda desk: number(desk.snap_angle),
-        lambda desk, text: run_typed(desk, f"angle {text}"),
+        lambda editor: number(editor.snap_angle),
+        lambda editor, text: run_typed(editor, f"angle {text}"),
         "Lines snap to multiples of this",
     ),
     "name": Field(_or_empty(_shown_name), _rename, "What people call it"),
     "note": Field(_or_empty(_shown_note), _note, "Whatever is worth remembering of it"),
     "x": Field(
-        _or_empty(lambda desk: number(_corner(desk)[0])),
-        lambda desk, text: _put(desk, 0, text),
+        _or_empty(lambda editor: number(_corner(editor)[0])),
+        lambda editor, text: _put(editor, 0, text),
         "From the left; +0.5 moves by half a metre",
     ),
     "y": Field(
-        _or_empty(lambda desk: number(_corner(desk)[1])),
-        lambda desk, text: _put(desk, 1, text),
+        _or_empty(lambda editor: number(_corner(editor)[1])),
+        lambda editor, text: _put(editor, 1, text),
         "From below; +0.5 moves by half a metre",
     ),
     "wide": Field(
-        _or_empty(lambda desk: _size(desk, 0)),
-        lambda desk, text: _resize(desk, 0, text),
+        _or_empty(lambda editor: _size(editor, 0)),
+        lambda editor, text: _resize(editor, 0, text),
         "Also *2, 50% or +0.3",
     ),
     "high": Field(
-        _or_empty(lambda desk: _size(desk, 1)),
-        lambda desk, text: _resize(desk, 1, text),
+        _or_empty(lambda editor: _size(editor, 1)),
+        lambda editor, text: _resize(editor, 1, text),
         "Also *2, 50% or +0.3",
     ),
     "width": Field(_or_empty(_wall_width), _set_width, "How thick the wall is"),
     "size:radius": Field(_or_empty(_radius), _set_radius, "Its radius"),
     "picture:scale": Field(
-        lambda desk: _on_picture(desk, lambda laid: f"{laid.scale:.6g}"), _set_scale, "Side of a pixel"
+        lambda editor: _on_picture(editor, lambda laid: f"{laid.scale:.6g}"), _set_scale, "Side of a pixel"
     ),
     "picture:turn": Field(
-        lambda desk: _on_picture(desk, lambda laid: number(laid.turn)), _set_turn, "Counter-clockwise"
+        lambda editor: _on_picture(editor, lambda laid: number(laid.turn)), _set_turn, "Counter-clockwise"
     ),
     "picture:opacity": Field(
-        lambda desk: _on_picture(desk, lambda laid: number(laid.opacity)), _set_opacity, ""
+        lambda editor: _on_picture(editor, lambda laid: number(laid.opacity)), _set_opacity, ""
     ),
 }
 """All fields by name."""

@@ -40,15 +40,15 @@ class FileCommands:
     """What can be done with whole documents."""
 
     def __init__(
-        self, desk: Editor, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
+        self, editor: Editor, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
     ) -> None:
-        self.desk, self.drafts, self._fit, self._patient = desk, drafts, fit, patient
+        self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
         self.leaving = False
 
     def close(self) -> None:
         """End what is going on beside the window."""
-        if isinstance(self.desk.asked, ImportDialog):
-            self.desk.dialogs.close()
+        if isinstance(self.editor.asked, ImportDialog):
+            self.editor.dialogs.close()
 
     def commands(self) -> dict[str, Callable[[], object]]:
         """Return what the commands do, by their names."""
@@ -68,7 +68,7 @@ class FileCommands:
 
     def leave(self, then: Callable[[], object]) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
-        document = self.desk.document
+        document = self.editor.document
         if not document.unsaved:
             then()
             document.close(discard=True)
@@ -83,7 +83,7 @@ class FileCommands:
 
         words = f"“{document.title}” has changes that are in no file."
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
-        self.desk.ask("Save the changes?", words, *answers)
+        self.editor.ask("Save the changes?", words, *answers)
 
     def quit(self) -> None:
         """End, after asking what is to become of what is open."""
@@ -93,16 +93,16 @@ class FileCommands:
         self.leaving = True
 
     def _put(self, document: Document, words: str = "") -> None:
-        self.desk.put(document)
+        self.editor.put(document)
         self._fit()
         if document.path is not None:
             self.remember(document.path)
-        self.desk.say(words)
+        self.editor.say(words)
 
     # opening
 
     def new(self) -> str:
-        """Put an empty sheet on the desk."""
+        """Put an empty sheet in the editor."""
         self._put(Document.new(self.drafts))
         return "a new map: 10 x 10 m; B draws another boundary"
 
@@ -122,26 +122,26 @@ class FileCommands:
         *,
         saves: bool = False,
     ) -> None:
-        desk = self.desk
+        editor = self.editor
 
         def chosen(path: Path) -> None:
-            desk.carry_out(lambda: call(path))
+            editor.carry_out(lambda: call(path))
 
-        desk.dialogs.ask(file_choice(title, desk.folder, chosen, endings=endings, text=text, saves=saves))
+        editor.dialogs.ask(file_choice(title, editor.folder, chosen, endings=endings, text=text, saves=saves))
 
     def ask_recent(self) -> None:
         """Ask which of the maps to open that were open lately, or come with robocov."""
-        names = [Option(path, "recent") for path in self.desk.recent if Path(path).exists()]
+        names = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
         names += [Option(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
 
         def chosen(option: Option) -> None:
-            self.desk.carry_out(lambda: self.open(map_file(option.text)))
+            self.editor.carry_out(lambda: self.open(map_file(option.text)))
 
-        self.desk.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
+        self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 
     def open(self, path: Path) -> None:
         """Open a file: a map, or one of a foreign format as a new map."""
-        own = self.desk.document.path
+        own = self.editor.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
             return
@@ -161,7 +161,7 @@ class FileCommands:
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
             self.leave(lambda: self._put(document, f"imported: {path.name}, not saved yet"))
 
-        self.desk.dialogs.ask(ImportDialog(path, importer, self._import_worker(), put))
+        self.editor.dialogs.ask(ImportDialog(path, importer, self._import_worker(), put))
 
     def _import_worker(self) -> Worker[Imported]:
         if self._patient:
@@ -171,27 +171,27 @@ class FileCommands:
     def recover(self, draft: Autosave) -> None:
         """Go on with work that was left behind."""
         self._put(Document.recovered(draft, self.drafts))
-        self.desk.say(f"recovered: {draft.words()}")
+        self.editor.say(f"recovered: {draft.words()}")
 
     def remember(self, path: Path) -> None:
         """Note a file as one that was open lately."""
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
-        self.desk.recent = [name, *(each for each in self.desk.recent if each != name)][:MOST_RECENT]
+        self.editor.recent = [name, *(each for each in self.editor.recent if each != name)][:MOST_RECENT]
 
     # saving
 
     def save(self, then: Callable[[], object] | None = None) -> str | None:
         """Save to the document's file; ask for one if it has none."""
-        if self.desk.document.path is None:
+        if self.editor.document.path is None:
             self.ask_name(then)
             return None
-        return self._save(self.desk.document.path, then)
+        return self._save(self.editor.document.path, then)
 
     def ask_name(self, then: Callable[[], object] | None = None) -> None:
         """Ask where to save."""
-        suggested = self.desk.document.suggested(self.desk.folder)
+        suggested = self.editor.document.suggested(self.editor.folder)
         text = str(suggested)
-        if suggested.parent == self.desk.folder:
+        if suggested.parent == self.editor.folder:
             text = suggested.name
 
         self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text, saves=True)
@@ -199,20 +199,20 @@ class FileCommands:
     def _save(
         self, path: Path, then: Callable[[], object] | None, *, over: bool = False, spoil: bool = False
     ) -> str | None:
-        desk = self.desk
-        if not (over or spoil) and desk.document.spoils(path):
+        editor = self.editor
+        if not (over or spoil) and editor.document.spoils(path):
             words = f"{path.name} holds a valid map; this one cannot run yet."
             self._ask_over("Save a draft over it?", words, then, lambda: self._save(path, then, spoil=True))
             return None
         try:
-            words = desk.document.save(path, over=over)
+            words = editor.document.save(path, over=over)
         except ChangedError as error:
             replace = partial(self._save, path, then, over=True)
             self._ask_over("Replace the file?", str(error), then, replace)
             return None
-        assert desk.document.path is not None
-        self.remember(desk.document.path)
-        grave = [problem for problem in desk.problems if problem.grave]
+        assert editor.document.path is not None
+        self.remember(editor.document.path)
+        grave = [problem for problem in editor.problems if problem.grave]
         if grave:
             words += f", as a draft: {grave[0].words}"
         if then is not None:
@@ -223,7 +223,7 @@ class FileCommands:
         self, title: str, words: str, then: Callable[[], object] | None, go_on: Callable[[], object]
     ) -> None:
         answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
-        self.desk.ask(title, words, *answers)
+        self.editor.ask(title, words, *answers)
 
     # exporting
 
@@ -231,11 +231,11 @@ class FileCommands:
         """Ask where to write the map in a foreign format, which goes by the suffix."""
         from robocov_app.formats import EXPORTERS
 
-        self.desk.sketch.environment()
+        self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
 
         title = f"Export to a file ending in {', '.join(suffixes)}"
-        name = Path(self.desk.document.suggested(self.desk.folder).name).stem
+        name = Path(self.editor.document.suggested(self.editor.folder).name).stem
         self._ask_path(title, self._export, suffixes, f"{name}.svg", saves=True)
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
@@ -244,9 +244,9 @@ class FileCommands:
         if path.exists() and not over:
             over_it = ("Replace it", "r", lambda: self._export(path, over=True))
             answers = (("Another name…", "a", self.ask_export), over_it, _CANCEL)
-            self.desk.ask("Replace the file?", f"{path} is there already.", *answers)
+            self.editor.ask("Replace the file?", f"{path} is there already.", *answers)
             return None
-        report = export_map(self.desk.sketch.environment(), path)
+        report = export_map(self.editor.sketch.environment(), path)
         said = [
             f"exported: {', '.join(str(file) for file in report.files)}",
             *report.warnings,
@@ -258,29 +258,29 @@ class FileCommands:
 
     def look(self) -> None:
         """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
-        desk = self.desk
-        if isinstance(asked := desk.asked, ImportDialog) and (imported := asked.poll()) is not None:
-            desk.dialogs.close()
-            desk.attempt(lambda: asked.call(imported))
-        if desk.asked is not None:
+        editor = self.editor
+        if isinstance(asked := editor.asked, ImportDialog) and (imported := asked.poll()) is not None:
+            editor.dialogs.close()
+            editor.attempt(lambda: asked.call(imported))
+        if editor.asked is not None:
             return
-        state = desk.document.look(desk.now)
+        state = editor.document.look(editor.now)
         if state == "gone":
-            desk.say(f"{desk.document.title} is no longer there; Ctrl S writes it again", trouble=True)
+            editor.say(f"{editor.document.title} is no longer there; Ctrl S writes it again", trouble=True)
         elif state == "changed":
-            words = f"Something else has changed {desk.document.title}. Reloading can be undone."
-            answers = (("Reload", "r", self.reload), ("Keep mine", "k", desk.document.keep_mine))
-            desk.ask("The file has changed", words, *answers)
+            words = f"Something else has changed {editor.document.title}. Reloading can be undone."
+            answers = (("Reload", "r", self.reload), ("Keep mine", "k", editor.document.keep_mine))
+            editor.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
         """Read the file again."""
-        if self.desk.document.path is None:
+        if self.editor.document.path is None:
             raise MapError("the map has no file yet")
-        self.desk.document.reload()
-        self.desk.measurement = None
-        self.desk.version += 1
-        self.desk.ask_readings()
-        return f"read again: {self.desk.document.title}"
+        self.editor.document.reload()
+        self.editor.measurement = None
+        self.editor.version += 1
+        self.editor.ask_readings()
+        return f"read again: {self.editor.document.title}"
 
     # the picture under the map
 
@@ -291,12 +291,12 @@ class FileCommands:
 
     def underlay(self, path: Path) -> None:
         """Put a picture under the map."""
-        lay_under(self.desk, path)
-        self.desk.choose("picture")
+        lay_under(self.editor, path)
+        self.editor.choose("picture")
         self._fit()
 
 
-def lay_under(desk: Editor, path: Path) -> None:
+def lay_under(editor: Editor, path: Path) -> None:
     """Put a picture under the map, as wide as the map is, or 20 m."""
     from PIL import Image, UnidentifiedImageError
 
@@ -305,12 +305,12 @@ def lay_under(desk: Editor, path: Path) -> None:
             pixels = picture.size
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
         raise MapError(f"{path}: not a picture that can be read") from None
-    bounds = desk.sketch.bounds
-    laid = picture_laid(_from_map(path, desk.document.path), pixels)
-    if bounds is not None and desk.sketch.background is None:
+    bounds = editor.sketch.bounds
+    laid = picture_laid(_from_map(path, editor.document.path), pixels)
+    if bounds is not None and editor.sketch.background is None:
         laid = picture_laid(laid.path, pixels, max(bounds[2] - bounds[0], 1.0))
-    desk.shown.add("picture")
-    desk.change(underlaid(desk.sketch, laid))
+    editor.shown.add("picture")
+    editor.change(underlaid(editor.sketch, laid))
 
 
 def _from_map(path: Path, of: Path | None) -> str:

@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
-from robocov_app.editor.ui.importing import Imported, Wanted, options_of
+from robocov_app.editor.ui.importing import Continuation, Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.foreign import square_metres
 from robocov_app.render.camera import Camera
@@ -96,7 +96,7 @@ class ImportDialog:
             self._mistake = str(error)
         else:
             self._mistake = ""
-            self._worker.put(Wanted(self.path, self.importer.name, options, shaping))
+            self._worker.put(Continuation(self.path, self.importer.name, options, shaping))
 
     def poll(self) -> Imported | None:
         """Take what was imported, if it is there; return it if it is accepted."""

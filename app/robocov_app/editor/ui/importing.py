@@ -95,7 +95,7 @@ def _helps(settings: type) -> dict[str, str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class Continuation:
     """Request: a file and the options to import it with."""
 
     path: Path
@@ -121,7 +121,7 @@ class Importing:
     def __init__(self) -> None:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
 
-    def __call__(self, questions: list[Wanted], line: Line) -> Imported:
+    def __call__(self, questions: list[Continuation], line: Line) -> Imported:
         """Import what was wanted last."""
         last = questions[-1]
         key = last.path, last.format, last.options

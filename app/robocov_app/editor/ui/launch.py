@@ -33,7 +33,7 @@ NO_DISPLAY = (
 )
 
 
-class EditorOpening:
+class EditorLauncher:
     """How the editor is opened."""
 
     def __init__(
@@ -65,9 +65,9 @@ class EditorOpening:
             with display(headless=self.headless, otherwise=NO_DISPLAY):
                 file = None if self.headless else settings_file(FILE)
                 settings, trouble = loaded(EditorSettings, file)
-                desk = self._desk(document, readings, settings)
-                window = self._opened(desk, settings, drafts)
-                desk.say(
+                editor = self._editor(document, readings, settings)
+                window = self._opened(editor, settings, drafts)
+                editor.say(
                     trouble or (heading(document) if self.path is not None and document is found else "")
                 )
                 if document.path is not None:
@@ -84,7 +84,7 @@ class EditorOpening:
                 finally:
                     window.close()
                     # what was not saved stays to be offered, unless it was decided about
-                    desk.document.close(discard=ended and window.documents.leaving)
+                    editor.document.close(discard=ended and window.documents.leaving)
         except BaseException:
             if not ended:
                 document.close(discard=False)
@@ -92,28 +92,28 @@ class EditorOpening:
         finally:
             readings.close()
 
-    def _desk(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Editor:
+    def _editor(self, document: Document, readings: Worker[Measurement], settings: EditorSettings) -> Editor:
         pasteboard: Pasteboard = OwnPasteboard() if self.headless else clipboard
-        desk = Editor(document, readings, pasteboard, self.folder)
-        desk.theme = self.theme or settings.theme
-        desk.shown = set(settings.shown) & set(SHOWN)
-        desk.snaps = set(settings.snaps) & set(SNAPS)
-        desk.grid, desk.snap_angle = settings.grid, settings.angle
-        desk.radius, desk.robots, desk.wall_width = settings.radius, settings.robots, settings.wall
-        desk.recent = list(settings.recent)
+        editor = Editor(document, readings, pasteboard, self.folder)
+        editor.theme = self.theme or settings.theme
+        editor.shown = set(settings.shown) & set(SHOWN)
+        editor.snaps = set(settings.snaps) & set(SNAPS)
+        editor.grid, editor.snap_angle = settings.grid, settings.angle
+        editor.radius, editor.robots, editor.wall_width = settings.radius, settings.robots, settings.wall
+        editor.recent = list(settings.recent)
         if self.background is not None:
-            lay_under(desk, self.background)
-            desk.choose("picture", tell=False)
-        return desk
+            lay_under(editor, self.background)
+            editor.choose("picture", tell=False)
+        return editor
 
-    def _opened(self, desk: Editor, settings: EditorSettings, drafts: Path | None) -> EditorWindow:
+    def _opened(self, editor: Editor, settings: EditorSettings, drafts: Path | None) -> EditorWindow:
         from robocov_app.editor.ui.window import EditorWindow
 
         size = self.size or (settings.width, settings.height)
         scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
         if self.size is None and not self.headless:
             size = fitting(size)
-        window = EditorWindow(desk, size, scale, drafts, patient=self.headless)
+        window = EditorWindow(editor, size, scale, drafts, patient=self.headless)
         window.panel.show_tab(settings.tab)
         return window
 
@@ -123,7 +123,7 @@ def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
     if not found:
         return
     draft, rest = found[0], found[1:]
-    desk = window.desk
+    editor = window.editor
 
     def recover() -> None:
         window.documents.leave(lambda: window.documents.recover(draft))
@@ -136,24 +136,24 @@ def offer(window: EditorWindow, found: tuple[Autosave, ...]) -> None:
     words = f"An editor ended without saving: {draft.words()}."
     if rest:
         words += f"\n{len(rest)} more {'are' if len(rest) > 1 else 'is'} kept besides."
-    desk.ask("Recover unsaved work?", words, *answers)
+    editor.ask("Recover unsaved work?", words, *answers)
 
 
 def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     """Return what is worth remembering of a window."""
-    desk = window.desk
+    editor = window.editor
     width, height = window.windowed or window.screen.get_size()
     changes = {
-        "theme": desk.theme,
+        "theme": editor.theme,
         "tab": window.panel.tab,
-        "grid": desk.grid,
-        "angle": desk.snap_angle,
-        "snaps": tuple(name for name in SNAPS if name in desk.snaps),
-        "shown": tuple(name for name in SHOWN if name in desk.shown),
-        "radius": desk.radius,
-        "robots": desk.robots,
-        "wall": desk.wall_width,
-        "recent": tuple(desk.recent),
+        "grid": editor.grid,
+        "angle": editor.snap_angle,
+        "snaps": tuple(name for name in SNAPS if name in editor.snaps),
+        "shown": tuple(name for name in SHOWN if name in editor.shown),
+        "radius": editor.radius,
+        "robots": editor.robots,
+        "wall": editor.wall_width,
+        "recent": tuple(editor.recent),
         "width": min(max(width, 900), 7680),
         "height": min(max(height, 600), 4320),
     }

@@ -104,9 +104,9 @@ class Panel:
     """
 
     def __init__(
-        self, desk: Editor, commands: Commands, do: Callable[[str], object], picked: Callable[[], object]
+        self, editor: Editor, commands: Commands, do: Callable[[str], object], picked: Callable[[], object]
     ) -> None:
-        self.desk, self._commands, self._do, self._picked = desk, commands, do, picked
+        self.editor, self._commands, self._do, self._picked = editor, commands, do, picked
         self.tab = TABS[0]
         self.covered = self.hidden = False
         self.ui = Ui(self._page, LIGHT)
@@ -128,9 +128,16 @@ class Panel:
 
     def update(self) -> None:
         """Let the page be drawn anew when something that it shows is different."""
-        desk = self.desk
-        sketch, selection = desk.preview
-        shows = (desk.version, self.tab, id(sketch), selection, id(desk.measurement), desk.document.unsaved)
+        editor = self.editor
+        sketch, selection = editor.preview
+        shows = (
+            editor.version,
+            self.tab,
+            id(sketch),
+            selection,
+            id(editor.measurement),
+            editor.document.unsaved,
+        )
         if shows != self._drawn:
             self._drawn, self.ui.stale = shows, True
 
@@ -152,15 +159,15 @@ class Panel:
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
-        document = self.desk.document
+        document = self.editor.document
         ui.header(f"{document.title}{', not saved' if document.unsaved else ''}")
         for row in _FILE:
             self._buttons(ui, row)
         ui.header("TOOLS")
-        tools = [(tool.title, f"tool:{tool.name}") for tool in self.desk.tools.values()]
+        tools = [(tool.title, f"tool:{tool.name}") for tool in self.editor.tools.values()]
         for k in range(0, len(tools), 4):
-            self._buttons(ui, tools[k : k + 4], columns=4, chosen=f"tool:{self.desk.tool.name}")
-        count = len(self.desk.problems)
+            self._buttons(ui, tools[k : k + 4], columns=4, chosen=f"tool:{self.editor.tool.name}")
+        count = len(self.editor.problems)
         titles = {name: name.capitalize() for name in TABS}
         titles["problems"] += f" {min(count, 99)}" if count else ""
         ui.row(44, 56, 46, 72, 0, below=8)
@@ -183,21 +190,21 @@ class Panel:
         ui.row()
 
     def _check(self, ui: Ui, kind: str, name: str, title: str) -> None:
-        desk = self.desk
-        chosen = desk.shown if kind == "show" else desk.snaps
+        editor = self.editor
+        chosen = editor.shown if kind == "show" else editor.snaps
         tip = self._commands[f"{kind}:{name}"].tip
         if ui.check(title, key=f"{kind}:{name}", now=name in chosen, tip=tip) is not None:
             self._do(f"{kind}:{name}")
 
     def _field(self, ui: Ui, name: str, word: str, unit: str = "") -> None:
         """Show a field between its word and its unit, each in a cell of its own."""
-        desk, field = self.desk, FIELDS[name]
+        editor, field = self.editor, FIELDS[name]
         ui.label(word, key=f"word:{name}", tip=field.tip)
-        given = ui.text_entry(name, field.text(desk), tip=field.tip)
+        given = ui.text_entry(name, field.text(editor), tip=field.tip)
         if unit:
             ui.label(unit, key=f"unit:{name}", style="unit")
         if given is not None:
-            desk.attempt(lambda: field.take(desk, given))
+            editor.attempt(lambda: field.take(editor, given))
 
     def _pair(self, ui: Ui, *fields: tuple[str, str, str]) -> None:
         """Show one or two fields side by side."""
@@ -220,7 +227,7 @@ class Panel:
             self._whole_row(ui, "title", "Name")
             self._whole_row(ui, "description", "About")
             ui.row(_NAME, 0, height=18, below=2)
-            for (word, tip), said in zip(_FACTS.items(), facts(self.desk), strict=True):
+            for (word, tip), said in zip(_FACTS.items(), facts(self.editor), strict=True):
                 ui.label(word, style="unit", tip=tip)
                 ui.label(said, key=f"fact:{word}")
             ui.space(4)
@@ -242,13 +249,13 @@ class Panel:
             self._check(ui, "show", "robots", "Show the team there")
 
     def _object(self, ui: Ui) -> None:
-        desk, kind = self.desk, object_kind(self.desk)
+        editor, kind = self.editor, object_kind(self.editor)
         if kind == "nothing":
             ui.words(_NOTHING, size=SMALL + 1, colour=ui.theme.faint)
             ui.space(6)
             self._things(ui)
             return
-        ui.header(object_words(desk))
+        ui.header(object_words(editor))
         if kind in ("polygon", "circle", "wall", "disc", "start"):
             self._whole_row(ui, "name", "Name")
         if kind in ("polygon", "circle", "wall", "several"):
@@ -264,7 +271,7 @@ class Panel:
         for row in _BUTTONS[kind]:
             self._buttons(ui, row)
         ui.space(4)
-        if desk.handled:
+        if editor.handled:
             self._vertices(ui)
         else:
             self._things(ui)
@@ -288,21 +295,23 @@ class Panel:
             self._pair(ui, ("picture:scale", "Pixel", "m"), ("picture:turn", "Turn", "°"))
             ui.row(_NAME, 0)
             ui.label("Opacity")
-            picture = self.desk.sketch.background
+            picture = self.editor.sketch.background
             why = "" if picture is not None else "there is no picture under the map"
             part = ui.slider("opacity", picture.opacity if picture is not None else 0.5, 0.0, 1.0, why=why)
             if part is not None:
                 text = f"{part:.2f}"
-                self.desk.attempt(lambda: FIELDS["picture:opacity"].take(self.desk, text))
+                self.editor.attempt(lambda: FIELDS["picture:opacity"].take(self.editor, text))
 
     def _problems(self, ui: Ui) -> None:
-        desk, problems = self.desk, self.desk.problems
+        editor, problems = self.editor, self.editor.problems
         row = (("Next", "problem:next"), ("Repair", "repair"), ("Clip", "clip"), ("Mend", "problem:fix"))
         self._buttons(ui, row)
         with ui.scroll("problems"):
             if not problems:
                 said = (
-                    "Nothing is wrong with the map." if desk.measurement is not None else "Being looked at …"
+                    "Nothing is wrong with the map."
+                    if editor.measurement is not None
+                    else "Being looked at …"
                 )
                 ui.words(said, colour=ui.theme.faint)
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
@@ -315,21 +324,21 @@ class Panel:
                 if ui.surface is not None:
                     canvas = Canvas(ui.surface, FLAT, ui.theme, ui.scale, np.zeros(1, dtype=np.intp))
                     draw_badge(canvas, badge.centerx, badge.top + ui.px(13), grave=problem.grave)
-                if ui.option("\n".join(lines), key=f"problem:{k}", chosen=problem is desk.problem):
-                    desk.problem = problem
+                if ui.option("\n".join(lines), key=f"problem:{k}", chosen=problem is editor.problem):
+                    editor.problem = problem
                     if problem.of is not None:
-                        desk.select(Selection.of(problem.of).within(desk.sketch))
-                    desk.version += 1
+                        editor.select(Selection.of(problem.of).within(editor.sketch))
+                    editor.version += 1
                     self._picked()
                 if mends and ui.button(TITLES[problem.kind], key=f"mend:{k}", small=True):
-                    desk.problem = problem
-                    desk.attempt(lambda: fix_problem(desk))
+                    editor.problem = problem
+                    editor.attempt(lambda: fix_problem(editor))
                     return  # these problems are of the map before
             if len(problems) > MOST_PROBLEMS:
                 ui.words(f"… and {len(problems) - MOST_PROBLEMS} more", colour=ui.theme.faint)
 
     def _history(self, ui: Ui) -> None:
-        history = self.desk.document.history
+        history = self.editor.document.history
         self._buttons(ui, (("Undo", "undo"), ("Redo", "redo")))
         steps = [(words, k - len(history.future)) for k, words in enumerate(reversed(history.future))]
         steps += [(words, k) for k, words in enumerate(history.past)]
@@ -339,13 +348,13 @@ class Panel:
                 done, count = steps[k]
                 aside = "undone" if count < 0 else ""
                 if ui.option(done, aside, key=f"step:{k}", chosen=count == 0):
-                    self.desk.travel(count)
+                    self.editor.travel(count)
 
     # lists
 
     def _things(self, ui: Ui) -> None:
         """Show all things of the map, the topmost first, also those that are locked or hidden."""
-        desk, sketch = self.desk, self.desk.sketch
+        editor, sketch = self.editor, self.editor.sketch
         things: list[tuple[Owner, str]] = []
         for item in reversed(sketch.obstacles):
             marks = [item.group, "locked" if item.locked else "", "hidden" if item.hidden else ""]
@@ -355,25 +364,25 @@ class Panel:
         with ui.scroll("things"):
             for k in ui.visible_rows(len(things), ROW):
                 owner, said = things[k]
-                chosen = owner in desk.selection.owners
+                chosen = owner in editor.selection.owners
                 if ui.option(numbered_name(sketch, owner), said, key=f"thing:{owner}", chosen=chosen):
                     own = Selection.of(owner)
-                    before = desk.selection.without_vertices()
-                    desk.select(before.toggled(own) if _added() else own)
+                    before = editor.selection.without_vertices()
+                    editor.select(before.toggled(own) if _added() else own)
 
     def _vertices(self, ui: Ui) -> None:
         """Show the vertices of what is selected, with their coordinates; in a drag, where they are by now."""
-        desk = self.desk
-        found = [vertex for owner in desk.handled for vertex, _ in points_of(desk.sketch, owner)]
+        editor = self.editor
+        found = [vertex for owner in editor.handled for vertex, _ in points_of(editor.sketch, owner)]
         with ui.scroll("vertices"):
             for k in ui.visible_rows(len(found), ROW):
                 vertex: Vertex = found[k]
-                x, y = place_of(desk.preview[0], vertex)
-                chosen = vertex in desk.selection.vertices
+                x, y = place_of(editor.preview[0], vertex)
+                chosen = vertex in editor.selection.vertices
                 if ui.option(f"{k + 1}", f"{x:.3f}      {y:.3f}  m", key=f"vertex:{k}", chosen=chosen):
                     own = Selection(vertices=frozenset({vertex}))
-                    before = Selection(vertices=desk.selection.vertices)
-                    desk.select(before.toggled(own) if _added() else own)
+                    before = Selection(vertices=editor.selection.vertices)
+                    editor.select(before.toggled(own) if _added() else own)
 
 
 def _added() -> bool:
@@ -381,9 +390,9 @@ def _added() -> bool:
     return bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
 
 
-def object_kind(desk: Editor) -> str:
+def object_kind(editor: Editor) -> str:
     """Return what kind of thing is selected, on which it depends what the page offers."""
-    selection = desk.selection
+    selection = editor.selection
     if not selection:
         return "nothing"
     if selection.vertices:
@@ -394,28 +403,28 @@ def object_kind(desk: Editor) -> str:
         return "boundary"
     if selection.starts:
         (name,) = selection.starts
-        spec = dict(desk.sketch.starts).get(name)
+        spec = dict(editor.sketch.starts).get(name)
         return "disc" if isinstance(spec, DiscStart) else "start"
     (key,) = selection.items
-    if key not in desk.sketch.places:
+    if key not in editor.sketch.places:
         return "nothing"
-    shape = desk.sketch.item(key).shape
+    shape = editor.sketch.item(key).shape
     return {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(shape)]
 
 
-def object_words(desk: Editor) -> str:
+def object_words(editor: Editor) -> str:
     """Return what the object page is about."""
-    selection = desk.selection
+    selection = editor.selection
     if selection.vertices:
-        return f"{selection.words(desk.sketch)} of {whole(selection).words(desk.sketch)}".upper()
+        return f"{selection.words(editor.sketch)} of {whole(selection).words(editor.sketch)}".upper()
     if selection.owners == {BOUNDARY}:
         return "BOUNDARY"
-    return selection.words(desk.sketch).upper()
+    return selection.words(editor.sketch).upper()
 
 
-def facts(desk: Editor) -> tuple[str, ...]:
+def facts(editor: Editor) -> tuple[str, ...]:
     """Return what the map page says of the map, in the order of its words."""
-    sketch, measurement = desk.sketch, desk.measurement
+    sketch, measurement = editor.sketch, editor.measurement
     size, ring = "no boundary yet: B draws one", sketch.boundary
     if ring:
         xs, ys = [x for x, _ in ring], [y for _, y in ring]

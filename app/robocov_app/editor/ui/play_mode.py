@@ -15,7 +15,7 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import LATTICE, Costs
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.scenario import Limits, Scenario
+from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
@@ -29,7 +29,7 @@ BACK = ("f5",)
 
 
 class PlayPresenter(Presenter):
-    """The demo's desk, which knows whether the map is still the one that is tried.
+    """The viewer's presenter, which knows whether the map is still the one that is tried.
 
     `elsewhere`: another map was opened meanwhile.
     """
@@ -55,19 +55,19 @@ class PlayPresenter(Presenter):
 
 
 class PlayWindow(Window):
-    """The demo's window, out of which F5 and Escape lead back.
+    """The viewer's window, out of which F5 and Escape lead back.
 
     `ended`: back to the editor. `held`: the key that began it, until it comes up: its repeated presses are
     none of their own.
     """
 
-    desk: PlayPresenter
+    viewer: PlayPresenter
     hint = "F5 back to the editor · F1 keys"
 
-    def __init__(self, desk: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
+    def __init__(self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
         self.ended = False
         self.held: int | None = None
-        super().__init__(desk, screen.get_size(), scale, patient=patient, screen=screen)
+        super().__init__(viewer, screen.get_size(), scale, patient=patient, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
@@ -83,18 +83,23 @@ class PlayWindow(Window):
     def do(self, name: str) -> None:
         """Do the action of this name; Escape leads back where it would do nothing."""
         idle = not (self.help or self.dialogs.open or self.tour is not None)
-        if name == "cancel" and idle and self.desk.tool is self.desk.hand and self.desk.selected is None:
-            self.ended = not self.desk.hand.cancel(self.desk.session)
+        if (
+            name == "cancel"
+            and idle
+            and self.viewer.tool is self.viewer.hand
+            and self.viewer.selected is None
+        ):
+            self.ended = not self.viewer.hand.cancel(self.viewer.session)
             return
         super().do(name)
 
 
-def begun(desk: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
-    """Return the demo on the map of a desk, with its team at its start."""
-    environment = desk.sketch.environment()
-    name = desk.start_name if desk.start_name in environment.starts else None
+def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
+    """Return the demo on the map of the editor, with its team at its start."""
+    environment = editor.sketch.environment()
+    name = editor.start_name if editor.start_name in environment.starts else None
     scenario = Scenario(
-        environment, robots=desk.robots, start=name, seed=desk.seed, limits=Limits(radius=desk.radius)
+        environment, robots=editor.robots, start=name, seed=editor.seed, limits=TeamSpec(radius=editor.radius)
     )
     session = Session(scenario)
     if patient:
@@ -102,14 +107,14 @@ def begun(desk: Editor, screen: pygame.Surface, scale: float, *, patient: bool) 
     costs: Costs = Costs(LATTICE, direct=True) if patient else Costs(LATTICE)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
-        demo = PlayPresenter(session, costs, shown, desk.folder, desk.document.title)
-        demo.theme = desk.theme
+        demo = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
+        demo.theme = editor.theme
         trial = PlayWindow(demo, screen, scale, patient=patient)
     except BaseException:
         costs.close()
         raise
     trial.panel.update(0.01)  # or its first frame would be without it
-    demo.say(f"trying “{desk.sketch.name}”: F5 or Esc leads back to the editor")
+    demo.say(f"trying “{editor.sketch.name}”: F5 or Esc leads back to the editor")
     return trial
 
 

@@ -37,9 +37,9 @@ class Pointer:
     """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
 
     def __init__(
-        self, desk: Editor, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
+        self, editor: Editor, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
     ) -> None:
-        self._desk, self._arena, self._panel, self._menu = desk, arena, panel, menu
+        self._editor, self._arena, self._panel, self._menu = editor, arena, panel, menu
         self.at = (0, 0)
         self.held = False
         """Whether the sheet is panned by the left button, for as long as a key is held."""
@@ -65,7 +65,7 @@ class Pointer:
         elif event.type == pygame.MOUSEBUTTONUP:
             self._released(event)
         elif taken:
-            self._desk.cursor = None
+            self._editor.cursor = None
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self._panel.ui.stop_typing()
             self._pressed(event, now)
@@ -77,10 +77,10 @@ class Pointer:
         raw, reach = self._arena.to_world(pixel), self._arena.reach
         held = pygame.key.get_mods()
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
-        tool = self._desk.tool
+        tool = self._editor.tool
         point, tool_guides = raw, tool.guides
         if tool.snaps:
-            snap = None if ctrl else self._desk.snap(raw, reach)
+            snap = None if ctrl else self._editor.snap(raw, reach)
             point, tool_guides = (raw, ()) if snap is None else (snap.point, snap.guides)
             tool.guides = tool_guides
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
@@ -88,37 +88,37 @@ class Pointer:
 
     def leave(self) -> None:
         """The mouse is not in the window any more."""
-        self._desk.cursor = None
+        self._editor.cursor = None
         self._arena.at = None
         self._arena.hovered = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
-        desk = self._desk
+        editor = self._editor
         if self._drag or not self._arena.over(event.pos) or event.button not in (1, 2, 3):
             return
         self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
-        if event.button != 1 or desk.tool.name == "pan" or self.held:
+        if event.button != 1 or editor.tool.name == "pan" or self.held:
             self._drag = "pan"
             return
         problem = self._arena.problem_at(event.pos)
-        if problem is not None and not desk.tool.busy:
-            desk.problem = None if desk.problem is problem else problem
-            desk.say(problem.words, trouble=problem.grave)
-            desk.version += 1
+        if problem is not None and not editor.tool.busy:
+            editor.problem = None if editor.problem is problem else problem
+            editor.say(problem.words, trouble=problem.grave)
+            editor.version += 1
             return
         then, where = self._last_click
         double = now - then < DOUBLE and _far(where, event.pos) < SLIP * self._arena.layout.scale
         self._last_click = (-1.0 if double else now), event.pos
         self._drag = "tool"
         aim = self.aim(event.pos)
-        act = desk.tool.twice if double else desk.tool.press
-        desk.attempt(lambda: act(desk, aim))
+        act = editor.tool.twice if double else editor.tool.press
+        editor.attempt(lambda: act(editor, aim))
 
     def _moved(self, event: pygame.event.Event) -> None:
-        desk, arena = self._desk, self._arena
+        editor, arena = self._editor, self._arena
         over = arena.over(event.pos) and not inside(arena.layout.panel, event.pos)
         aimed = over or self._drag == "tool"
-        desk.cursor = arena.to_world(event.pos) if aimed else None
+        editor.cursor = arena.to_world(event.pos) if aimed else None
         arena.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
         arena.hovered = arena.problem_at(event.pos) if over and not self._drag else None
         far = _far(event.pos, self._pressed_at) >= SLIP * arena.layout.scale
@@ -128,41 +128,41 @@ class Pointer:
                 arena.pan(*event.rel)
         elif aimed:
             aim = self.aim(event.pos)
-            self._quietly(lambda: desk.tool.move(desk, aim))
+            self._quietly(lambda: editor.tool.move(editor, aim))
         else:
-            desk.tool.guides = ()
+            editor.tool.guides = ()
 
     def _quietly(self, action: Callable[[], object]) -> None:
         """Do something for every move of the mouse: the panel need not look again each time."""
-        version = self._desk.version
-        self._desk.attempt(action)
-        self._desk.version = version
+        version = self._editor.version
+        self._editor.attempt(action)
+        self._editor.version = version
 
     def _released(self, event: pygame.event.Event) -> None:
-        desk, drag = self._desk, self._drag
+        editor, drag = self._editor, self._drag
         if event.button != self._button or not drag:
             return
         self._drag, self._button = "", 0
         if drag == "tool":
             aim = self.aim(event.pos)
-            desk.attempt(lambda: desk.tool.release(desk, aim, clicked=not self._moved_off))
-            desk.document.history.break_drag()
+            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
+            editor.document.history.break_drag()
         elif event.button == 3 and not self._moved_off:
-            if desk.tool.busy:
-                desk.attempt(lambda: desk.tool.finish(desk))
+            if editor.tool.busy:
+                editor.attempt(lambda: editor.tool.finish(editor))
             else:
                 self._menu(event.pos)
 
     def show(self) -> None:
         """Let the cursor tell what a press would do."""
-        arena, desk = self._arena, self._desk
+        arena, editor = self._arena, self._editor
         if inside(arena.layout.panel, self.at):
             self._shape = -1  # the panel has set its own
             return
         shape = "arrow"
         if arena.over(self.at):
             panned = self._drag == "pan" or self.held
-            shape = "move" if panned else "hand" if arena.hovered else desk.tool.shape_of_cursor(desk)
+            shape = "move" if panned else "hand" if arena.hovered else editor.tool.shape_of_cursor(editor)
         if _SHAPES[shape] != self._shape:
             self._shape = _SHAPES[shape]
             show_cursor(self._shape)

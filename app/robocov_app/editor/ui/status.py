@@ -13,32 +13,36 @@ if TYPE_CHECKING:
 HINT = "F5 try it · F1 keys"
 
 
-def hovered_words(desk: Editor) -> str:
+def hovered_words(editor: Editor) -> str:
     """Return what is noted about what the cursor is on."""
-    owner = desk.selector.hovered
-    if desk.tool is not desk.selector or not isinstance(owner, int) or owner not in desk.sketch.places:
+    owner = editor.selector.hovered
+    if editor.tool is not editor.selector or not isinstance(owner, int) or owner not in editor.sketch.places:
         return ""
-    item = desk.sketch.item(owner)
+    item = editor.sketch.item(owner)
     return f"{item.shape.name or 'note'}: {item.note}" if item.note else ""
 
 
-def facts(desk: Editor, frames: float, team: Team | None) -> list[str]:
+def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
     """Return what the line says, the most important first."""
-    said = [f"{desk.tool.title}: {desk.tool.hint}" if desk.tool is not desk.selector else ""]
-    if desk.cursor is not None:
-        said.insert(0, place_words(desk.cursor))
-    said.append(hovered_words(desk))
-    if desk.selection and desk.tool is desk.selector:
-        said.append(desk.selection.words(desk.sketch))
-    if "robots" in desk.shown and team is not None:
+    said = [f"{editor.tool.title}: {editor.tool.hint}" if editor.tool is not editor.selector else ""]
+    if editor.cursor is not None:
+        said.insert(0, place_words(editor.cursor))
+    said.append(hovered_words(editor))
+    if editor.selection and editor.tool is editor.selector:
+        said.append(editor.selection.words(editor.sketch))
+    if "robots" in editor.shown and team is not None:
         said.append(team.words or f"{len(team.places)} robots at {team.start or 'anywhere'}")
-    if desk.tool is desk.selector and not desk.selection:
-        said.append(desk.tool.hint)
+    if editor.tool is editor.selector and not editor.selection:
+        said.append(editor.tool.hint)
     snaps = (
-        "no snapping" if not desk.snaps else f"grid {desk.grid:g} m" if "grid" in desk.snaps else "grid off"
+        "no snapping"
+        if not editor.snaps
+        else f"grid {editor.grid:g} m"
+        if "grid" in editor.snaps
+        else "grid off"
     )
     said.append(snaps)
-    if desk.readings.busy:
+    if editor.readings.busy:
         said.append("measuring …")
     said.append(f"{frames:.0f} fps")
     return [each for each in said if each]

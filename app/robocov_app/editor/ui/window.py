@@ -1,4 +1,4 @@
-"""The editor's window: events in, frames out. What happens between is the desk's."""
+"""The editor's window: events in, frames out. What happens between is the editor's."""
 
 from __future__ import annotations
 
@@ -46,31 +46,37 @@ _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no
 
 
 class EditorWindow(BaseWindow):
-    """Shows a desk and lets it be touched."""
+    """Shows the editor and lets it be touched."""
 
     def __init__(
-        self, desk: Editor, size: tuple[int, int], scale: float, drafts: Path | None, *, patient: bool = False
+        self,
+        editor: Editor,
+        size: tuple[int, int],
+        scale: float,
+        drafts: Path | None,
+        *,
+        patient: bool = False,
     ) -> None:
         super().__init__(size)
-        self.desk, self.scale = desk, scale
+        self.editor, self.scale = editor, scale
         self.help = False
         self.trial: PlayWindow | None = None
-        self.arena = Arena(desk)
-        self.documents = FileCommands(desk, drafts, self.arena.fit, patient=patient)
-        self.dialogs = desk.dialogs
-        listed = editor_commands(desk, {**self.documents.commands(), **self._what_to_do()})
-        self.commands = Commands(listed, self._attempt, lambda: typed_commands(desk))
-        self.panel = Panel(desk, self.commands, self.do, self._show_problem)
+        self.arena = Arena(editor)
+        self.documents = FileCommands(editor, drafts, self.arena.fit, patient=patient)
+        self.dialogs = editor.dialogs
+        listed = editor_commands(editor, {**self.documents.commands(), **self._what_to_do()})
+        self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
+        self.panel = Panel(editor, self.commands, self.do, self._show_problem)
         self.menu: Menu | None = None
-        self.pointer = Pointer(desk, self.arena, self.panel, self.open_menu)
+        self.pointer = Pointer(editor, self.arena, self.panel, self.open_menu)
         self.team = TeamThread()
-        self._patient = desk.snapper.patient = patient
+        self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._tried: Environment | None = None
         self._caption = ""
         self._arrange()
         self.arena.fit()
-        desk.ask_readings()
+        editor.ask_readings()
         self.draw()
 
     # frames
@@ -81,20 +87,34 @@ class EditorWindow(BaseWindow):
             self.trial.close()
         self.team.close()
         self.documents.close()
-        self.desk.snapper.close()
+        self.editor.snapper.close()
 
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
         if self.trial is not None:
             return self.trial.look()
-        desk, arena, ui = self.desk, self.arena, self.panel.ui
-        if ui.busy or ui.stale or desk.moves_since is not None or self.dialogs.open:
+        editor, arena, ui = self.editor, self.arena, self.panel.ui
+        if ui.busy or ui.stale or editor.moves_since is not None or self.dialogs.open:
             return None
         return (
-            *(desk.version, desk.message, desk.trouble, desk.typed, desk.readings.busy, desk.problem),
-            *(desk.sketch, desk.selection, desk.measurement, desk.tool, desk.cursor, frozenset(desk.shown)),
+            *(
+                editor.version,
+                editor.message,
+                editor.trouble,
+                editor.typed,
+                editor.readings.busy,
+                editor.problem,
+            ),
+            *(
+                editor.sketch,
+                editor.selection,
+                editor.measurement,
+                editor.tool,
+                editor.cursor,
+                frozenset(editor.shown),
+            ),
             *(arena.team, arena.camera, arena.hovered, self.help),
-            *(self._arranged, self._caption, desk.grid, frozenset(desk.snaps)),
+            *(self._arranged, self._caption, editor.grid, frozenset(editor.snaps)),
         )
 
     def update(self, seconds: float) -> None:
@@ -102,15 +122,15 @@ class EditorWindow(BaseWindow):
         if self.trial is not None:
             self._play(self.trial, seconds)
             return
-        desk = self.desk
-        desk.pass_time(seconds)
+        editor = self.editor
+        editor.pass_time(seconds)
         if not self.pointer.dragging:
             self.documents.look()
             self._ask_team()
-        if not (self.pointer.dragging and desk.readings.busy):
-            desk.ask_readings()
-        if desk.document.trouble:
-            desk.say(desk.document.trouble, trouble=True)
+        if not (self.pointer.dragging and editor.readings.busy):
+            editor.ask_readings()
+        if editor.document.trouble:
+            editor.say(editor.document.trouble, trouble=True)
         if self.documents.leaving:
             self.closed = True
             return
@@ -118,30 +138,30 @@ class EditorWindow(BaseWindow):
         self.panel.covered = self.dialogs.open or self.menu is not None
         self.panel.update()
         self.pointer.show()
-        caption = f"{'● ' if desk.document.unsaved else ''}{desk.document.title} · {_CAPTION}"
+        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · {_CAPTION}"
         if caption != self._caption:
             self._caption = caption
             pygame.display.set_caption(caption)
 
     def _ask_team(self) -> None:
-        desk = self.desk
-        if "robots" in desk.shown:
-            self.team.ask(desk.sketch, desk.start_name, desk.robots, desk.seed, desk.radius)
+        editor = self.editor
+        if "robots" in editor.shown:
+            self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
             answer = self.team.poll()
             if answer is not None:
                 self.arena.team = answer
                 if answer.words:
-                    desk.say(answer.words, trouble=True)
+                    editor.say(answer.words, trouble=True)
 
     def _arrange(self) -> None:
         """Lay the window out anew when its size or look is another."""
-        desk = self.desk
-        key = (self.screen.get_size(), self.scale, desk.panel, desk.theme)
+        editor = self.editor
+        key = (self.screen.get_size(), self.scale, editor.panel, editor.theme)
         if key == self._arranged:
             return
         self._arranged = key
-        self.theme = theme_named(desk.theme)
-        self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=desk.panel, plot=False)
+        self.theme = theme_named(editor.theme)
+        self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
         self.arena.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
@@ -150,13 +170,13 @@ class EditorWindow(BaseWindow):
         if self.trial is not None:
             self.trial.draw()
             return
-        layout, theme, desk = self.layout, self.theme, self.desk
+        layout, theme, editor = self.layout, self.theme, self.editor
         self.arena.draw(self.screen)
-        told = facts(desk, self.rate, self.arena.team)
+        told = facts(editor, self.rate, self.arena.team)
         draw_status(self.screen, layout.status, theme, layout.scale, told, HINT)
         if layout.panel[2]:
             self.panel.draw(self.screen)
-        draw_message(self.screen, desk.message, layout.arena, theme, layout.scale, desk.trouble)
+        draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, editor.trouble)
         if self.menu is not None:
             self.menu.draw(self.screen, theme, layout.scale)
         if self.help:
@@ -175,21 +195,21 @@ class EditorWindow(BaseWindow):
             self.commands.do(name)
 
     def _attempt(self, action: Callable[[], object]) -> None:
-        desk, problem = self.desk, self.desk.problem
-        desk.attempt(action)
-        if desk.problem is not problem:
+        editor, problem = self.editor, self.editor.problem
+        editor.attempt(action)
+        if editor.problem is not problem:
             self._show_problem()
 
     def _show_problem(self) -> None:
-        if self.desk.problem is not None:
-            self.arena.go_to(self.desk.problem)
+        if self.editor.problem is not None:
+            self.arena.go_to(self.editor.problem)
 
     def open_palette(self, text: str = "") -> None:
         """Open the palette, with the beginning of a command."""
 
         def told(words: str) -> None:
-            self.desk.version += 1
-            self.desk.say(words)
+            self.editor.version += 1
+            self.editor.say(words)
 
         asked = palette(self.commands, GHOST, told)
         asked.text = text
@@ -212,7 +232,7 @@ class EditorWindow(BaseWindow):
             "name": self._name,
             "menu": lambda: self.open_menu(self.pointer.at),
             "fullscreen": self.toggle_fullscreen,
-            "screenshot": lambda: self.save_screenshot(self.desk.folder),
+            "screenshot": lambda: self.save_screenshot(self.editor.folder),
             "help": self._toggle_help,
             "palette": self.open_palette,
             "try": self.try_it,
@@ -225,18 +245,18 @@ class EditorWindow(BaseWindow):
         return left + width / 2, top + height / 2
 
     def _switch_theme(self) -> None:
-        self.desk.theme = "dark" if self.desk.theme == "light" else "light"
+        self.editor.theme = "dark" if self.editor.theme == "light" else "light"
 
     def _switch_panel(self) -> None:
-        self.desk.panel = not self.desk.panel
+        self.editor.panel = not self.editor.panel
 
     def _next_tab(self) -> None:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
 
     def _name(self) -> None:
         """Go to the field with the name of what is selected, or of the map."""
-        field, tab = ("name", "object") if len(self.desk.selection.owners) == 1 else ("title", "map")
-        self.desk.panel = True
+        field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
+        self.editor.panel = True
         self._arrange()
         self.panel.show_tab(tab)
         self.panel.focus(field)
@@ -246,23 +266,23 @@ class EditorWindow(BaseWindow):
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the menu for what is at a pixel; what is not selected yet is selected then."""
-        desk = self.desk
+        editor = self.editor
         if self.arena.over(pixel):
-            there = owners_at(desk.sketch, self.arena.to_world(pixel), 0.5 * self.arena.reach)
-            near = desk.selection.vertices or any(each in desk.selection.owners for each in there)
+            there = owners_at(editor.sketch, self.arena.to_world(pixel), 0.5 * self.arena.reach)
+            near = editor.selection.vertices or any(each in editor.selection.owners for each in there)
             if not near:
-                desk.select(Selection.of(*there[:1]))
-        found = [self.commands[name] if name else None for name in offered(desk)]
+                editor.select(Selection.of(*there[:1]))
+        found = [self.commands[name] if name else None for name in offered(editor)]
         self.menu = Menu(found, pixel, self.do)
 
     # trying
 
     def try_it(self) -> None:
         """Begin the demo on the map."""
-        if self.desk.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
-            self.desk.selector.cancel(self.desk)
-        trial = begun(self.desk, self.screen, self.scale, patient=self._patient)
-        self._tried = trial.desk.session.environment
+        if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
+            self.editor.selector.cancel(self.editor)
+        trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
+        self._tried = trial.viewer.session.environment
         trial.windowed = self.windowed
         self.trial = trial
 
@@ -277,17 +297,17 @@ class EditorWindow(BaseWindow):
         self.trial = None
         self.screen = pygame.display.get_surface() or self.screen
         self.windowed = trial.windowed
-        desk = self.desk
-        desk.theme = trial.desk.theme
+        editor = self.editor
+        editor.theme = trial.viewer.theme
         assert self._tried is not None
-        change = brought_back(desk.sketch, self._tried, trial.desk.session.environment)
-        if change is not None and not trial.desk.elsewhere:
-            desk.change(change)
+        change = brought_back(editor.sketch, self._tried, trial.viewer.session.environment)
+        if change is not None and not trial.viewer.elsewhere:
+            editor.change(change)
         self.commands.forget_keys()
         if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
             self.commands.hold(pygame.K_F5)
         self._arrange()
-        desk.version += 1
+        editor.version += 1
         if leaving:
             self.do("quit")
         else:
@@ -313,14 +333,14 @@ class EditorWindow(BaseWindow):
         if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
             self.pointer.at = event.pos
         if kind == pygame.QUIT:
-            if isinstance(self.desk.asked, ImportDialog):
+            if isinstance(self.editor.asked, ImportDialog):
                 self.dialogs.close()
             if not self.dialogs.open:
                 self.do("quit")
         elif self.dialogs.take(event):
             return
         elif kind == pygame.DROPFILE:
-            self.desk.attempt(lambda: self.documents.open(Path(event.file)))
+            self.editor.attempt(lambda: self.documents.open(Path(event.file)))
         elif self.menu is not None and self._menu_takes(self.menu, event):
             return
         elif kind == pygame.KEYDOWN:
@@ -331,7 +351,7 @@ class EditorWindow(BaseWindow):
         elif kind == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif kind in OF_THE_MOUSE:
-            self.pointer.take(event, self.desk.now)
+            self.pointer.take(event, self.editor.now)
         elif kind == pygame.WINDOWLEAVE:
             self.pointer.leave()
         else:
@@ -353,18 +373,18 @@ class EditorWindow(BaseWindow):
 
     def _number(self, event: pygame.event.Event) -> bool:
         """Take a key for the number that is typed while something is drawn; say whether it was one."""
-        desk, name, sign = self.desk, key_of(event), event.unicode
-        if not desk.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
+        editor, name, sign = self.editor, key_of(event), event.unicode
+        if not editor.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
             return False
-        if desk.typed and name in ("return", "enter", "backspace", "tab"):
+        if editor.typed and name in ("return", "enter", "backspace", "tab"):
             if name in ("return", "enter"):
-                desk.enter()
+                editor.enter()
             else:
-                desk.typed = desk.typed[:-1] if name == "backspace" else f"{desk.typed} "
+                editor.typed = editor.typed[:-1] if name == "backspace" else f"{editor.typed} "
             return True
-        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if desk.tool.busy else "x×*/ ;%,-+@<°")
-        follows = bool(desk.typed) and (sign in _OF_NUMBERS or sign in _UNITS)
+        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if editor.tool.busy else "x×*/ ;%,-+@<°")
+        follows = bool(editor.typed) and (sign in _OF_NUMBERS or sign in _UNITS)
         if len(sign) == 1 and (begins or follows):
-            desk.typed = (desk.typed + sign)[:40]
+            editor.typed = (editor.typed + sign)[:40]
             return True
         return False

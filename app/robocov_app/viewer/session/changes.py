@@ -16,10 +16,10 @@ from robocov.density import Density
 from robocov.environment import Environment, Obstacle, Point
 from robocov.errors import ParameterError
 from robocov.world.relocation import nearest_free
-from robocov_app.viewer.session.history import Circumstances
+from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import painted, with_obstacles
-from robocov_app.viewer.session.pane import Lane, Wanted
-from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Scenario
+from robocov_app.viewer.session.pane import Continuation, Pane
+from robocov_app.viewer.session.scenario import MOST_ROBOTS, ControllerChoice, Scenario, TeamSpec
 
 
 @dataclass(frozen=True)
@@ -42,18 +42,18 @@ class Place:
     robot: int
     at: Point
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
-        setup, row = pane.circumstances, _row(pane, self.robot)
+        setup, row = pane.setup, _row(pane, self.robot)
         if row is None:
             others, radii = pane.simulation.positions, pane.simulation.team.radius
             place = _fitting(_without_wreck(setup, self.robot), self.robot, others, radii, self.at)
-            return Wanted(replace(setup, failed={**setup.failed, self.robot: place}))
+            return Continuation(replace(setup, failed={**setup.failed, self.robot: place}))
         positions, velocities = np.array(pane.simulation.positions), np.array(pane.simulation.velocities)
         others, radii = np.delete(positions, row, axis=0), np.delete(setup.team.radius, row)
         positions[row] = _fitting(setup, self.robot, others, radii, self.at)
         velocities[row] = 0.0
-        return Wanted(setup, positions, velocities)
+        return Continuation(setup, positions, velocities)
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ class Join:
     robot: int
     at: Point
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
         there = _there(pane)
         if len(there) >= MOST_ROBOTS:
             raise ParameterError(f"there are {MOST_ROBOTS} robots already")
         if self.robot in there:
             raise ParameterError(f"there is a robot {self.robot} already")
-        return _with_robot(pane, pane.circumstances, self.robot, self.at)
+        return _with_robot(pane, pane.setup, self.robot, self.at)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Leave:
 
     robot: int
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
         _row(pane, self.robot)
         _need_another(pane, self.robot)
@@ -92,7 +92,7 @@ class Fail:
 
     robot: int
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
         row = _row(pane, self.robot)
         if row is None:
@@ -100,8 +100,8 @@ class Fail:
         _need_another(pane, self.robot)
         x, y = pane.simulation.positions[row].tolist()
         wanted = _without_robot(pane, self.robot)
-        failed = {**wanted.circumstances.failed, self.robot: (x, y)}
-        return wanted._replace(circumstances=replace(wanted.circumstances, failed=failed))
+        failed = {**wanted.setup.failed, self.robot: (x, y)}
+        return wanted._replace(setup=replace(wanted.setup, failed=failed))
 
 
 @dataclass(frozen=True)
@@ -110,11 +110,11 @@ class Revive:
 
     robot: int
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
         if _row(pane, self.robot) is not None:
             raise ParameterError(f"robot {self.robot} works")
-        setup = pane.circumstances
+        setup = pane.setup
         return _with_robot(pane, _without_wreck(setup, self.robot), self.robot, setup.failed[self.robot])
 
 
@@ -163,23 +163,23 @@ class SetController:
     """Another controller, or other gains, take over in a pane."""
 
     pane: int
-    law: Law
+    law: ControllerChoice
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
-        setup = pane.circumstances
-        return Wanted(replace(setup, law=self.law) if pane.number == self.pane else setup)
+        setup = pane.setup
+        return Continuation(replace(setup, law=self.law) if pane.number == self.pane else setup)
 
 
 @dataclass(frozen=True)
 class SetLimits:
     """All robots are, and can do, something else."""
 
-    limits: Limits
+    limits: TeamSpec
 
-    def of(self, pane: Lane) -> Wanted:
+    def of(self, pane: Pane) -> Continuation:
         """Return how a pane goes on."""
-        return Wanted(replace(pane.circumstances, limits=self.limits))
+        return Continuation(replace(pane.setup, limits=self.limits))
 
 
 @dataclass(frozen=True)
@@ -213,47 +213,47 @@ def map_change(before: Environment, after: Environment) -> EditObstacles:
     return EditObstacles(first, len(old) - first - last, new[first : len(new) - last])
 
 
-def _there(pane: Lane) -> set[int]:
-    return {*pane.numbers, *pane.circumstances.failed}
+def _there(pane: Pane) -> set[int]:
+    return {*pane.numbers, *pane.setup.failed}
 
 
-def _row(pane: Lane, number: int) -> int | None:
+def _row(pane: Pane, number: int) -> int | None:
     """Return the row of a robot, None where it has failed."""
     if number not in _there(pane):
         raise ParameterError(f"there is no robot {number}")
     return pane.row(number)
 
 
-def _need_another(pane: Lane, number: int) -> None:
+def _need_another(pane: Pane, number: int) -> None:
     if not set(pane.numbers) - {number}:
         raise ParameterError("the last robot that works stays")
 
 
-def _fitting(setup: Circumstances, number: int, others: np.ndarray, radii: np.ndarray, point: Point) -> Point:
+def _fitting(setup: PaneSetup, number: int, others: np.ndarray, radii: np.ndarray, point: Point) -> Point:
     """Return the place nearest to a point where a robot fits beside the others and those that failed."""
     return nearest_free(setup.solid, setup.limits.radius_of(number), others, point, radii)
 
 
-def _without_wreck(setup: Circumstances, number: int) -> Circumstances:
+def _without_wreck(setup: PaneSetup, number: int) -> PaneSetup:
     return replace(setup, failed={key: place for key, place in setup.failed.items() if key != number})
 
 
-def _without_robot(pane: Lane, number: int) -> Wanted:
-    setup, row = _without_wreck(pane.circumstances, number), pane.row(number)
+def _without_robot(pane: Pane, number: int) -> Continuation:
+    setup, row = _without_wreck(pane.setup, number), pane.row(number)
     if row is None:
-        return Wanted(setup)
-    return Wanted(
+        return Continuation(setup)
+    return Continuation(
         replace(setup, numbers=tuple(each for each in setup.numbers if each != number)),
         np.delete(pane.simulation.positions, row, axis=0),
         np.delete(pane.simulation.velocities, row, axis=0),
     )
 
 
-def _with_robot(pane: Lane, setup: Circumstances, number: int, point: Point) -> Wanted:
+def _with_robot(pane: Pane, setup: PaneSetup, number: int, point: Point) -> Continuation:
     """Return a pane's robots and one more, at rest at a point or as near as it fits."""
     positions, row = pane.simulation.positions, bisect(setup.numbers, number)
     place = _fitting(setup, number, positions, pane.simulation.team.radius, point)
-    return Wanted(
+    return Continuation(
         replace(setup, numbers=(*setup.numbers[:row], number, *setup.numbers[row:])),
         np.insert(positions, row, place, axis=0),
         np.insert(pane.simulation.velocities, row, 0.0, axis=0),

@@ -10,7 +10,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from robocov.arrays import Array
-    from robocov_app.viewer.session.pane import Lane
+    from robocov_app.viewer.session.pane import Pane
     from robocov_app.viewer.session.session import Session
 
 MOST_SAMPLES = 3000
@@ -131,12 +131,12 @@ DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean dista
 TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")
 
 
-def speeds_of(session: Session, lane: Lane) -> Array | None:
+def speeds_of(session: Session, pane: Pane) -> Array | None:
     """Return how fast each robot that is shown can go, (n,) m/s; None where all are equally fast.
 
     Robots that have failed are remembered: who is left may be equally fast, and the curve goes on.
     """
-    there = session.circumstances(lane)
+    there = session.setup(pane)
     if "max_speed" not in dict(there.limits.different):
         return None
     return there.limits.team(there.numbers).max_speed
@@ -144,12 +144,12 @@ def speeds_of(session: Session, lane: Lane) -> Array | None:
 
 def chosen(session: Session, wanted: Plotted) -> Plotted:
     """Return what is plotted: what is wanted, if there is a choice."""
-    return wanted if any(len(lane.times) for lane in session.lanes) else DISTANCE
+    return wanted if any(len(pane.times) for pane in session.panes) else DISTANCE
 
 
-def curve_of(lane: Lane, what: Plotted) -> Curve:
-    """Return a lane's curve of what is plotted."""
-    return lane.times if what is TIME else lane.curve
+def curve_of(pane: Pane, what: Plotted) -> Curve:
+    """Return a pane's curve of what is plotted."""
+    return pane.times if what is TIME else pane.curve
 
 
 def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
@@ -157,7 +157,7 @@ def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[in
 
     They come in one after the other; a pane without any yet is left out.
     """
-    curves = {lane.number: curve_of(lane, what) for lane in session.lanes if len(curve_of(lane, what))}
+    curves = {pane.number: curve_of(pane, what) for pane in session.panes if len(curve_of(pane, what))}
     time = min([session.time, *(curve.last_time for curve in curves.values())])
     values = {number: curve.at(time) for number, curve in curves.items()}
     return time, {number: value for number, value in values.items() if np.isfinite(value)}

@@ -16,7 +16,7 @@ from robocov_app.viewer.session.changes import Change, Restart
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Moment
 from robocov_app.viewer.session.lockstep import Happening
-from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
 MOST_KEPT = 160
 """Moments of a node that are kept while another branch is shown."""
@@ -44,7 +44,7 @@ class Node:
     redo: Node | None = field(default=None, repr=False)
     kept: list[Moment] = field(default_factory=list, repr=False)
     curves: dict[tuple[int, str], Curve] = field(default_factory=dict, repr=False)
-    controllers: dict[int, Law] = field(default_factory=dict, repr=False)
+    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)
     happenings: set[Happening] = field(default_factory=set, repr=False)
 
     @property

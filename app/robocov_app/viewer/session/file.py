@@ -47,7 +47,7 @@ from robocov_app.viewer.session.changes import (
 )
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.document import Document, Node
-from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
 
@@ -435,11 +435,11 @@ def density_json(density: Any) -> Any:
     return to_json(square.with_density(density)).get("density")
 
 
-def _law_json(law: Law) -> dict[str, Any]:
+def _law_json(law: ControllerChoice) -> dict[str, Any]:
     return {"name": law.name, "gains": dict(law.gains)}
 
 
-def _limits_json(limits: Limits) -> dict[str, Any]:
+def _limits_json(limits: TeamSpec) -> dict[str, Any]:
     found: dict[str, Any] = {name: _finite(getattr(limits, name)) for name in UNITS}
     if limits.different:
         found["different"] = {
@@ -584,7 +584,7 @@ class _Reader:
     def _density(self, document: Any) -> Any:
         return None if document is None else density_of(document, self._environment(0).boundary, self._where)
 
-    def _law(self, model: ControllerModel, at: tuple[str | int, ...]) -> Law:
+    def _law(self, model: ControllerModel, at: tuple[str | int, ...]) -> ControllerChoice:
         name = model.name
         if name not in CONTROLLERS and name not in self._controllers:
             kind = name.rpartition(":")[2]
@@ -596,20 +596,20 @@ class _Reader:
                 )
             name = known[0]
         gains: dict[str, Value] = dict(model.gains)
-        law = Law(name, gains)
+        law = ControllerChoice(name, gains)
         try:
             law.made()
         except RobocovError as error:
             raise MapError.of(self._where, [Mistake.at((*at, "gains"), str(error))]) from None
         return law
 
-    def _limits(self, model: TeamModel) -> Limits:
+    def _limits(self, model: TeamModel) -> TeamSpec:
         values = {name: _unlimited(getattr(model, name)) for name in UNITS}
         different = tuple(
             (name, tuple((int(number), _unlimited(value)) for number, value in each.items()))
             for name, each in model.different.items()
         )
-        return Limits(**values, different=different)
+        return TeamSpec(**values, different=different)
 
     def _scenario(self, model: ScenarioModel, at: tuple[str | int, ...]) -> Scenario:
         if model.map >= len(self._model.maps):

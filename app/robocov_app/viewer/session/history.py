@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Decision
     from robocov.robots import Team
-    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
 MOST_BYTES = 24_000_000
 """Memory that the moments of a window may take."""
@@ -37,7 +37,7 @@ _KEPT = 0.75
 
 
 @dataclass(frozen=True, eq=False)
-class Circumstances:
+class PaneSetup:
     """What stays as it is from one touch to the next.
 
     `environment`: the map as it is, without robots that failed. `numbers`, (n,) int: what people call the
@@ -47,8 +47,8 @@ class Circumstances:
     """
 
     environment: Environment
-    law: Law
-    limits: Limits
+    law: ControllerChoice
+    limits: TeamSpec
     numbers: tuple[int, ...]
     failed: Mapping[int, tuple[float, float]]
     conditions: Conditions | None = None
@@ -84,7 +84,7 @@ class State(NamedTuple):
     the robots had; None where they know the others as they are.
     """
 
-    circumstances: Circumstances
+    setup: PaneSetup
     positions: Array
     velocities: Array
     memory: Any
@@ -216,7 +216,7 @@ def _strides(age: IntArray, recent: int) -> IntArray:
 def _changes(before: Moment, after: Moment) -> bool:
     """Whether something was touched between two moments: such are kept, so that no event is lost."""
     return any(
-        pane in before.states and before.states[pane].circumstances is not state.circumstances
+        pane in before.states and before.states[pane].setup is not state.setup
         for pane, state in after.states.items()
     )
 

@@ -27,8 +27,8 @@ from robocov_app.viewer.session.changes import (
     SetDensity,
     SetLimits,
 )
-from robocov_app.viewer.session.history import Circumstances, Moment
-from robocov_app.viewer.session.pane import Lane, Wanted, begun, resumed
+from robocov_app.viewer.session.history import Moment, PaneSetup
+from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
 from robocov_app.viewer.session.scenario import Scenario
 
 SPRING = 60.0
@@ -68,8 +68,8 @@ class Lockstep:
         self.hand: tuple[int, Point] | None = None
         self.panes = []
         for number, law in enumerate(scenario.laws):
-            setup = Circumstances(scenario.environment, law, scenario.limits, numbers, {}, conditions)
-            self.panes.append(Lane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
+            setup = PaneSetup(scenario.environment, law, scenario.limits, numbers, {}, conditions)
+            self.panes.append(Pane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
 
     @classmethod
     def resumed(cls, moment: Moment) -> Lockstep:
@@ -78,7 +78,7 @@ class Lockstep:
         run = cls.__new__(cls)
         run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
         run.panes = [
-            Lane(number, state.circumstances, resumed(state, run.scenario.dt, run.step))
+            Pane(number, state.setup, resumed(state, run.scenario.dt, run.step))
             for number, state in moment.states.items()
         ]
         return run
@@ -116,7 +116,7 @@ class Lockstep:
                 self._remove(number)
             case EditObstacles() | Paint() | SetDensity():
                 environment = change.on(self.scenario.environment)
-                self._change_all(lambda pane: Wanted(replace(pane.circumstances, environment=environment)))
+                self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
                 self.scenario = replace(self.scenario, environment=environment)
             case SetController(_, law):
                 law.made()
@@ -133,7 +133,7 @@ class Lockstep:
                 if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
                     self.hand = None
 
-    def pane(self, number: int) -> Lane:
+    def pane(self, number: int) -> Pane:
         """Return the pane with a number."""
         return next(pane for pane in self.panes if pane.number == number)
 
@@ -146,18 +146,18 @@ class Lockstep:
         self.panes = [pane for pane in self.panes if pane.number != number]
         self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
 
-    def _change_all(self, wanted: Callable[[Lane], Wanted]) -> None:
+    def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
         """Let every pane go on as is wanted; if one cannot, none does."""
         wants = [(pane, wanted(pane)) for pane in self.panes]
         changes = [
             (pane, want, pane.changed(want))
             for pane, want in wants
-            if want.positions is not None or want.circumstances is not pane.circumstances
+            if want.positions is not None or want.setup is not pane.setup
         ]
         for pane, want, simulation in changes:
-            pane.take(want.circumstances, simulation)
+            pane.take(want.setup, simulation)
 
-    def _pull(self, pane: Lane) -> Array | None:
+    def _pull(self, pane: Pane) -> Array | None:
         """Return the pull of the hand on the robots of a pane, N."""
         row = pane.row(self.hand[0]) if self.hand is not None else None
         if row is None or self.hand is None:
@@ -177,7 +177,7 @@ class Lockstep:
             return
         begins, ends = conditions.lives(self.scenario.robots)
         now, before = self.time + SOON, self.time - self.scenario.dt + SOON
-        there = {*self.panes[0].numbers, *self.panes[0].circumstances.failed}
+        there = {*self.panes[0].numbers, *self.panes[0].setup.failed}
         for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
             if number not in there:
                 place = next(join.place for join in conditions.joins if join.robot == number)

@@ -14,7 +14,7 @@ from robocov.world.relocation import relocated
 from robocov_app.render.scene import Sensed
 from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
-from robocov_app.viewer.session.history import Circumstances, State
+from robocov_app.viewer.session.history import PaneSetup, State
 from robocov_app.viewer.session.trail import Trail
 
 if TYPE_CHECKING:
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     from robocov.environment import Environment
     from robocov.observation import Decision
     from robocov.robots import Team
-    from robocov_app.viewer.session.scenario import Law
+    from robocov_app.viewer.session.scenario import ControllerChoice
 
 SENSED_EVERY = 3
 """What is sensed is noted at every so many steps."""
 
 
-class Wanted(NamedTuple):
-    """How a lane is to go on. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
+class Continuation(NamedTuple):
+    """How a pane is to go on. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
 
-    circumstances: Circumstances
+    setup: PaneSetup
     positions: Array | None = None
     velocities: Array | None = None
 
 
-class Lane:
+class Pane:
     """A team under one controller, which can be touched.
 
     A robot that failed stands where it is and says nothing: the others do not hear it any more, but their
     range sensors see it, as they see any obstacle.
     """
 
-    def __init__(self, number: int, circumstances: Circumstances, simulation: Simulation) -> None:
-        self.number, self.circumstances, self.simulation = number, circumstances, simulation
+    def __init__(self, number: int, setup: PaneSetup, simulation: Simulation) -> None:
+        self.number, self.setup, self.simulation = number, setup, simulation
         self.starts = simulation.positions
         self.trail = Trail(len(self.starts))
         self.trail.add(simulation.time, self.starts)
@@ -55,14 +55,14 @@ class Lane:
         self._steps = 0
 
     @property
-    def law(self) -> Law:
+    def law(self) -> ControllerChoice:
         """The controller as it was chosen."""
-        return self.circumstances.law
+        return self.setup.law
 
     @property
     def numbers(self) -> tuple[int, ...]:
         """What people call the robots that work, row by row."""
-        return self.circumstances.numbers
+        return self.setup.numbers
 
     @property
     def time(self) -> float:
@@ -94,21 +94,19 @@ class Lane:
         simulation = self.simulation
         # who wrote a controller may have it change what it remembers
         memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
-        return State(
-            self.circumstances, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox
-        )
+        return State(self.setup, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox)
 
-    def changed(self, wanted: Wanted) -> Simulation:
-        """Return the simulation that goes on from here as wanted; the lane stays as it is.
+    def changed(self, wanted: Continuation) -> Simulation:
+        """Return the simulation that goes on from here as wanted; the pane stays as it is.
 
         Robots that do not fit any more are pushed out of what is in the way. Raises StartError when there is
         no room for a robot; ParameterError when the controller or the team does not take a value.
         """
-        old, circumstances = self.simulation, wanted.circumstances
-        environment, team = circumstances.solid, circumstances.team
+        old, setup = self.simulation, wanted.setup
+        environment, team = setup.solid, setup.team
         # the same controller goes on remembering; one without memory begins anew, as when resumed
-        goes_on = circumstances.law == self.law and remembers(old.controller)
-        controller = None if goes_on else circumstances.law.made()
+        goes_on = setup.law == self.law and remembers(old.controller)
+        controller = None if goes_on else setup.law.made()
         if self._only_weighed(wanted):
             return old.with_density(environment)
         changed = _fitted(
@@ -124,26 +122,26 @@ class Lane:
             old.positions if wanted.positions is None else wanted.positions,
             old.velocities if wanted.velocities is None else wanted.velocities,
         )
-        if old.inbox is not None and circumstances.numbers != self.numbers:
+        if old.inbox is not None and setup.numbers != self.numbers:
             # who stays keeps the messages of who stays
-            rows = [-1 if self.row(number) is None else self.row(number) for number in circumstances.numbers]
+            rows = [-1 if self.row(number) is None else self.row(number) for number in setup.numbers]
             changed = changed.remembering(changed.memory, old.inbox.rearranged(np.array(rows, dtype=np.intp)))
         return changed
 
-    def _only_weighed(self, wanted: Wanted) -> bool:
+    def _only_weighed(self, wanted: Continuation) -> bool:
         """Return whether nothing is wanted to be otherwise but the density, as when it is painted."""
-        now, then = self.circumstances, wanted.circumstances
+        now, then = self.setup, wanted.setup
         alike = all(
             getattr(now, name) == getattr(then, name) for name in ("law", "limits", "numbers", "failed")
         )
         placed = wanted.positions is not None or wanted.velocities is not None
         return alike and not placed and then.environment.same_place(now.environment)
 
-    def take(self, circumstances: Circumstances, simulation: Simulation) -> None:
+    def take(self, setup: PaneSetup, simulation: Simulation) -> None:
         """Go on with what `changed` returned."""
-        if circumstances.numbers != self.numbers:
-            self._renumber(self.numbers, circumstances.numbers, simulation.positions)
-        self.simulation, self.circumstances = simulation, circumstances
+        if setup.numbers != self.numbers:
+            self._renumber(self.numbers, setup.numbers, simulation.positions)
+        self.simulation, self.setup = simulation, setup
         self.trail.add(self.time, simulation.positions, always=True)
 
     def _renumber(self, before: Sequence[int], after: Sequence[int], positions: Array) -> None:
@@ -161,25 +159,23 @@ class Lane:
         self.trail, self.starts = trail, starts
 
 
-def _spec(circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None) -> RunSpec:
-    law = circumstances.law
+def _spec(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None) -> RunSpec:
+    law = setup.law
     return RunSpec(
-        circumstances.solid,
+        setup.solid,
         law.name,
         law.gains,
-        team=circumstances.team,
+        team=setup.team,
         positions=positions,
         velocities=velocities,
         dt=dt,
-        conditions=circumstances.conditions,
+        conditions=setup.conditions,
     )
 
 
-def begun(
-    circumstances: Circumstances, positions: Array, dt: float, velocities: Array | None = None
-) -> Simulation:
+def begun(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None) -> Simulation:
     """Return a simulation that begins in these circumstances; StartError, ParameterError as `Simulation`."""
-    return _spec(circumstances, positions, dt, velocities).simulation(circumstances.law.made())
+    return _spec(setup, positions, dt, velocities).simulation(setup.law.made())
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
@@ -187,9 +183,9 @@ def resumed(state: State, dt: float, step: int) -> Simulation:
 
     Raises ParameterError when the controller cannot be had any more.
     """
-    circumstances = state.circumstances
-    spec = _spec(circumstances, state.positions, dt, state.velocities)
-    simulation = spec.simulation(circumstances.law.made(), steps=step, resumed=True)
+    setup = state.setup
+    spec = _spec(setup, state.positions, dt, state.velocities)
+    simulation = spec.simulation(setup.law.made(), steps=step, resumed=True)
     if state.memory is not None or state.inbox is not None:
         memory = simulation.memory if state.memory is None else state.memory
         simulation = simulation.remembering(memory, state.inbox)

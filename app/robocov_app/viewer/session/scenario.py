@@ -34,7 +34,7 @@ MOST_PANES = 4
 
 
 @dataclass(frozen=True)
-class Law:
+class ControllerChoice:
     """A controller as the user chose it.
 
     `name`: as `make_controller` takes it. `gains`: those that differ from their defaults.
@@ -63,7 +63,7 @@ class Law:
         """Return the value of a gain."""
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
-    def with_gain(self, gain: str, value: Value) -> Law:
+    def with_gain(self, gain: str, value: Value) -> ControllerChoice:
         """Return the law with another value of one gain.
 
         Raises ParameterError when there is no such gain, or the value is out of range.
@@ -73,13 +73,13 @@ class Law:
         return replace(self, gains={name: v for name, v in gains.items() if v != self.known[name].default})
 
 
-def gain_words(before: Law, after: Law) -> str:
+def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
     """Return which gains differ, as people write them."""
     changed = [name for name in after.known if before.value(name) != after.value(name)]
     return ", ".join(f"{name} = {_said(after.value(name))}" for name in changed)
 
 
-def branch_words(law: Law) -> str:
+def branch_words(law: ControllerChoice) -> str:
     """Return how a branch that was left is called."""
     gains = ", ".join(
         f"{name} {_said(value)}" for name, value in law.gains.items() if value != law.known[name].default
@@ -92,7 +92,7 @@ def _said(value: Value) -> str:
 
 
 @dataclass(frozen=True)
-class Limits:
+class TeamSpec:
     """What each robot of the team is and can do; SI units, infinite for no limit.
 
     `radius`, `mass`, `max_speed`, `max_acceleration`, `viscosity`, `sensing_range`, `communication_range`: as
@@ -128,7 +128,7 @@ class Limits:
         return float(self.team((number,)).radius[0])
 
     @classmethod
-    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> Limits:
+    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> TeamSpec:
         """Return what the robots of a team are and can do; by default they are numbered from 1."""
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
@@ -151,11 +151,11 @@ class Scenario:
     """
 
     environment: Environment
-    laws: tuple[Law, ...] = (Law("rapf"),)
+    laws: tuple[ControllerChoice, ...] = (ControllerChoice("rapf"),)
     robots: int = 6
     start: str | None = None
     seed: int = 0
-    limits: Limits = Limits()
+    limits: TeamSpec = TeamSpec()
     dt: float = DEFAULT_DT
     given: Array | None = None
     moving: Array | None = None

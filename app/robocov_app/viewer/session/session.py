@@ -42,17 +42,17 @@ from robocov_app.viewer.session.changes import (
 )
 from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.curves import Curve, Event, Ghost
+from robocov_app.viewer.session.decision_replay import DecisionReplay
 from robocov_app.viewer.session.document import Branch, Document, Node
-from robocov_app.viewer.session.history import Circumstances, History, Moment
+from robocov_app.viewer.session.history import History, Moment, PaneSetup
 from robocov_app.viewer.session.lockstep import Lockstep
-from robocov_app.viewer.session.past import Past
 from robocov_app.viewer.session.scenario import MOST_PANES, branch_words, gain_words
 from robocov_app.viewer.session.trail import starts_of, trail_of
 
 if TYPE_CHECKING:
     from robocov_app.viewer.session.file import SavedSession
-    from robocov_app.viewer.session.pane import Lane
-    from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+    from robocov_app.viewer.session.pane import Pane
+    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
     from robocov_app.viewer.session.trail import Trail
 
 MOST_GHOSTS = 8
@@ -88,7 +88,7 @@ class Session:
         self.repeatable = True
         """Whether a record that the run began with is what its scenario leads to."""
         self.serial = self.revision = 0
-        self._past = Past()
+        self._past = DecisionReplay()
         self._run = Lockstep(scenario)
         self.document = Document(scenario)
         self.head = self.document.nodes[0]
@@ -133,8 +133,8 @@ class Session:
         self.recorded_until = last * history.dt
         self._cursor = 0 if len(history) > 1 else None
         self.serial += 1
-        for lane in self.lanes:
-            lane.trail = trail_of(history, lane.number, len(history) - 1)
+        for pane in self.panes:
+            pane.trail = trail_of(history, pane.number, len(history) - 1)
 
     # what there is
 
@@ -144,7 +144,7 @@ class Session:
         return self._run.scenario
 
     @property
-    def lanes(self) -> list[Lane]:
+    def panes(self) -> list[Pane]:
         """The panes, as they are in the present."""
         return self._run.panes
 
@@ -156,7 +156,7 @@ class Session:
     @property
     def environment(self) -> Environment:
         """The map as it is now, or was at the moment that is looked at."""
-        return self.circumstances(self.lanes[0]).environment
+        return self.setup(self.panes[0]).environment
 
     @property
     def time(self) -> float:
@@ -176,7 +176,7 @@ class Session:
     @property
     def numbers(self) -> tuple[int, ...]:
         """What people call the robots that work, in the first pane."""
-        return self.circumstances(self.lanes[0]).numbers
+        return self.setup(self.panes[0]).numbers
 
     @property
     def step_now(self) -> int:
@@ -192,44 +192,44 @@ class Session:
         """Make sure that everything can be made again; ParameterError says why it cannot."""
         if not self.can_be_made_again:
             raise ParameterError("this began with a recorded run, which cannot be made again")
-        for lane in self.lanes:
-            lane.law.made()
+        for pane in self.panes:
+            pane.law.made()
 
     @property
     def at_end_of_record(self) -> bool:
         """Whether the present is the end of a record that nobody has gone on from."""
         return self.recorded_until is not None and self.end <= self.recorded_until + 1e-9
 
-    def circumstances(self, lane: Lane) -> Circumstances:
+    def setup(self, pane: Pane) -> PaneSetup:
         """Return what holds for a pane at the moment that is looked at."""
         if self._cursor is None:
-            return lane.circumstances
-        return self.history[self._cursor].states[lane.number].circumstances
+            return pane.setup
+        return self.history[self._cursor].states[pane.number].setup
 
-    def snapshot(self, lane: Lane) -> Snapshot:
+    def snapshot(self, pane: Pane) -> Snapshot:
         """Return the moment that is looked at; a controller that fails on it has decided nothing."""
         if self._cursor is None:
             try:
-                return lane.simulation.snapshot
+                return pane.simulation.snapshot
             except RobocovError:
-                return self._past.snapshot(self.history.last.states[lane.number], self.time)
-        return self._past.snapshot(self.history[self._cursor].states[lane.number], self.time)
+                return self._past.snapshot(self.history.last.states[pane.number], self.time)
+        return self._past.snapshot(self.history[self._cursor].states[pane.number], self.time)
 
-    def positions(self, lane: Lane) -> Array:
+    def positions(self, pane: Pane) -> Array:
         """Return where the robots are at the moment that is looked at, (n, 2) m."""
         if self._cursor is None:
-            return lane.simulation.positions
-        return self.history[self._cursor].states[lane.number].positions
+            return pane.simulation.positions
+        return self.history[self._cursor].states[pane.number].positions
 
-    def trail(self, lane: Lane) -> tuple[Array, Array]:
+    def trail(self, pane: Pane) -> tuple[Array, Array]:
         """Return where the robots went up to the moment that is looked at: (k, n, 2) m and (k,) s."""
-        if self._cursor is None or self.circumstances(lane).numbers == lane.numbers:
-            return lane.trail.until(self.time)
+        if self._cursor is None or self.setup(pane).numbers == pane.numbers:
+            return pane.trail.until(self.time)
         key = self._cursor, self.serial
-        kept, trail = self._rebuilt.get(lane.number, (None, lane.trail))
+        kept, trail = self._rebuilt.get(pane.number, (None, pane.trail))
         if kept != key:
-            trail = trail_of(self.history, lane.number, self._cursor)
-            self._rebuilt[lane.number] = key, trail
+            trail = trail_of(self.history, pane.number, self._cursor)
+            self._rebuilt[pane.number] = key, trail
         return trail.positions, trail.time
 
     @property
@@ -249,22 +249,22 @@ class Session:
     def ghosts(self) -> list[Ghost]:
         """The cost curves of other branches, from where they left this one; the newest last."""
         if self._ghosts is None:
-            self._ghosts = self._other_curves()[-2 * MOST_GHOSTS * len(self.lanes) :]
+            self._ghosts = self._other_curves()[-2 * MOST_GHOSTS * len(self.panes) :]
         return self._ghosts
 
     def summary(self) -> Mapping[int, float]:
         """Return the newest mean distance of each pane, m, by its number."""
-        return {lane.number: lane.curve.at(self.time) for lane in self.lanes}
+        return {pane.number: pane.curve.at(self.time) for pane in self.panes}
 
-    def recent(self, lane: Lane, number: int) -> Array:
+    def recent(self, pane: Pane, number: int) -> Array:
         """Return where a robot was during the last seconds before the moment looked at, (k, 2) m."""
         last = self._cursor if self._cursor is not None else len(self.history) - 1
         first = self.history.at(self.time - SETTLED_WINDOW)
         places = []
         for k in range(first, last + 1, max(1, (last - first) // 30)):
-            state = self.history[k].states.get(lane.number)
-            if state is not None and number in state.circumstances.numbers:
-                places.append(state.positions[state.circumstances.numbers.index(number)])
+            state = self.history[k].states.get(pane.number)
+            if state is not None and number in state.setup.numbers:
+                places.append(state.positions[state.setup.numbers.index(number)])
         return np.array(places).reshape(-1, 2)
 
     # time
@@ -340,11 +340,11 @@ class Session:
         if self.hand is not None or self.end < SETTLED_WINDOW:
             return False
         before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
-        for lane in self.lanes:
-            state = before.states.get(lane.number)
-            if state is None or state.circumstances is not lane.circumstances:
+        for pane in self.panes:
+            state = before.states.get(pane.number)
+            if state is None or state.setup is not pane.setup:
                 return False
-            moved = np.hypot(*(lane.simulation.positions - state.positions).T)
+            moved = np.hypot(*(pane.simulation.positions - state.positions).T)
             if len(moved) and float(moved.max()) >= SETTLED_DISTANCE:
                 return False
         return True
@@ -494,7 +494,7 @@ class Session:
                 for each in path:
                     if (pane.number, what) in each.curves:
                         curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
-            before = next((lane for lane in self.lanes if lane.number == pane.number), None)
+            before = next((each for each in self.panes if each.number == pane.number), None)
             if before is not None and on_the_way:
                 pane.sensed = before.sensed.copy()
                 pane.sensed.cut(run.time)
@@ -522,14 +522,14 @@ class Session:
             node.keep([*moments.get(node.number, []), *later])
             begin = node.begin * self.scenario.dt
             end = path[k + 1].at * self.scenario.dt if k + 1 < len(path) else np.inf
-            for lane in self.lanes:
-                node.controllers[lane.number] = lane.law
-                for what, curve in (("distance", lane.curve), ("time", lane.times)):
+            for pane in self.panes:
+                node.controllers[pane.number] = pane.law
+                for what, curve in (("distance", pane.curve), ("time", pane.times)):
                     known = curve.between(begin, end)
-                    if (lane.number, what) in node.curves:
-                        known.extend(node.curves[lane.number, what], np.inf)
+                    if (pane.number, what) in node.curves:
+                        known.extend(node.curves[pane.number, what], np.inf)
                     if len(known):
-                        node.curves[lane.number, what] = known
+                        node.curves[pane.number, what] = known
 
     def _other_curves(self) -> list[Ghost]:
         limits, dt, found = self.document.limits(self.head, self._run.step), self.scenario.dt, []
@@ -619,40 +619,40 @@ class Session:
         self.revision += 1
         self._begin_time_line()
 
-    def set_law(self, lane: Lane, law: Law) -> None:
+    def set_law(self, pane: Pane, law: ControllerChoice) -> None:
         """Let another controller, or other gains, take over in a pane."""
-        before = self.circumstances(lane).law
+        before = self.setup(pane).law
         if law == before:
             return
         law.made()
         if law.name != before.name:
-            self.do(SetController(lane.number, law), "law", f"{law.label} takes over")
+            self.do(SetController(pane.number, law), "law", f"{law.label} takes over")
         else:
             words = gain_words(before, law)
-            gesture = "gain", lane.number, words.partition(" = ")[0]
-            self.do(SetController(lane.number, law), "law", f"{law.label}: {words}", gesture)
+            gesture = "gain", pane.number, words.partition(" = ")[0]
+            self.do(SetController(pane.number, law), "law", f"{law.label}: {words}", gesture)
 
-    def set_limits(self, limits: Limits) -> None:
+    def set_limits(self, limits: TeamSpec) -> None:
         """Change what all robots are and can do."""
-        if limits != self.circumstances(self.lanes[0]).limits:
+        if limits != self.setup(self.panes[0]).limits:
             self.do(SetLimits(limits), "limits", "limits changed", "limits")
 
-    def add_pane(self, law: Law) -> None:
+    def add_pane(self, law: ControllerChoice) -> None:
         """Compare with one controller more; all begin anew, from the same starts."""
-        if len(self.lanes) >= MOST_PANES:
+        if len(self.panes) >= MOST_PANES:
             raise ParameterError(f"there is room for {MOST_PANES} controllers side by side")
         self.restart(laws=(*self.scenario.laws, law))
 
-    def remove_pane(self, lane: Lane) -> None:
+    def remove_pane(self, pane: Pane) -> None:
         """Leave a pane out from now on; the others go on."""
-        self.do(RemovePane(lane.number), "pane", f"{lane.law.label} left out")
+        self.do(RemovePane(pane.number), "pane", f"{pane.law.label} left out")
 
     def edit(self, environment: Environment, words: str) -> int:
         """Go on with other obstacles; return how many robots had to be pushed out of the way."""
         change = map_change(self.environment, environment)
-        before = {lane.number: self.positions(lane) for lane in self.lanes}
+        before = {pane.number: self.positions(pane) for pane in self.panes}
         self.do(change, "obstacle", words)
-        after = {lane.number: lane.simulation.positions for lane in self.lanes}
+        after = {pane.number: pane.simulation.positions for pane in self.panes}
         return max(int((np.hypot(*(after[k] - before[k]).T) > PUSHED).sum()) for k in before)
 
     def paint(self, dabs: tuple[Point, ...], radius: float, *, lowers: bool, stroke: object) -> None:
@@ -693,7 +693,7 @@ class Session:
 
     def add_robot(self, point: Point, number: int | None = None) -> int:
         """Let one robot more join at a point, or as near as it fits; return its number."""
-        there = {*self.numbers, *self.circumstances(self.lanes[0]).failed}
+        there = {*self.numbers, *self.setup(self.panes[0]).failed}
         new = max(there) + 1 if number is None else number
         at = float(point[0]), float(point[1])
         self.do(Join(new, at), "robot", f"robot {new} joined")
@@ -721,11 +721,11 @@ def _scenario_of(node: Node) -> Scenario:
 def _sensed_in(history: History, pane: int) -> Sensed:
     """Return what a pane's robots have sensed, as far as kept moments tell."""
     found, sensor = Sensed(), None
-    setup: Circumstances | None = None
+    setup: PaneSetup | None = None
     for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
         state = history[k].states[pane]
-        if state.circumstances is not setup or sensor is None:
-            setup = state.circumstances
+        if state.setup is not setup or sensor is None:
+            setup = state.setup
             sensor = RangeSensor(solid_pieces(setup.solid), movers(setup.solid))
         sensor.show(history.time(k))
         points = sensor.nearest(state.positions, setup.team.sensing_range)

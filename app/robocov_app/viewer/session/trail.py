@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from robocov.arrays import Array
-    from robocov_app.viewer.session.history import Circumstances, History
+    from robocov_app.viewer.session.history import History, PaneSetup
 
 RATE = 30.0
 """Most rows for each simulated second."""
@@ -85,20 +85,20 @@ class Trail:
 
 def trail_of(history: History, pane: int, last: int) -> Trail:
     """Return where the robots that worked in a pane at moment `last` went until then."""
-    numbers = history[last].states[pane].circumstances.numbers
+    numbers = history[last].states[pane].setup.numbers
     trail = Trail(len(numbers))
-    before: Circumstances | None = None
+    before: PaneSetup | None = None
     rows: list[int] = []
     their_rows: list[int] = []
     latest = -np.inf
     for k in range(last + 1):
         time, state = history.time(k), history[k].states[pane]
-        touched = state.circumstances is not before
+        touched = state.setup is not before
         # who came in since is in the last row, too
         if time - latest < 1.0 / RATE - 1e-6 and not touched and k < last:
             continue
         if touched:
-            before = state.circumstances
+            before = state.setup
             rows = [row for row, number in enumerate(numbers) if number in before.numbers]
             their_rows = [before.numbers.index(numbers[row]) for row in rows]
         places = np.full((len(numbers), 2), np.nan)
@@ -111,11 +111,11 @@ def trail_of(history: History, pane: int, last: int) -> Trail:
 def starts_of(history: History, pane: int, last: int) -> Array:
     """Return where the robots that worked in a pane at moment `last` had come in, (n, 2) m."""
     starts: dict[int, list[float]] = {}
-    before: Circumstances | None = None
+    before: PaneSetup | None = None
     for k in range(last + 1):
         state = history[k].states[pane]
-        if state.circumstances is not before:
-            before = state.circumstances
+        if state.setup is not before:
+            before = state.setup
             for number, place in zip(before.numbers, state.positions.tolist(), strict=True):
                 starts.setdefault(number, place)
-    return np.array([starts[number] for number in history[last].states[pane].circumstances.numbers])
+    return np.array([starts[number] for number in history[last].states[pane].setup.numbers])

@@ -6,7 +6,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, positions_of, s
 
 from robocov.errors import ParameterError, StartError
 from robocov.simulation import Simulation
-from robocov_app.viewer.session.scenario import Law, Limits, Scenario
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 
 MINE = """
@@ -29,10 +29,10 @@ class Failing:
 
 
 @pytest.fixture(scope="module")
-def failing(tmp_path_factory) -> Law:
+def failing(tmp_path_factory) -> ControllerChoice:
     file = tmp_path_factory.mktemp("own") / "mine.py"
     file.write_text(MINE)
-    return Law(f"{file}:Failing")
+    return ControllerChoice(f"{file}:Failing")
 
 
 # time
@@ -44,7 +44,7 @@ def test_it_goes_as_the_simulation_does():
     stepped(session, 50)
     for _ in range(50):
         simulation.step()
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), simulation.positions)
+    np.testing.assert_array_equal(session.positions(session.panes[0]), simulation.positions)
     assert session.time == session.end == pytest.approx(simulation.time)
     assert session.numbers == (1, 2, 3, 4)
     assert session.environment is HALL
@@ -55,11 +55,11 @@ def test_lanes_go_in_step():
     session = begun(RAPF, RPF, LLOYD)
     for k in range(100):
         session.step()
-        assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+        assert {pane.time for pane in session.panes} == {session.panes[0].time}
         assert session.end == pytest.approx((k + 1) / 60)
-        assert session.lanes[0].time == pytest.approx(session.end, abs=1e-9)
+        assert session.panes[0].time == pytest.approx(session.end, abs=1e-9)
     # each in its own way from the same starts
-    first = [session.history[0].states[lane.number].positions for lane in session.lanes]
+    first = [session.history[0].states[pane.number].positions for pane in session.panes]
     np.testing.assert_array_equal(first[0], first[2])
     assert np.abs(positions_of(session)[0] - positions_of(session)[2]).max() > 0.1
 
@@ -95,20 +95,20 @@ def test_a_controller_that_fails_stops_all_lanes_at_the_same_time(failing):
             session.advance(0.1)
     assert not session.playing
     assert session.end == pytest.approx(13 / 60)
-    assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+    assert {pane.time for pane in session.panes} == {session.panes[0].time}
     before = all_told(session)
     with pytest.raises(ParameterError, match="enough"):
         session.step()
     assert all_told(session) == before
     # what it decided can be shown nonetheless, and the past looked at
-    assert session.snapshot(session.lanes[1]).decision.forces.tolist() == np.zeros((3, 2)).tolist()
+    assert session.snapshot(session.panes[1]).decision.forces.tolist() == np.zeros((3, 2)).tolist()
     session.look_at(0.1)
-    session.snapshot(session.lanes[1])
+    session.snapshot(session.panes[1])
     # another one goes on
     session.look_at(9.0)
-    session.set_law(session.lanes[1], RPF)
+    session.set_law(session.panes[1], RPF)
     session.step()
-    assert {lane.time for lane in session.lanes} == {session.lanes[0].time}
+    assert {pane.time for pane in session.panes} == {session.panes[0].time}
 
 
 def test_it_stops_when_all_have_settled():
@@ -150,11 +150,11 @@ def test_the_past_is_as_it_was():
         assert not session.live
         assert session.time == pytest.approx(k / 60)
         assert session.end == pytest.approx(40 / 60)
-        for lane, places in zip(session.lanes, was[k], strict=True):
-            np.testing.assert_array_equal(session.positions(lane), places)
-            assert session.snapshot(lane).time == pytest.approx(k / 60)
-            assert session.trail(lane)[1][-1] <= session.time + 1e-9
-            np.testing.assert_array_equal(session.trail(lane)[0][0], was[0][lane.number])
+        for pane, places in zip(session.panes, was[k], strict=True):
+            np.testing.assert_array_equal(session.positions(pane), places)
+            assert session.snapshot(pane).time == pytest.approx(k / 60)
+            assert session.trail(pane)[1][-1] <= session.time + 1e-9
+            np.testing.assert_array_equal(session.trail(pane)[0][0], was[0][pane.number])
     session.look_at(40 / 60)
     assert session.live
     session.look_at(99.0)
@@ -212,31 +212,31 @@ def test_a_thinned_past_plays_at_the_same_speed(short):
 
 def test_where_a_robot_was_lately():
     session = stepped(begun(), 300)
-    lane = session.lanes[0]
-    places = session.recent(lane, 2)
+    pane = session.panes[0]
+    places = session.recent(pane, 2)
     assert 20 <= len(places) <= 62
     np.testing.assert_array_equal(places[0], session.history[60].states[0].positions[1])
-    assert np.abs(places[-1] - session.positions(lane)[1]).max() < 0.5
+    assert np.abs(places[-1] - session.positions(pane)[1]).max() < 0.5
     session.look_at(1.0)
-    np.testing.assert_array_equal(session.recent(lane, 2)[0], session.history[0].states[0].positions[1])
-    assert session.recent(lane, 99).shape == (0, 2)
+    np.testing.assert_array_equal(session.recent(pane, 2)[0], session.history[0].states[0].positions[1])
+    assert session.recent(pane, 99).shape == (0, 2)
 
 
 def test_trails_of_the_past_are_of_who_worked_then():
     session = stepped(begun(), 30)
     session.fail_robot(2)
     stepped(session, 30)
-    lane = session.lanes[0]
-    assert session.trail(lane)[0].shape[1] == 2
+    pane = session.panes[0]
+    assert session.trail(pane)[0].shape[1] == 2
     session.look_at(0.25)
-    positions, times = session.trail(lane)
+    positions, times = session.trail(pane)
     assert positions.shape[1] == 3
     assert times[-1] <= 0.25 + 1e-9
     assert np.isfinite(positions).all()
     # looked at again, it is not looked for again
-    assert session.trail(lane)[0] is positions or np.shares_memory(session.trail(lane)[0], positions)
+    assert session.trail(pane)[0] is positions or np.shares_memory(session.trail(pane)[0], positions)
     session.look_at(0.5)
-    assert session.trail(lane)[0].shape[1] == 2
+    assert session.trail(pane)[0].shape[1] == 2
 
 
 # the hand
@@ -250,25 +250,25 @@ def test_a_hand_pulls_a_robot_and_it_flies_on():
     for _ in range(12):
         session.advance(0.1)
         assert too_deep(session) < 2e-3
-    for lane in session.lanes:
-        assert np.hypot(*(lane.simulation.positions[0] - (5.3, 3.3))) < 0.3
+    for pane in session.panes:
+        assert np.hypot(*(pane.simulation.positions[0] - (5.3, 3.3))) < 0.3
     session.grab(1, (1.0, 3.3))
     session.advance(0.1)
-    speeds = [float(np.hypot(*lane.simulation.velocities[0])) for lane in session.lanes]
+    speeds = [float(np.hypot(*pane.simulation.velocities[0])) for pane in session.panes]
     assert min(speeds) > 1.5
     session.release()
     assert session.hand is None
     assert session.events[-1].text == "robot 1 was dragged"
     session.advance(0.1)
     # it brakes from more than it can do by itself
-    for lane, speed in zip(session.lanes, speeds, strict=True):
-        assert 1.0 < np.hypot(*lane.simulation.velocities[0]) < speed
+    for pane, speed in zip(session.panes, speeds, strict=True):
+        assert 1.0 < np.hypot(*pane.simulation.velocities[0]) < speed
     session.release()
     assert len(session.events) == 1
 
 
 def test_a_robot_that_is_thrown_at_a_wall_stays_inside():
-    session = begun(RAPF, robots=1, limits=Limits(radius=0.3, mass=3.0))
+    session = begun(RAPF, robots=1, limits=TeamSpec(radius=0.3, mass=3.0))
     session.playing = True
     for target in ((6.5, 4.5), (-0.5, -0.5), (6.5, -0.5), (-0.5, 4.5), (4.2, 1.2), (2.5, 9.0)):
         session.grab(1, target)
@@ -293,10 +293,10 @@ def test_a_session_needs_room():
     with pytest.raises(StartError):
         Session(Scenario(HALL, robots=400))
     with pytest.raises(ParameterError):
-        Session(Scenario(HALL, (Law("nobody"),)))
+        Session(Scenario(HALL, (ControllerChoice("nobody"),)))
 
 
 def test_starts_that_are_given_are_begun_with():
     given = np.array([[1.0, 1.0], [5.0, 3.0]])
     session = begun(robots=2, given=given)
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), given)
+    np.testing.assert_array_equal(session.positions(session.panes[0]), given)

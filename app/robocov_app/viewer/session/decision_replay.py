@@ -23,10 +23,10 @@ from robocov.world.solid import movers, solid_pieces
 if TYPE_CHECKING:
     from robocov.controllers.base import Controller
     from robocov.environment import Environment
-    from robocov_app.viewer.session.history import Circumstances, State
+    from robocov_app.viewer.session.history import PaneSetup, State
 
 
-class Past:
+class DecisionReplay:
     """Explains states; it keeps what many of them have in common.
 
     `dt`, s: the control period, which messages and noise depend on.
@@ -39,22 +39,22 @@ class Past:
 
     def snapshot(self, state: State, time: float) -> Snapshot:
         """Return the moment as it was; a controller that fails on it decided nothing. `time` in s."""
-        return self._explaining(state.circumstances, self.dt).snapshot(state, time)
+        return self._explaining(state.setup, self.dt).snapshot(state, time)
 
 
 class _Explaining:
     """What states of the same circumstances have in common."""
 
-    def __init__(self, circumstances: Circumstances, dt: float) -> None:
-        self._region, self._density = circumstances.solid.region, circumstances.solid.density
-        conditions = circumstances.conditions
-        self._perception = None if conditions is None else Perception(conditions, circumstances.team, dt)
-        self._sensor = _sensor_in(circumstances.solid)
-        self._team = circumstances.team
-        self._by_time = circumstances.law.gains.get("cells") == "time" and self._team.mixed_speeds
+    def __init__(self, setup: PaneSetup, dt: float) -> None:
+        self._region, self._density = setup.solid.region, setup.solid.density
+        conditions = setup.conditions
+        self._perception = None if conditions is None else Perception(conditions, setup.team, dt)
+        self._sensor = _sensor_in(setup.solid)
+        self._team = setup.team
+        self._by_time = setup.law.gains.get("cells") == "time" and self._team.mixed_speeds
         self._controller: Controller | None = None
         with suppress(ParameterError):  # what a saved run was made with may be gone
-            self._controller = informed(circumstances.law.made(), circumstances.solid.static)
+            self._controller = informed(setup.law.made(), setup.solid.static)
 
     def snapshot(self, state: State, time: float) -> Snapshot:
         self._sensor.show(time)

@@ -12,10 +12,10 @@ from robocov.controllers import CONTROLLERS, informed, remembers
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.observation import Decision
 from robocov_app.runs.saved import roster_of
-from robocov_app.viewer.session.history import MOST_BYTES, Circumstances, History, Moment, State
+from robocov_app.viewer.session.history import MOST_BYTES, History, Moment, PaneSetup, State
 from robocov_app.viewer.session.lockstep import Happening
-from robocov_app.viewer.session.pane import SENSED_EVERY, Lane, resumed
-from robocov_app.viewer.session.scenario import MOST_PANES, Law, Limits, Scenario
+from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
+from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ _OF_A_MOMENT = 1500
 
 
 @dataclass(frozen=True)
-class LostLaw(Law):
+class LostController(ControllerChoice):
     """A controller that is not loaded, or does not take its gains: its runs can be looked at.
 
     `title`: what people called it. `reason`: why it cannot be had.
@@ -63,7 +63,7 @@ class LostLaw(Law):
 
 
 @dataclass(frozen=True)
-class _StandIn(LostLaw):
+class _StandIn(LostController):
     """What holds the place of a lost controller at the end of its run, until somebody wants to go on."""
 
     def made(self) -> Controller:
@@ -75,14 +75,14 @@ class _Nobody:
     name: ClassVar[str] = "nobody"
     label: ClassVar[str] = "nobody"
     summary: ClassVar[str] = "stands for a controller that is not there any more"
-    law: LostLaw
+    law: LostController
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
         """Say that there is no such controller."""
-        LostLaw.made(self.law)
+        LostController.made(self.law)
         raise AssertionError
 
 
@@ -98,10 +98,10 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     _check(saved)
     rosters = [roster_of(record) for record in records]
     first, dt = records[0], control_dt(records[0])
-    limits, environment = Limits.of(first.team, rosters[0].numbers), rosters[0].environment
+    limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record, controllers) for record in records]
     casts = [
-        Circumstances(environment, law, limits, roster.numbers, roster.failed)
+        PaneSetup(environment, law, limits, roster.numbers, roster.failed)
         for law, roster in zip(laws, rosters, strict=True)
     ]
     standing = [_standing(cast) for cast in casts]
@@ -119,8 +119,8 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     )
     session = Session(scenario)
     history = _history_of(records, casts, replace(scenario, laws=tuple(laws)))
-    for lane, each in zip(session.lanes, saved, strict=True):
-        _put(lane, each, history)
+    for pane, each in zip(session.panes, saved, strict=True):
+        _put(pane, each, history)
     for touched in first.session.get("touched", ()):
         words = f"robot {', '.join(map(str, touched['robots']))} was dragged"
         session.head.happenings.add(Happening(round(touched["to_s"] / dt), "hand", words))
@@ -149,26 +149,26 @@ def _paced(record: Record) -> Record:
     )
 
 
-def law_of(record: Record, controllers: Sequence[str] = ()) -> Law:
+def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
     """Return the controller of a record: a built-in one, or the one of `controllers` that is called as it."""
     kind = record.controller.rpartition(":")[2]
     known = [name for name in controllers if name.rpartition(":")[2] == kind]
     if record.controller in (*CONTROLLERS, *known):
-        law = Law(record.controller, dict(record.gains))
+        law = ControllerChoice(record.controller, dict(record.gains))
     elif known:
-        law = Law(known[0], dict(record.gains))
+        law = ControllerChoice(known[0], dict(record.gains))
     else:
         name = f"FILE.py:{kind}" if kind != record.controller else kind
         reason = (
             f"{record.label} is none of robocov's controllers; to go on, open it with --controller {name}"
         )
-        return LostLaw(record.controller, dict(record.gains), record.label, reason)
+        return LostController(record.controller, dict(record.gains), record.label, reason)
     try:
         law.made()
         gains = {name: value for name, value in law.gains.items() if value != law.known[name].default}
         return replace(law, gains=gains)
     except RobocovError as error:
-        return LostLaw(record.controller, dict(record.gains), record.label, str(error))
+        return LostController(record.controller, dict(record.gains), record.label, str(error))
 
 
 def _check(saved: Sequence[Saved]) -> None:
@@ -198,15 +198,15 @@ def _check(saved: Sequence[Saved]) -> None:
                 )
 
 
-def _standing(circumstances: Circumstances) -> Circumstances:
+def _standing(setup: PaneSetup) -> PaneSetup:
     """Return the circumstances with somebody in the place of a controller that is not there any more."""
-    law = circumstances.law
-    if not isinstance(law, LostLaw):
-        return circumstances
-    return replace(circumstances, law=_StandIn(law.name, law.gains, law.title, law.reason))
+    law = setup.law
+    if not isinstance(law, LostController):
+        return setup
+    return replace(setup, law=_StandIn(law.name, law.gains, law.title, law.reason))
 
 
-def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], scenario: Scenario) -> History:
+def _history_of(records: Sequence[Record], casts: Sequence[PaneSetup], scenario: Scenario) -> History:
     """Return the past that records tell of; its arrays are theirs."""
     first, dt = records[0], scenario.dt
     stride = round(first.dt / dt)
@@ -218,7 +218,7 @@ def _history_of(records: Sequence[Record], casts: Sequence[Circumstances], scena
     return history
 
 
-def _states_of(record: Record, cast: Circumstances) -> list[State]:
+def _states_of(record: Record, cast: PaneSetup) -> list[State]:
     positions, velocities, forces, goals = (
         _fixed(array) for array in (record.positions, record.velocities, record.forces, record.goals)
     )
@@ -233,7 +233,7 @@ def _states_of(record: Record, cast: Circumstances) -> list[State]:
     return states
 
 
-def _circumstances_of(record: Record, cast: Circumstances) -> Iterator[Circumstances]:
+def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
     """Yield the circumstances of each moment: who worked then, and who had failed.
 
     What robots had heard no record tells: who goes on from a moment lets them begin with no messages.
@@ -241,7 +241,7 @@ def _circumstances_of(record: Record, cast: Circumstances) -> Iterator[Circumsta
     if record.conditions is None:
         yield from [cast] * len(record)
         return
-    known: dict[bytes, Circumstances] = {}
+    known: dict[bytes, PaneSetup] = {}
     rest = record.conditions.of_robots_that_stay()
     for places, working, there in zip(record.positions, record.working, record.present, strict=True):
         key = working.tobytes() + there.tobytes()
@@ -254,14 +254,14 @@ def _circumstances_of(record: Record, cast: Circumstances) -> Iterator[Circumsta
         yield known[key]
 
 
-def _memories_of(record: Record, law: Law) -> list[Any]:
+def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
     """Return what the controller remembered at each moment.
 
     A record does not tell, but the controller can be asked again. Where it does not decide as it did, it is
     not what it was: from there on it is to begin anew.
     """
     nothing: list[Any] = [None] * len(record)
-    if isinstance(law, LostLaw):
+    if isinstance(law, LostController):
         return nothing
     controller = law.made()
     if not remembers(controller):
@@ -281,23 +281,23 @@ def _memories_of(record: Record, law: Law) -> list[Any]:
     return found + nothing[len(found) :]
 
 
-def _put(lane: Lane, saved: Saved, history: History) -> None:
-    """Let a lane be at the end of a run."""
+def _put(pane: Pane, saved: Saved, history: History) -> None:
+    """Let a pane be at the end of a run."""
     record, last = saved.record, history.last
-    state = last.states[lane.number]
-    standing = state._replace(circumstances=_standing(state.circumstances))
-    lane.simulation = resumed(standing, history.dt, last.step)
-    lane.circumstances = state.circumstances
-    lane.starts = record.positions[0][record.working[-1]]
+    state = last.states[pane.number]
+    standing = state._replace(setup=_standing(state.setup))
+    pane.simulation = resumed(standing, history.dt, last.step)
+    pane.setup = state.setup
+    pane.starts = record.positions[0][record.working[-1]]
     for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
-        numbers = history[k].states[lane.number].circumstances.numbers
-        lane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
+        numbers = history[k].states[pane.number].setup.numbers
+        pane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
     if saved.history is not None:
         for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
-            lane.curve.add(float(time), float(value))
+            pane.curve.add(float(time), float(value))
         if saved.history.mean_time is not None:
             for time, value in zip(saved.history.time, saved.history.mean_time, strict=True):
-                lane.times.add(float(time), float(value))
+                pane.times.add(float(time), float(value))
 
 
 def _fixed(array: Array) -> Array:

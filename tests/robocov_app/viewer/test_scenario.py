@@ -14,9 +14,9 @@ from robocov_app.viewer.parameters import limit_parameters, with_limit
 from robocov_app.viewer.session.scenario import (
     MOST_PANES,
     MOST_ROBOTS,
-    Law,
-    Limits,
+    ControllerChoice,
     Scenario,
+    TeamSpec,
     branch_words,
     gain_words,
 )
@@ -37,11 +37,11 @@ class Mine:
 
 class TestLaw:
     def test_its_controller(self):
-        assert Law("rapf", {"k_rep": 0.3}).made() == make_controller("rapf", {"k_rep": 0.3})
+        assert ControllerChoice("rapf", {"k_rep": 0.3}).made() == make_controller("rapf", {"k_rep": 0.3})
         assert [law.label for law in (RAPF, RPF, LLOYD)] == ["RAPF", "RPF", "Lloyd"]
 
     def test_its_gains(self):
-        law = Law("rapf", {"k_rep": 0.7})
+        law = ControllerChoice("rapf", {"k_rep": 0.7})
         assert law.value("k_rep") == 0.7
         assert law.value("k_att") == law.known["k_att"].default
         other = law.with_gain("k_att", 2.5)
@@ -60,19 +60,19 @@ class TestLaw:
 
     def test_there_is_no_such_law(self):
         with pytest.raises(ParameterError, match="did you mean 'rapf'"):
-            Law("rapff").made()
+            ControllerChoice("rapff").made()
 
     def test_a_file_is_not_run_for_each_picture(self, tmp_path):
         marks = tmp_path / "marks"
         (tmp_path / "mine.py").write_text(MINE.format(marks=str(marks)))
-        law = Law(f"{tmp_path / 'mine.py'}:Mine")
+        law = ControllerChoice(f"{tmp_path / 'mine.py'}:Mine")
         for _ in range(20):
             assert law.label == "Mine"
             assert law.value("stiffness") == 1.0
         assert len(marks.read_text().splitlines()) <= 2
 
     def test_what_differs_in_words(self):
-        stiff = Law("rapf", {"k_rep": 0.123456})
+        stiff = ControllerChoice("rapf", {"k_rep": 0.123456})
         assert gain_words(RAPF, stiff) == "k_rep = 0.123"
         assert gain_words(stiff, stiff.with_gain("k_att", 2.0)) == "k_att = 2"
         assert gain_words(stiff, stiff) == ""
@@ -80,29 +80,29 @@ class TestLaw:
         assert branch_words(stiff) == "RAPF, k_rep 0.123"
         optional = [name for name, gain in RAPF.known.items() if gain.optional]
         for name in optional:
-            law = Law("rapf", {name: 1.25})
-            assert "no limit" in gain_words(law, Law("rapf", {name: None})) + branch_words(
-                Law("rapf", {name: None})
+            law = ControllerChoice("rapf", {name: 1.25})
+            assert "no limit" in gain_words(law, ControllerChoice("rapf", {name: None})) + branch_words(
+                ControllerChoice("rapf", {name: None})
             )
 
 
 class TestLimits:
     def test_they_make_a_team_and_are_told_by_it(self):
-        limits = Limits(radius=0.2, max_speed=0.5, sensing_range=math.inf)
+        limits = TeamSpec(radius=0.2, max_speed=0.5, sensing_range=math.inf)
         team = limits.team(3)
         assert len(team) == 3
         assert team.radius.tolist() == [0.2] * 3
-        assert Limits.of(team) == limits
+        assert TeamSpec.of(team) == limits
 
     def test_robots_may_differ(self):
         team = replace(Team.homogeneous(3), radius=np.array([0.1, 0.1, 0.3]), mass=np.array([2.0, 1.0, 1.0]))
-        limits = Limits.of(team)
+        limits = TeamSpec.of(team)
         assert limits.team(3).to_dict() == team.to_dict()
         # robots keep what is theirs under their numbers; a new one is as the first
         assert limits.team((1, 3)).radius.tolist() == [0.1, 0.3]
         assert limits.team(4).mass.tolist() == [2.0, 1.0, 1.0, 2.0]
         assert limits.radius_of(3) == 0.3
-        assert Limits.of(team, (2, 5, 7)).team((7, 1)).radius.tolist() == [0.3, 0.1]
+        assert TeamSpec.of(team, (2, 5, 7)).team((7, 1)).radius.tolist() == [0.3, 0.1]
         equal = with_limit(limits, "team.radius", 0.2)
         assert equal.team(3).radius.tolist() == [0.2] * 3
         assert equal.team(3).mass.tolist() == [2.0, 1.0, 1.0]
@@ -111,13 +111,13 @@ class TestLimits:
             replace(limits, different=(("radius", ((1, -1.0),)),)).team(1)
 
     def test_they_are_the_papers_by_default(self):
-        assert Limits.of(Team.homogeneous(2)) == Limits()
+        assert TeamSpec.of(Team.homogeneous(2)) == TeamSpec()
 
     @pytest.mark.parametrize("name", ["radius", "mass", "max_speed", "max_acceleration"])
     @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
     def test_what_cannot_be_is_refused(self, name, value):
         with pytest.raises(ParameterError, match=name):
-            replace(Limits(), **{name: value}).team(1)
+            replace(TeamSpec(), **{name: value}).team(1)
 
 
 class TestScenario:
@@ -134,7 +134,7 @@ class TestScenario:
         assert Scenario(HALL, given=given, robots=2).positions() is given
 
     def test_larger_robots_start_farther_apart(self):
-        places = Scenario(HALL, robots=4, limits=Limits(radius=0.3)).positions()
+        places = Scenario(HALL, robots=4, limits=TeamSpec(radius=0.3)).positions()
         apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
         assert apart[np.triu_indices(4, 1)].min() >= 0.6
 

@@ -15,9 +15,9 @@ from robocov.record import Record
 from robocov.robots import Team
 from robocov.voronoi.weighted_cells import WeightedCells
 from robocov_app.runs.saved import Saved, roster_of
-from robocov_app.viewer.opening import Opening
-from robocov_app.viewer.session.replayed import LostLaw, control_dt, replayed_session
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.session.recorded import LostController, control_dt, replayed_session
+from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
 
 STEPS = 60
@@ -36,7 +36,7 @@ def replayed(*records: Record, controllers: tuple[str, ...] = ()) -> Session:
     return session
 
 
-def recorded(*laws: Law, steps: int = STEPS, robots: int = 4, **changes) -> Record:
+def recorded(*laws: ControllerChoice, steps: int = STEPS, robots: int = 4, **changes) -> Record:
     return record_of(stepped(begun(*laws, robots=robots, **changes), steps))
 
 
@@ -46,14 +46,14 @@ def record() -> Record:
 
 
 @pytest.fixture
-def counting(tmp_path: Path) -> Law:
+def counting(tmp_path: Path) -> ControllerChoice:
     path = tmp_path / "mine.py"
     path.write_text(COUNTING)
-    return Law(f"{path}:Counting")
+    return ControllerChoice(f"{path}:Counting")
 
 
 def state_of(session: Session) -> tuple[np.ndarray, np.ndarray]:
-    return session.lanes[0].simulation.positions, session.lanes[0].simulation.velocities
+    return session.panes[0].simulation.positions, session.panes[0].simulation.velocities
 
 
 # looking at it
@@ -66,21 +66,21 @@ def test_it_begins_at_the_beginning_and_plays(record: Record) -> None:
     assert (session.time, session.end) == (0.0, 1.0)
     assert session.numbers == (1, 2, 3, 4)
     assert session.scenario.start_name == "corner"
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[0])
+    np.testing.assert_array_equal(session.positions(session.panes[0]), record.positions[0])
     session.clock.budget = float("inf")
     for _ in range(30):
         session.advance(1 / 60)
     assert session.time == pytest.approx(0.5)
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[30])
+    np.testing.assert_array_equal(session.positions(session.panes[0]), record.positions[30])
 
 
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD], ids=lambda law: law.name)
-def test_every_moment_is_the_recorded_one_with_all_that_explains_it(law: Law) -> None:
+def test_every_moment_is_the_recorded_one_with_all_that_explains_it(law: ControllerChoice) -> None:
     record = recorded(law)
     session = replayed(record)
     for k in (0, 17, STEPS):
         session.look_at(k / 60)
-        snapshot = session.snapshot(session.lanes[0])
+        snapshot = session.snapshot(session.panes[0])
         np.testing.assert_array_equal(snapshot.positions, record.positions[k])
         np.testing.assert_array_equal(snapshot.velocities, record.velocities[k])
         np.testing.assert_allclose(snapshot.decision.forces, record.forces[k], rtol=1e-12)
@@ -91,23 +91,23 @@ def test_every_moment_is_the_recorded_one_with_all_that_explains_it(law: Law) ->
 
 def test_where_it_went_and_what_it_sensed_is_there(record: Record) -> None:
     session = replayed(record)
-    lane = session.lanes[0]
+    pane = session.panes[0]
     session.look_at(0.5)
-    places, times = session.trail(lane)
+    places, times = session.trail(pane)
     assert times[-1] == pytest.approx(0.5, abs=1 / 30)
     np.testing.assert_array_equal(places[-1], record.positions[round(times[-1] * 60)])
-    np.testing.assert_array_equal(lane.starts, record.positions[0])
-    live = stepped(begun(robots=4), STEPS).lanes[0]
-    np.testing.assert_array_equal(lane.sensed.until(0.9)[0], live.sensed.until(0.9)[0])
+    np.testing.assert_array_equal(pane.starts, record.positions[0])
+    live = stepped(begun(robots=4), STEPS).panes[0]
+    np.testing.assert_array_equal(pane.sensed.until(0.9)[0], live.sensed.until(0.9)[0])
 
 
 def test_the_curve_is_that_of_the_file(record: Record) -> None:
     time = np.linspace(0.0, 1.0, 11)
     history = CostHistory(time, 3.0 - time, 10.0 - time, 0.0 * time)
-    lane = replayed_session([saved(record, history)]).lanes[0]
-    np.testing.assert_allclose(lane.curve.time, time)
-    np.testing.assert_allclose(lane.curve.value, 3.0 - time)
-    assert len(replayed_session([saved(record)]).lanes[0].curve) == 0
+    pane = replayed_session([saved(record, history)]).panes[0]
+    np.testing.assert_allclose(pane.curve.time, time)
+    np.testing.assert_allclose(pane.curve.value, 3.0 - time)
+    assert len(replayed_session([saved(record)]).panes[0].curve) == 0
 
 
 def test_one_moment_is_the_present(record: Record) -> None:
@@ -120,8 +120,10 @@ def test_one_moment_is_the_present(record: Record) -> None:
 # going on
 
 
-@pytest.mark.parametrize("law", [RAPF, LLOYD, Law("rpf", {"k_rep": 1.0})], ids=lambda law: law.name)
-def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: Law) -> None:
+@pytest.mark.parametrize(
+    "law", [RAPF, LLOYD, ControllerChoice("rpf", {"k_rep": 1.0})], ids=lambda law: law.name
+)
+def test_it_goes_on_beyond_its_end_as_if_it_had_never_stopped(law: ControllerChoice) -> None:
     whole = stepped(begun(law, robots=8, start="spread"), 2 * STEPS)
     session = replayed(recorded(law, robots=8, start="spread"))
     session.playing = True
@@ -151,7 +153,7 @@ def test_it_can_be_gone_on_from_any_moment(record: Record) -> None:
 def test_it_can_be_touched_at_any_moment(record: Record) -> None:
     session = replayed(record)
     session.look_at(0.5)
-    session.set_law(session.lanes[0], LLOYD)
+    session.set_law(session.panes[0], LLOYD)
     session.fail_robot(2)
     assert session.live
     assert session.numbers == (1, 3, 4)
@@ -177,7 +179,7 @@ def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
     before.fail_robot(2)
     stepped(before, 30)
     session = replayed(record_of(before))
-    there = session.circumstances(session.lanes[0])
+    there = session.setup(session.panes[0])
     assert session.numbers == (1, 3, 4)
     assert list(there.failed) == [2]
     assert there.environment == HALL
@@ -193,7 +195,7 @@ def test_a_part_of_a_session_comes_back_with_its_numbers_and_wrecks() -> None:
 
 def test_who_moved_at_the_beginning_moves_when_it_begins_anew() -> None:
     before = stepped(begun(robots=4), 30)
-    before.set_law(before.lanes[0], LLOYD)
+    before.set_law(before.panes[0], LLOYD)
     record = record_of(stepped(before, 30))
     session = replayed(record)
     assert session.scenario.start is None
@@ -271,14 +273,14 @@ def test_a_comparison_is_side_by_side() -> None:
     before = stepped(begun(RAPF, RPF, LLOYD), STEPS)
     records = records_of(before)
     session = replayed(*records)
-    assert [lane.law.name for lane in session.lanes] == ["rapf", "rpf", "lloyd"]
+    assert [pane.law.name for pane in session.panes] == ["rapf", "rpf", "lloyd"]
     session.look_at(0.5)
-    for lane, record in zip(session.lanes, records, strict=True):
-        np.testing.assert_array_equal(session.positions(lane), record.positions[30])
+    for pane, record in zip(session.panes, records, strict=True):
+        np.testing.assert_array_equal(session.positions(pane), record.positions[30])
     session.branch()
     stepped(session, 30)
-    for lane, record in zip(session.lanes, records, strict=True):
-        np.testing.assert_array_equal(lane.simulation.positions, record.positions[-1])
+    for pane, record in zip(session.panes, records, strict=True):
+        np.testing.assert_array_equal(pane.simulation.positions, record.positions[-1])
 
 
 def test_robots_that_failed_at_different_places_stay_there() -> None:
@@ -286,9 +288,9 @@ def test_robots_that_failed_at_different_places_stay_there() -> None:
     before.fail_robot(1)
     records = records_of(stepped(before, 10))
     session = replayed(*records)
-    for lane, other in zip(session.lanes, before.lanes, strict=True):
-        assert session.circumstances(lane).failed == other.circumstances.failed
-    assert session.lanes[0].circumstances.environment is session.lanes[1].circumstances.environment
+    for pane, other in zip(session.panes, before.panes, strict=True):
+        assert session.setup(pane).failed == other.setup.failed
+    assert session.panes[0].setup.environment is session.panes[1].setup.environment
 
 
 @pytest.mark.parametrize(
@@ -316,9 +318,9 @@ def test_robots_that_differ_are_as_they_were(record: Record) -> None:
     radius, speeds = np.array([0.1, 0.1, 0.1, 0.2]), np.array([1.0, 0.5, 0.5, 1.0])
     team = replace(record.team, radius=radius, max_speed=speeds)
     session = replayed(replace(record, team=team, gains={**record.gains, "cells": "time"}))
-    circumstances = session.circumstances(session.lanes[0])
-    assert circumstances.team.to_dict() == team.to_dict()
-    seen = session.snapshot(session.lanes[0]).seen
+    setup = session.setup(session.panes[0])
+    assert setup.team.to_dict() == team.to_dict()
+    seen = session.snapshot(session.panes[0]).seen
     assert seen.max_speeds is not None
     assert seen.max_speeds.tolist() == [1.0, 0.5, 0.5, 1.0]
 
@@ -331,16 +333,16 @@ def test_more_than_there_is_room_for_is_refused(record: Record) -> None:
 # controllers that are not what they were
 
 
-def test_a_controller_that_is_not_loaded_leaves_its_run_to_be_looked_at(counting: Law) -> None:
+def test_a_controller_that_is_not_loaded_leaves_its_run_to_be_looked_at(counting: ControllerChoice) -> None:
     record = recorded(counting)
     session = replayed(record)
-    lane = session.lanes[0]
-    law = session.circumstances(lane).law
-    assert isinstance(law, LostLaw)
+    pane = session.panes[0]
+    law = session.setup(pane).law
+    assert isinstance(law, LostController)
     assert law.label == "Counting"
     for k in (0, 20, STEPS):
         session.look_at(k / 60)
-        snapshot = session.snapshot(lane)
+        snapshot = session.snapshot(pane)
         np.testing.assert_array_equal(snapshot.positions, record.positions[k])
         np.testing.assert_array_equal(snapshot.decision.forces, record.forces[k])
         assert snapshot.decision.goals is None
@@ -354,28 +356,28 @@ def test_a_controller_that_is_not_loaded_leaves_its_run_to_be_looked_at(counting
     assert (session.end, len(session.history)) == (1.0, STEPS + 1), "nothing is lost"
 
 
-def test_at_its_end_another_controller_may_take_over(counting: Law) -> None:
+def test_at_its_end_another_controller_may_take_over(counting: ControllerChoice) -> None:
     record = recorded(counting)
     session = replayed(record)
     session.look_at(session.end)
-    session.set_law(session.lanes[0], RAPF)
+    session.set_law(session.panes[0], RAPF)
     stepped(session, 10)
     assert session.end == pytest.approx(1.0 + 10 / 60)
 
 
-def test_the_window_shows_what_it_can(tmp_path: Path, counting: Law) -> None:
+def test_the_window_shows_what_it_can(tmp_path: Path, counting: ControllerChoice) -> None:
     record = recorded(counting)
-    opening = Opening(
+    opening = Launcher(
         replayed_session([saved(record)]), "", tmp_path, size=(900, 600), headless=True, lattice=16
     )
     with opening.window() as window:
         for _ in range(40):
             window.frame(1 / 30)
-        assert window.desk.session.live
-        assert window.desk.message.startswith("the record ends here")
+        assert window.viewer.session.live
+        assert window.viewer.message.startswith("the record ends here")
         window.do("pause")
         window.frame(1 / 30)
-        assert "not gone on with" in window.desk.message
+        assert "not gone on with" in window.viewer.message
         for tab in ("show", "robot", "parameters"):
             window.panel.show_tab(tab)
             window.do("robot:next")
@@ -383,18 +385,20 @@ def test_the_window_shows_what_it_can(tmp_path: Path, counting: Law) -> None:
             window.frame(1 / 30)
 
 
-def test_a_controller_that_has_changed_does_not_change_the_past(tmp_path: Path, counting: Law) -> None:
+def test_a_controller_that_has_changed_does_not_change_the_past(
+    tmp_path: Path, counting: ControllerChoice
+) -> None:
     record = recorded(counting)
     (tmp_path / "mine.py").write_text(COUNTING.replace("0.05", "0.5"))
     session = replayed(record, controllers=(counting.name,))
-    lane = session.lanes[0]
+    pane = session.panes[0]
     session.look_at(0.5)
-    np.testing.assert_array_equal(session.snapshot(lane).decision.forces, record.forces[30])
+    np.testing.assert_array_equal(session.snapshot(pane).decision.forces, record.forces[30])
     session.branch()
     assert stepped(session, 5).end == pytest.approx(0.5 + 5 / 60)
 
 
-def test_a_controller_remembers_again_what_it_did(counting: Law) -> None:
+def test_a_controller_remembers_again_what_it_did(counting: ControllerChoice) -> None:
     whole = stepped(begun(counting, robots=4), STEPS + 20)
     record = replace(recorded(counting), controller="elsewhere/theirs.py:Counting")
     session = replayed(record, controllers=("lloyd", counting.name))
@@ -410,7 +414,7 @@ def test_cells_are_of_the_recorded_kind_also_without_the_controller(record: Reco
     record = replace(record, controller="theirs.py:Mine", team=team, gains={"cells": "time"})
     session = replayed(record)
     session.look_at(0.5)
-    cells = session.snapshot(session.lanes[0]).decision.cells
+    cells = session.snapshot(session.panes[0]).decision.cells
     assert isinstance(cells, WeightedCells)
     np.testing.assert_array_equal(cells.centroid, record.cells(30).centroid)
 
@@ -423,9 +427,9 @@ def test_gains_that_it_does_not_take_any_more_are_said(record: Record) -> None:
 
 
 def test_only_gains_that_differ_are_the_users(record: Record) -> None:
-    assert replayed(record).lanes[0].law == RAPF
-    law = Law("rapf", {"k_rep": 0.7})
-    assert replayed(recorded(law, steps=3)).lanes[0].law == law
+    assert replayed(record).panes[0].law == RAPF
+    law = ControllerChoice("rapf", {"k_rep": 0.7})
+    assert replayed(recorded(law, steps=3)).panes[0].law == law
 
 
 def test_runs_of_any_origin_can_be_looked_at() -> None:
@@ -435,4 +439,4 @@ def test_runs_of_any_origin_can_be_looked_at() -> None:
     assert roster_of(record).numbers == (1, 2, 3)
     session = replayed(record)
     session.look_at(1.0)
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), record.positions[10])
+    np.testing.assert_array_equal(session.positions(session.panes[0]), record.positions[10])

@@ -24,7 +24,7 @@ from touched_run import (
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
 from robocov_app.viewer.session.map_edits import with_moved, with_obstacle, without_obstacle
-from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.scenario import TeamSpec
 from robocov_app.viewer.session.session import MOST_GHOSTS
 
 # anything
@@ -32,7 +32,7 @@ from robocov_app.viewer.session.session import MOST_GHOSTS
 points = st.tuples(st.floats(-0.5, 6.5), st.floats(-0.5, 4.5))
 laws = st.sampled_from([RAPF, RPF, LLOYD, RAPF.with_gain("k_rep", 1.0)])
 some_limits = st.builds(
-    Limits,
+    TeamSpec,
     radius=st.sampled_from([0.05, 0.1, 0.25]),
     max_speed=st.sampled_from([0.5, 1.0, 4.0]),
     sensing_range=st.sampled_from([0.3, 3.0, np.inf]),
@@ -130,8 +130,8 @@ class Anything(RuleBasedStateMachine):
 
     @rule(k=st.integers(0, 3), law=laws)
     def set_law(self, k, law):
-        lane = self.session.lanes[k % len(self.session.lanes)]
-        self.attempt(lambda: self.session.set_law(lane, law))
+        pane = self.session.panes[k % len(self.session.panes)]
+        self.attempt(lambda: self.session.set_law(pane, law))
 
     @rule(limits=some_limits)
     def set_limits(self, limits):
@@ -156,37 +156,37 @@ class Anything(RuleBasedStateMachine):
 
     @rule(law=laws)
     def add_pane(self, law):
-        if len(self.session.lanes) < 3:
+        if len(self.session.panes) < 3:
             self.attempt(lambda: self.session.add_pane(law))
 
     @rule(k=st.integers(0, 3))
     def remove_pane(self, k):
-        if len(self.session.lanes) > 1:
-            self.session.remove_pane(self.session.lanes[k % len(self.session.lanes)])
+        if len(self.session.panes) > 1:
+            self.session.remove_pane(self.session.panes[k % len(self.session.panes)])
 
     @invariant()
     def lanes_are_alike(self):
         if not hasattr(self, "session"):
             return
         session = self.session
-        first = session.lanes[0].circumstances
+        first = session.panes[0].setup
         assert len(first.numbers) >= 1
         assert list(first.numbers) == sorted(set(first.numbers))
         assert not set(first.numbers) & set(first.failed)
-        for lane in session.lanes:
-            there = lane.circumstances
+        for pane in session.panes:
+            there = pane.setup
             assert there.numbers == first.numbers
             assert set(there.failed) == set(first.failed)
             assert there.environment is first.environment
             assert there.limits == first.limits
             count = len(there.numbers)
-            for rows in (lane.simulation.positions, lane.starts, lane.trail.positions[-1]):
+            for rows in (pane.simulation.positions, pane.starts, pane.trail.positions[-1]):
                 assert rows.shape == (count, 2)
                 assert np.isfinite(rows).all()
-            assert len(lane.simulation.team) == count
-        assert len({lane.number for lane in session.lanes}) == len(session.lanes)
+            assert len(pane.simulation.team) == count
+        assert len({pane.number for pane in session.panes}) == len(session.panes)
         assert session.scenario.environment is first.environment
-        assert session.scenario.laws == tuple(lane.law for lane in session.lanes)
+        assert session.scenario.laws == tuple(pane.law for pane in session.panes)
         assert session.scenario.limits == first.limits
 
     @invariant()
@@ -198,15 +198,15 @@ class Anything(RuleBasedStateMachine):
         assert session.live == (session.time == session.end)
         assert (np.diff(session.history.steps) > 0).all()
         assert session.history.time(len(session.history) - 1) == session.end
-        for lane in session.lanes:
-            assert lane.time == pytest.approx(session.end, abs=1e-9)
-            assert (np.diff(lane.trail.time) > 0).all()
-            assert lane.trail.time[-1] <= session.end + 1e-9
-            last = session.history.last.states[lane.number]
-            np.testing.assert_array_equal(last.positions, lane.simulation.positions)
-            np.testing.assert_array_equal(last.velocities, lane.simulation.velocities)
-            assert last.circumstances is lane.circumstances
-        assert len(session.ghosts) <= 2 * MOST_GHOSTS * len(session.lanes)
+        for pane in session.panes:
+            assert pane.time == pytest.approx(session.end, abs=1e-9)
+            assert (np.diff(pane.trail.time) > 0).all()
+            assert pane.trail.time[-1] <= session.end + 1e-9
+            last = session.history.last.states[pane.number]
+            np.testing.assert_array_equal(last.positions, pane.simulation.positions)
+            np.testing.assert_array_equal(last.velocities, pane.simulation.velocities)
+            assert last.setup is pane.setup
+        assert len(session.ghosts) <= 2 * MOST_GHOSTS * len(session.panes)
         times = [event.time for event in session.events]
         assert times == sorted(times)
         assert not times or times[-1] <= session.end
@@ -216,11 +216,11 @@ class Anything(RuleBasedStateMachine):
     def what_is_looked_at_can_be_shown(self):
         if not hasattr(self, "session"):
             return
-        for lane in self.session.lanes:
-            there, snapshot = self.session.circumstances(lane), self.session.snapshot(lane)
+        for pane in self.session.panes:
+            there, snapshot = self.session.setup(pane), self.session.snapshot(pane)
             assert snapshot.time == pytest.approx(self.session.time, abs=1e-9)
-            np.testing.assert_array_equal(snapshot.positions, self.session.positions(lane))
-            trail, times = self.session.trail(lane)
+            np.testing.assert_array_equal(snapshot.positions, self.session.positions(pane))
+            trail, times = self.session.trail(pane)
             assert trail.shape[1:] == snapshot.positions.shape == (len(there.numbers), 2)
             assert len(trail) == len(times) >= 1
             assert times[-1] <= self.session.time + 1e-6
@@ -276,7 +276,7 @@ def test_who_takes_all_back_has_the_same_map_and_the_same_robots(touches):
     while session.redo() is not None:
         pass
     assert (robots_of(session), session.environment) == end
-    assert {lane.numbers for lane in session.lanes} == {session.numbers}
+    assert {pane.numbers for pane in session.panes} == {session.numbers}
 
 
 @given(
@@ -293,10 +293,10 @@ def test_however_it_came_so_far_from_there_it_goes_the_same_way_again(touches, c
             touched(session, *touch)
     since = session.end
     stepped(session, steps)
-    end, went = session.end, [lane.simulation.positions for lane in session.lanes]
+    end, went = session.end, [pane.simulation.positions for pane in session.panes]
     session.look_at(max(end - back / 60, since))
     session.branch()
     while session.end < end:
         session.step()
-    for lane, before in zip(session.lanes, went, strict=True):
-        np.testing.assert_array_equal(lane.simulation.positions, before)
+    for pane, before in zip(session.panes, went, strict=True):
+        np.testing.assert_array_equal(pane.simulation.positions, before)

@@ -75,8 +75,8 @@ def test_robots_know_of_it_while_it_is_painted():
         now[0] += 0.1
         brush.move(session, (5.0 - 0.02 * k, 3.0))
         stepped(session, 1)
-        for lane in session.lanes:
-            assert lane.simulation.snapshot.seen.density is session.environment.density
+        for pane in session.panes:
+            assert pane.simulation.snapshot.seen.density is session.environment.density
     assert session.environment.density is not None
     assert session.can_undo
     assert brush.painting
@@ -109,9 +109,9 @@ def test_escape_gives_the_stroke_up():
 def test_it_goes_on_where_robots_lean_on_something_and_keeps_what_was_drawn():
     """Only the density changes: nobody is pushed, and an obstacle of in between stays."""
     brush, session = Brush(radius=0.5), stepped(begun(), 3)
-    places = session.lanes[0].simulation.positions.copy()
+    places = session.panes[0].simulation.positions.copy()
     stroke(brush, session, (1.0, 1.0), (2.0, 1.0))
-    assert np.array_equal(session.lanes[0].simulation.positions, places)
+    assert np.array_equal(session.panes[0].simulation.positions, places)
     pillar = CircleObstacle((5.0, 2.5), 0.2)
     with_pillar = replace(session.environment, obstacles=(*HALL.obstacles, pillar))
     session.edit(with_pillar, "circle drawn")
@@ -168,23 +168,21 @@ def test_in_the_window(tmp_path):
     with opened(tmp_path, RAPF, LLOYD) as driver:
         plain = driver.picture()
         driver.key("g")
-        brush = driver.desk.tool
+        brush = driver.viewer.tool
         driver.wheel(*driver.pixel((3.0, 2.0)), 2)
         larger = brush.radius
         driver.key("[")
-        assert brush.radius < larger and "radius" in driver.desk.message
+        assert brush.radius < larger and "radius" in driver.viewer.message
         driver.drag(*(driver.pixel((1.0 + 0.3 * k, 3.0)) for k in range(5)))
-        assert driver.desk.message == "density raised"
+        assert driver.viewer.message == "density raised"
         high = value_at(driver.session, (1.6, 3.0))
         driver.drag(*(driver.pixel((4.5 + 0.2 * k, 3.2)) for k in range(4)), button=3)
-        assert driver.desk.message == "density lowered"
+        assert driver.viewer.message == "density lowered"
         assert high > 1.1 and value_at(driver.session, (4.8, 3.2)) < 0.9
         assert not driver.same(plain)
-        assert {lane.circumstances.environment for lane in driver.session.lanes} == {
-            driver.session.environment
-        }
+        assert {pane.setup.environment for pane in driver.session.panes} == {driver.session.environment}
         driver.key("ctrl+shift+s")
-        assert load_map(driver.desk.map_name) == driver.session.environment
+        assert load_map(driver.viewer.map_name) == driver.session.environment
         driver.key("ctrl+z", 2)
         assert driver.session.environment.density is None
         assert "φ" not in driver.window.canvas._scenes[0].cost

@@ -32,7 +32,7 @@ HEADLESS_FPS = 30
 """Frames per second of what is rendered without a display."""
 
 
-class Opening:
+class Launcher:
     """How a window is opened.
 
     Parameters
@@ -89,9 +89,9 @@ class Opening:
                 file = None if self.headless else settings_file()
                 settings, trouble = loaded(Settings, file)
                 window = self._opened(settings)
-                window.desk.say(trouble)
+                window.viewer.say(trouble)
                 if not self.headless and (left := recoverable(autosave_folder())):
-                    window.desk.say(f"{left[0].words}: Ctrl K, “recover” opens it")
+                    window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
                 elif self._offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)
@@ -100,8 +100,8 @@ class Opening:
                     ended = self._settings_of(window, settings)
                     save_settings(changed_settings(settings, begun, ended), file)
                 finally:
-                    window.desk.workspace.close()
-                    window.desk.costs.close()
+                    window.viewer.workspace.close()
+                    window.viewer.costs.close()
         finally:
             # the window is gone; what is still being saved is waited for
             if keeper is not None:
@@ -131,15 +131,15 @@ class Opening:
         costs: Costs = Costs(self.lattice, direct=True) if self.headless else Costs(self.lattice)
         try:
             kept_in = None if self.headless else autosave_folder()
-            desk = Presenter(
+            viewer = Presenter(
                 self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file
             )
-            desk.theme = self.theme or settings.theme
-            desk.fade, desk.suggests, desk.recent = settings.fade, settings.suggests, [*settings.recent]
-            window = Window(desk, size, scale, patient=self.headless)
+            viewer.theme = self.theme or settings.theme
+            viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
+            window = Window(viewer, size, scale, patient=self.headless)
             if self.scale is not None and window.layout.scale < self.scale:
                 wide, high = (round(each * self.scale) for each in SMALLEST)
-                desk.say(
+                viewer.say(
                     f"scale {self.scale:g} needs a window of {wide} × {high}: {window.layout.scale:g} it is"
                 )
         except BaseException:
@@ -154,11 +154,11 @@ class Opening:
 
         width, height = window.windowed or window.screen.get_size()
         changes = {
-            "theme": window.desk.theme,
-            "fade": window.desk.fade,
-            "suggests": window.desk.suggests,
-            "recent": tuple(window.desk.recent),
-            "shown": tuple(sorted((window.desk.shown - self._only_now) | self._not_now)),
+            "theme": window.viewer.theme,
+            "fade": window.viewer.fade,
+            "suggests": window.viewer.suggests,
+            "recent": tuple(window.viewer.recent),
+            "shown": tuple(sorted((window.viewer.shown - self._only_now) | self._not_now)),
             "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
             "width": min(max(width, 900), 7680),
             "height": min(max(height, 600), 4320),

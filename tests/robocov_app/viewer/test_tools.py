@@ -43,8 +43,8 @@ def dragged(tool, session, start, *points, number=None) -> str | None:
 
 
 def place_of(session, number) -> list[float]:
-    lane = session.lanes[0]
-    return lane.simulation.positions[lane.row(number)].tolist()
+    pane = session.panes[0]
+    return pane.simulation.positions[pane.row(number)].tolist()
 
 
 def test_the_box_has_every_tool_once():
@@ -123,9 +123,9 @@ class TestHand:
         hand, session = Hand(), begun()
         session.fail_robot(2)
         session.playing = True
-        failed = session.lanes[0].circumstances.failed
+        failed = session.panes[0].setup.failed
         dragged(hand, session, failed[2], (3.0, 3.2), number=2)
-        assert session.lanes[0].circumstances.failed == {2: (3.0, 3.2)}
+        assert session.panes[0].setup.failed == {2: (3.0, 3.2)}
 
     def test_a_robot_that_is_gone_meanwhile(self):
         hand, session = Hand(), begun()

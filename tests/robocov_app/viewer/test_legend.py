@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from robocov.mapfile import load_map
-from robocov_app.viewer.opening import Opening
-from robocov_app.viewer.session.scenario import Law, Scenario
+from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 from robocov_app.viewer.session.session import Session
 
 
 def words(tmp_path: Path, *laws: str) -> list[str]:
-    session = Session(Scenario(load_map("square"), tuple(Law(law) for law in laws)))
-    with Opening(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
+    session = Session(Scenario(load_map("square"), tuple(ControllerChoice(law) for law in laws)))
+    with Launcher(session, "square", tmp_path, size=(1280, 720), headless=True).window() as window:
         for _ in range(10):
             window.frame(1 / 30)
         return [entry.text for entry in window.canvas._legend_entries()]

@@ -20,9 +20,9 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.theme import LIGHT
 from robocov_app.runs.saved import load_saved
 from robocov_app.viewer.costs import Costs
-from robocov_app.viewer.session.pane import Wanted
-from robocov_app.viewer.session.replayed import replayed_session
-from robocov_app.viewer.session.scenario import MOST_THAT_TALK, Law, Limits, Scenario
+from robocov_app.viewer.session.pane import Continuation
+from robocov_app.viewer.session.recorded import replayed_session
+from robocov_app.viewer.session.scenario import MOST_THAT_TALK, ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 
 CART = CircleObstacle((1.0, 3.0), 0.4, "cart", ObstaclePath(((1, 3), (5, 3)), 1.0, "back-and-forth"))
@@ -44,9 +44,9 @@ def begun(conditions: Conditions | None = BAD) -> Session:
     return Session(
         Scenario(
             HALL,
-            (Law("rapf"), Law("lloyd")),
+            (ControllerChoice("rapf"), ControllerChoice("lloyd")),
             4,
-            limits=Limits(communication_range=4.0),
+            limits=TeamSpec(communication_range=4.0),
             dt=0.05,
             given=STARTS,
             conditions=conditions,
@@ -58,10 +58,10 @@ def states(session: Session, steps: int) -> list[bytes]:
     found = []
     for _ in range(steps):
         session.step()
-        for lane in session.lanes:
-            seen = lane.simulation.snapshot.seen
+        for pane in session.panes:
+            seen = pane.simulation.snapshot.seen
             heard = b"" if seen.reported_positions is None else seen.reported_positions.tobytes()
-            found.append(lane.simulation.positions.tobytes() + seen.positions.tobytes() + heard)
+            found.append(pane.simulation.positions.tobytes() + seen.positions.tobytes() + heard)
     return found
 
 
@@ -73,7 +73,7 @@ def test_robots_fail_and_join_by_themselves() -> None:
     assert [event.text for event in session.events] == ["robot 2 failed"]
     states(session, 6)
     assert session.numbers == (1, 3, 4)
-    place = session.lanes[0].simulation.positions[1]
+    place = session.panes[0].simulation.positions[1]
     assert np.hypot(*(place - [4.5, 2.0])) < 0.2
 
 
@@ -89,13 +89,13 @@ def test_rewinding_and_playing_on_gives_the_same_again() -> None:
 
 def test_the_past_is_explained_as_it_was() -> None:
     session = begun()
-    lane = session.lanes[0]
+    pane = session.panes[0]
     then = []
     for _ in range(12):
-        then.append(lane.simulation.snapshot)
+        then.append(pane.simulation.snapshot)
         session.step()
     session.look_at(8 * 0.05)
-    past = session.snapshot(lane)
+    past = session.snapshot(pane)
     assert past.decision.forces.tobytes() == then[8].decision.forces.tobytes()
     assert past.seen.reported_positions is not None
     assert then[8].seen.reported_positions is not None
@@ -106,16 +106,16 @@ def test_the_past_is_explained_as_it_was() -> None:
 def test_who_stays_keeps_the_messages_when_another_is_taken_out() -> None:
     session = begun(replace(BAD, failures=(), joins=(), loss=0.0))
     states(session, 15)
-    before = session.lanes[0].simulation.inbox
+    before = session.panes[0].simulation.inbox
     assert before is not None
     session.remove_robot(2)
-    after = session.lanes[0].simulation.inbox
+    after = session.panes[0].simulation.inbox
     assert after is not None
     kept = [0, 2, 3]
     assert (after.sent == before.sent[np.ix_(kept, kept)]).all()
     assert (after.places == before.places[np.ix_(kept, kept)]).all()
     session.add_robot((3.0, 1.0))
-    inbox = session.lanes[0].simulation.inbox
+    inbox = session.panes[0].simulation.inbox
     assert inbox is not None
     assert (inbox.arrived[3] == -1).all() and (inbox.arrived[:, 3] == -1).all()
     states(session, 10)
@@ -125,29 +125,34 @@ def test_it_goes_as_a_run_does_while_nobody_comes_or_goes() -> None:
     conditions = replace(BAD, failures=(), joins=())
     session = begun(conditions)
     states(session, 30)
-    lane = session.lanes[0]
+    pane = session.panes[0]
     one = Simulation(
-        HALL, Law("rapf").made(), STARTS, Limits(communication_range=4.0).team(4), 0.05, conditions=conditions
+        HALL,
+        ControllerChoice("rapf").made(),
+        STARTS,
+        TeamSpec(communication_range=4.0).team(4),
+        0.05,
+        conditions=conditions,
     )
     record = one.run(1.5)
-    assert lane.simulation.positions.tobytes() == record.positions[-1].tobytes()
+    assert pane.simulation.positions.tobytes() == record.positions[-1].tobytes()
 
 
 def test_robots_are_pushed_out_of_where_an_obstacle_is_now() -> None:
     session = begun(None)
     states(session, 40)  # the cart has come to x = 3
-    lane = session.lanes[0]
-    positions = lane.simulation.positions.copy()
+    pane = session.panes[0]
+    positions = pane.simulation.positions.copy()
     positions[0] = [3.0, 3.0]
-    moved = lane.changed(Wanted(lane.circumstances, positions, np.zeros_like(positions)))
+    moved = pane.changed(Continuation(pane.setup, positions, np.zeros_like(positions)))
     assert np.hypot(*(moved.positions[0] - [3.0, 3.0])) > 0.49
 
 
 def test_what_the_selected_robot_believes_is_drawn() -> None:
     session = begun()
     states(session, 12)
-    lane = session.lanes[0]
-    scene = Scene.of(HALL, lane.circumstances.team, lane.simulation.snapshot)
+    pane = session.panes[0]
+    scene = Scene.of(HALL, pane.setup.team, pane.simulation.snapshot)
     painter = Painter(HALL, (400, 300), LIGHT, standard_layers(), 1.0)
     # what is drawn of all is what is: cells that neither overlap nor leave gaps
     assert scene.cells is not None
@@ -160,22 +165,22 @@ def test_what_the_selected_robot_believes_is_drawn() -> None:
 
 
 def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None:
-    team = Limits(communication_range=4.0).team(4)
-    simulation = Simulation(HALL, Law("rapf").made(), STARTS, team, 0.05, conditions=BAD)
+    team = TeamSpec(communication_range=4.0).team(4)
+    simulation = Simulation(HALL, ControllerChoice("rapf").made(), STARTS, team, 0.05, conditions=BAD)
     simulation.run(1.5).save(tmp_path)
     session = replayed_session(load_saved(tmp_path))
-    lane = session.lanes[0]
+    pane = session.panes[0]
     told = []
     for when in (0.5, 0.9, 1.5):
         session.look_at(when)
-        told.append((session.circumstances(lane).numbers, tuple(session.circumstances(lane).failed)))
+        told.append((session.setup(pane).numbers, tuple(session.setup(pane).failed)))
     assert told == [((1, 2, 4), ()), ((1, 4), (2,)), ((1, 3, 4), (2,))]
     session.look_at(0.6)
     session.branch()
     assert session.numbers == (1, 2, 4)
     states(session, 12)
     assert session.numbers == (1, 3, 4)
-    assert lane.simulation.conditions == BAD.of_robots_that_stay()
+    assert pane.simulation.conditions == BAD.of_robots_that_stay()
 
 
 def test_where_obstacles_move_the_cost_is_told_as_elsewhere() -> None:

@@ -17,7 +17,7 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.command import Command, matching
 from robocov_app.toolkit.input import key_words
 from robocov_app.viewer import panel, window
-from robocov_app.viewer.commands import GROUPS, desk_commands
+from robocov_app.viewer.commands import GROUPS, viewer_commands
 from robocov_app.viewer.tools import toolbox
 
 TITLES = {layer.name: layer.title for layer in standard_layers()}
@@ -51,13 +51,13 @@ def test_everything_has_a_key_or_is_typed_and_is_in_a_group_of_the_help(actions:
 
 
 def test_all_layers_and_all_tools_are_there(shared: Driver) -> None:
-    named = [each.name for each in desk_commands(shared.desk, TITLES)]
+    named = [each.name for each in viewer_commands(shared.viewer, TITLES)]
     assert [name for name in named if name.startswith("tool:")] == [f"tool:{name}" for name in toolbox()]
     assert {name for name in named if name.startswith("layer:")} == {f"layer:{name}" for name in TITLES}
 
 
 def test_a_layer_that_nobody_foresaw_has_an_action_without_a_key(shared: Driver) -> None:
-    listed = desk_commands(shared.desk, {**TITLES, "dust": "Dust"})
+    listed = viewer_commands(shared.viewer, {**TITLES, "dust": "Dust"})
     assert [each.keys for each in listed if each.name == "layer:dust"] == [()]
 
 
@@ -121,15 +121,29 @@ def test_every_button_of_the_panel_that_has_a_name_does_that_action_or_is_the_pa
 
 def state_of(driver: Driver) -> list[object]:
     """Return whatever an action might change."""
-    desk, session, its = driver.desk, driver.session, driver.window
+    viewer, session, its = driver.viewer, driver.session, driver.window
     camera = its.canvas._painters[0].camera
-    told: list[object] = [desk.shown.copy(), desk.theme, desk.fade, desk.panel, desk.tool, desk.active]
-    told += [desk.hand.selected, desk.message, desk.map_name, session.playing, session.time, session.end]
-    told += [session.serial, session.clock.speed, session.stop_when_settled, session.environment]
-    told += [session.scenario, len(session.lanes), [lane.law for lane in session.lanes], camera]
+    told: list[object] = [
+        viewer.shown.copy(),
+        viewer.theme,
+        viewer.fade,
+        viewer.panel,
+        viewer.tool,
+        viewer.active,
+    ]
     told += [
-        desk.tool.preview(session),
-        session.circumstances(session.lanes[0]),
+        viewer.hand.selected,
+        viewer.message,
+        viewer.map_name,
+        session.playing,
+        session.time,
+        session.end,
+    ]
+    told += [session.serial, session.clock.speed, session.stop_when_settled, session.environment]
+    told += [session.scenario, len(session.panes), [pane.law for pane in session.panes], camera]
+    told += [
+        viewer.tool.preview(session),
+        session.setup(session.panes[0]),
         its.help,
         its.dialogs.open,
         its.tour,
@@ -169,32 +183,32 @@ def shared(tmp_path_factory: pytest.TempPathFactory):
 
 def prepared(driver: Driver) -> Driver:
     """Bring a window into a state in which every action has something to do."""
-    its, desk, session = driver.window, driver.desk, driver.session
+    its, viewer, session = driver.window, driver.viewer, driver.session
     its.help = False
     its.dialogs.close()
     its._end_tour()
-    desk.attempt(lambda: desk.open_map("square"))
-    while len(session.lanes) > 1:
-        session.remove_pane(session.lanes[-1])
-    desk.add_pane()
+    viewer.attempt(lambda: viewer.open_map("square"))
+    while len(session.panes) > 1:
+        session.remove_pane(session.panes[-1])
+    viewer.add_pane()
     for _ in range(90):
         session.step()
-    desk.hand.selected = 2
+    viewer.hand.selected = 2
     session.add_robot((8.0, 8.0))
     session.add_robot((8.0, 2.0))
     session.undo()
     session.playing = False
-    do(desk, "tool:polygon")
-    desk.tool.press(session, (6.0, 6.0), 0.1, None)
-    desk.tool.press(session, (7.0, 6.0), 0.1, None)
-    desk.tool.press(session, (7.0, 7.0), 0.1, None)
-    desk.tool.move(session, (6.5, 7.5))
+    do(viewer, "tool:polygon")
+    viewer.tool.press(session, (6.0, 6.0), 0.1, None)
+    viewer.tool.press(session, (7.0, 6.0), 0.1, None)
+    viewer.tool.press(session, (7.0, 7.0), 0.1, None)
+    viewer.tool.move(session, (6.5, 7.5))
     session.step()
     session.look_at(0.7)
     its.canvas.fit()
     its.canvas.zoom(1.4, (200, 200))
     its.canvas.pan(20, 20)
-    desk.message = ""
+    viewer.message = ""
     return driver
 
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from robocov_app.viewer.chart import curve_colour, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.curves import compared
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session.scenario import ControllerChoice
 
 
 @pytest.fixture
 def driver(tmp_path: Path) -> Iterator[Driver]:
-    with opened(tmp_path, Law("rapf"), Law("rpf")) as opened_driver:
+    with opened(tmp_path, ControllerChoice("rapf"), ControllerChoice("rpf")) as opened_driver:
         yield opened_driver
 
 
@@ -70,14 +70,20 @@ def test_curves_are_drawn_in_the_colours_of_their_controllers(driver: Driver) ->
     window = driver.window
     left, top, width, height = window.layout.chart
     picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
-    for lane in driver.session.lanes:
-        colour = np.array(curve_colour(driver.desk, window.theme, lane))
-        assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, lane.law.name
+    for pane in driver.session.panes:
+        colour = np.array(curve_colour(driver.viewer, window.theme, pane))
+        assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, pane.law.name
 
 
 def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
-    with opened(tmp_path, Law("rapf"), Law("rapf", {"k_rep": 1.0}), Law("rpf"), Law("rpf")) as driver:
-        colours = {curve_colour(driver.desk, driver.window.theme, lane) for lane in driver.session.lanes}
+    with opened(
+        tmp_path,
+        ControllerChoice("rapf"),
+        ControllerChoice("rapf", {"k_rep": 1.0}),
+        ControllerChoice("rpf"),
+        ControllerChoice("rpf"),
+    ) as driver:
+        colours = {curve_colour(driver.viewer, driver.window.theme, pane) for pane in driver.session.panes}
         assert len(colours) == 4
 
 
@@ -85,7 +91,7 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
     played(driver)
     window = driver.window
     before = pixels(window.screen).copy()
-    driver.desk.attempt(lambda: driver.session.fail_robot(1))
+    driver.viewer.attempt(lambda: driver.session.fail_robot(1))
     driver.frames(8)
     after = pixels(window.screen)
     column = round(window.chart.column(driver.session.end))
@@ -98,9 +104,9 @@ def test_an_event_changes_the_plot_where_it_happened(driver: Driver) -> None:
 
 def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> None:
     played(driver)
-    first, second = driver.session.lanes
+    first, second = driver.session.panes
     last = first.curve.last_time
-    values = {lane.number: lane.curve.value[-1] for lane in (first, second)}
+    values = {pane.number: pane.curve.value[-1] for pane in (first, second)}
     second.curve.add(last + 0.01, 99.0)
     driver.session._run.step += 60
     time, known = compared(driver.session)

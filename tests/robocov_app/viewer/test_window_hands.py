@@ -24,11 +24,11 @@ def test_a_robot_that_is_dragged_follows_the_mouse(driver: Driver) -> None:
     assert driver.session.hand is not None and driver.session.hand[0] == 2
     driver.release()
     assert driver.session.hand is None
-    assert driver.desk.selected == 2 and driver.window.panel.tab == "robot"
+    assert driver.viewer.selected == 2 and driver.window.panel.tab == "robot"
 
 
 def test_a_robot_that_is_let_go_of_in_swing_flies_on(driver: Driver) -> None:
-    driver.desk.attempt(lambda: driver.session.place(1, (0.5, 3.0)))
+    driver.viewer.attempt(lambda: driver.session.place(1, (0.5, 3.0)))
     driver.key("space")
     driver.press(*driver.robot(1))
     x, y = driver.at
@@ -36,9 +36,9 @@ def test_a_robot_that_is_let_go_of_in_swing_flies_on(driver: Driver) -> None:
         driver.move(x + 8 * k, y, held=1, settled=False)
         driver.frames()
     driver.release()
-    lane = driver.session.lanes[0]
-    fast = float(np.hypot(*lane.simulation.velocities[lane.numbers.index(1)]))
-    assert fast > lane.circumstances.limits.max_speed
+    pane = driver.session.panes[0]
+    fast = float(np.hypot(*pane.simulation.velocities[pane.numbers.index(1)]))
+    assert fast > pane.setup.limits.max_speed
     before = place(driver, 1).copy()
     driver.frames(10)
     assert place(driver, 1)[0] > before[0] + 0.1
@@ -51,13 +51,13 @@ def test_while_paused_a_robot_is_put_where_the_mouse_is(driver: Driver) -> None:
 
 def test_a_click_on_the_floor_forgets_the_robot_and_a_drag_pans(driver: Driver) -> None:
     driver.click(*driver.robot(1))
-    assert driver.desk.selected == 1
+    assert driver.viewer.selected == 1
     x, y = driver.pixel(MIDDLE)
     driver.drag((x, y), (x + 40, y + 30))
-    assert driver.desk.selected == 1
+    assert driver.viewer.selected == 1
     assert np.allclose(driver.pixel(MIDDLE), (x + 40, y + 30), atol=2)
     driver.click(*driver.pixel(MIDDLE))
-    assert driver.desk.selected is None
+    assert driver.viewer.selected is None
 
 
 def test_an_obstacle_is_moved_and_that_can_be_undone_and_done_again(driver: Driver) -> None:
@@ -65,9 +65,9 @@ def test_an_obstacle_is_moved_and_that_can_be_undone_and_done_again(driver: Driv
     driver.drag_at((4.2, 1.2), (4.6, 1.6), (5.0, 1.8))
     (pillar, _) = driver.session.environment.obstacles
     assert pillar.center == pytest.approx((5.0, 1.8), abs=0.03)
-    assert driver.desk.message.startswith("circle “pillar” moved")
+    assert driver.viewer.message.startswith("circle “pillar” moved")
     driver.key("ctrl+z")
-    assert driver.session.environment == before and driver.desk.message.startswith("undone: ")
+    assert driver.session.environment == before and driver.viewer.message.startswith("undone: ")
     driver.key("ctrl+y")
     assert driver.session.environment.obstacles[0] == pillar
     driver.key("ctrl+z")
@@ -105,7 +105,7 @@ def test_a_polygon_is_drawn_corner_by_corner_and_closed_by_enter(driver: Driver)
     driver.key("return")
     obstacle = driver.session.environment.obstacles[-1]
     assert np.allclose(obstacle.vertices, ((0.4, 3.0), (1.2, 3.0), (0.8, 3.7)), atol=0.02)
-    assert driver.desk.message.startswith("polygon drawn")
+    assert driver.viewer.message.startswith("polygon drawn")
 
 
 @pytest.mark.parametrize("how", ["double click", "first corner", "right click"])
@@ -178,7 +178,7 @@ def test_an_obstacle_that_cannot_be_is_refused_with_the_reason(corners, why: str
     for corner in corners:
         driver.click_at(corner)
     driver.key("return")
-    assert why in driver.desk.message and driver.desk.trouble
+    assert why in driver.viewer.message and driver.viewer.trouble
     assert driver.session.environment is before
 
 
@@ -188,14 +188,14 @@ def test_an_obstacle_over_all_of_the_floor_is_refused(driver: Driver) -> None:
     for corner in ((0.01, 0.01), (5.99, 0.01), (5.99, 3.99), (0.01, 3.99)):
         driver.click_at(corner)
     driver.key("return")
-    assert driver.desk.trouble and driver.desk.message
+    assert driver.viewer.trouble and driver.viewer.message
     assert driver.session.environment is before
 
 
 def test_the_ruler_measures(driver: Driver) -> None:
     driver.key("m")
     driver.drag_at((1.0, 3.0), (3.0, 3.0))
-    preview = driver.desk.tool.preview(driver.session)
+    preview = driver.viewer.tool.preview(driver.session)
     assert preview is not None and preview.words.startswith("2.0")
 
 
@@ -203,6 +203,6 @@ def test_what_is_drawn_is_in_the_pane_under_the_mouse(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
         driver.key("c")
         driver.drag(driver.pixel((1.0, 3.2), 1), driver.pixel((1.4, 3.2), 1))
-        assert driver.desk.active == 1
-        for lane in driver.session.lanes:
-            assert lane.circumstances.environment.obstacles[-1].center == pytest.approx((1.0, 3.2), abs=0.05)
+        assert driver.viewer.active == 1
+        for pane in driver.session.panes:
+            assert pane.setup.environment.obstacles[-1].center == pytest.approx((1.0, 3.2), abs=0.05)

@@ -90,8 +90,8 @@ class Monkey:
         session = self.driver.session
         large = session.scenario.robots > 5 or len(session.numbers) > 6
         if large or len(session.environment.obstacles) > 20:
-            self.driver.desk.attempt(lambda: self.driver.desk.open_map("square"))
-            self.driver.desk.attempt(lambda: self.driver.desk.restart(robots=2))
+            self.driver.viewer.attempt(lambda: self.driver.viewer.open_map("square"))
+            self.driver.viewer.attempt(lambda: self.driver.viewer.restart(robots=2))
 
     def one(self) -> None:
         what = self.random.random()
@@ -117,7 +117,7 @@ class Monkey:
             pygame.display.set_mode(size, pygame.RESIZABLE)
             self.driver.post(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1])
         elif what < 0.985:
-            self.driver.desk.attempt(
+            self.driver.viewer.attempt(
                 lambda: self.driver.window.commands.typed(f"map {self.random.choice(MAPS)}")
             )
         else:
@@ -168,9 +168,9 @@ class Monkey:
         boxes = [*layout.panes, layout.track, layout.chart, layout.panel, layout.panel]
         if what > 0.7 and window._arranged and window.canvas._scenes:
             session = self.driver.session
-            lane = rng.randrange(min(len(session.lanes), len(layout.panes)))
-            x, y = rng.choice(session.positions(session.lanes[lane]).tolist())
-            at = self.driver.pixel((x, y), lane)
+            pane = rng.randrange(min(len(session.panes), len(layout.panes)))
+            x, y = rng.choice(session.positions(session.panes[pane]).tolist())
+            at = self.driver.pixel((x, y), pane)
             return round(at[0]) + rng.randint(-3, 3), round(at[1]) + rng.randint(-3, 3)
         left, top, wide, high = rng.choice(boxes)
         return left + rng.randrange(max(wide, 1)), top + rng.randrange(max(high, 1))
@@ -224,22 +224,22 @@ def limited(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def check(driver: Driver) -> None:
     """Fail unless the state is one that can be."""
     session, window = driver.session, driver.window
-    assert 1 <= len(session.lanes) <= MOST_PANES == 4
-    numbers = session.lanes[0].numbers
+    assert 1 <= len(session.panes) <= MOST_PANES == 4
+    numbers = session.panes[0].numbers
     assert len(numbers) >= 1 and list(numbers) == sorted(set(numbers))
-    for lane in session.lanes:
-        assert lane.numbers == numbers
-        assert lane.circumstances.failed.keys() == session.lanes[0].circumstances.failed.keys()
-        assert lane.circumstances.environment is session.lanes[0].circumstances.environment
-        assert lane.simulation.positions.shape == (len(numbers), 2)
-        assert np.isfinite(lane.simulation.positions).all() and np.isfinite(lane.simulation.velocities).all()
-        assert lane.time == pytest.approx(session.end, abs=1e-6)
-        assert (np.diff(lane.curve.time) > 0).all() and lane.curve.last_time <= session.end + 1e-6
+    for pane in session.panes:
+        assert pane.numbers == numbers
+        assert pane.setup.failed.keys() == session.panes[0].setup.failed.keys()
+        assert pane.setup.environment is session.panes[0].setup.environment
+        assert pane.simulation.positions.shape == (len(numbers), 2)
+        assert np.isfinite(pane.simulation.positions).all() and np.isfinite(pane.simulation.velocities).all()
+        assert pane.time == pytest.approx(session.end, abs=1e-6)
+        assert (np.diff(pane.curve.time) > 0).all() and pane.curve.last_time <= session.end + 1e-6
     assert too_deep(session) < 0.01
     assert 0.0 <= session.time <= session.end + 1e-9
-    assert 0 <= driver.desk.active < MOST_PANES
+    assert 0 <= driver.viewer.active < MOST_PANES
     assert window.panel.tab in ("parameters", "show", "robot", "keep")
-    assert len(window.layout.panes) == len(session.lanes)
+    assert len(window.layout.panes) == len(session.panes)
 
 
 @pytest.mark.slow
@@ -258,20 +258,20 @@ def test_it_bears_whatever_is_pressed(seed: int, tmp_path: Path, monkeypatch: py
 
 def usual(driver: Driver) -> None:
     """Fail unless a window that has borne all that can still be used."""
-    window, desk = driver.window, driver.desk
+    window, viewer = driver.window, driver.viewer
     for button in (1, 2, 3):
         driver.release(button)
     pygame.display.set_mode((900, 600), pygame.RESIZABLE)
     driver.post(pygame.VIDEORESIZE, size=(900, 600), w=900, h=600)
     driver.post(pygame.WINDOWFOCUSLOST)  # so that no key is held any more
     driver.key("escape", 6)
-    desk.panel, window.scale, desk.shown = True, 1.0, {"robots", "obstacles", "boundary"}
-    while len(driver.session.lanes) > 1:
-        driver.session.remove_pane(driver.session.lanes[-1])
-    desk.attempt(lambda: desk.open_map("square"))
-    typed(desk, "robots 2")
+    viewer.panel, window.scale, viewer.shown = True, 1.0, {"robots", "obstacles", "boundary"}
+    while len(driver.session.panes) > 1:
+        driver.session.remove_pane(driver.session.panes[-1])
+    viewer.attempt(lambda: viewer.open_map("square"))
+    typed(viewer, "robots 2")
     for name in ("radius 0.1", "max_speed 1", "speed 1", "controller rapf"):
-        typed(desk, name)
+        typed(viewer, name)
     driver.settle()
     driver.settle()
     driver.push("tool:hand")
@@ -279,8 +279,8 @@ def usual(driver: Driver) -> None:
     driver.session.playing = False
     driver.settle()
     driver.drag(driver.robot(1), driver.pixel((5.0, 5.0)))
-    lane = driver.session.lanes[0]
-    assert np.allclose(lane.simulation.positions[0], (5.0, 5.0), atol=0.05)
+    pane = driver.session.panes[0]
+    assert np.allclose(pane.simulation.positions[0], (5.0, 5.0), atol=0.05)
     assert window.panel.tab == "robot"
     driver.push("pause")
     driver.frames(5)
@@ -288,5 +288,5 @@ def usual(driver: Driver) -> None:
     driver.turn("parameters")
     driver.write("k_rep", "0.75")
     driver.key("return")
-    assert lane.law.value("k_rep") == 0.75
+    assert pane.law.value("k_rep") == 0.75
     check(driver)

@@ -11,7 +11,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, positions_of, s
 from robocov.environment import CircleObstacle
 from robocov.errors import StartError
 from robocov_app.viewer.session import session as module
-from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.scenario import TeamSpec
 
 # branches
 
@@ -58,10 +58,10 @@ def test_a_branch_leaves_a_ghost():
     for ghost in session.ghosts:
         assert ghost.time[0] == pytest.approx(0.5)
         assert ghost.time[-1] == pytest.approx(59 / 60)
-    for lane in session.lanes:
-        assert lane.curve.last_time == pytest.approx(0.5)
-        assert lane.time == pytest.approx(0.5)
-        assert lane.trail.time[-1] == pytest.approx(0.5)
+    for pane in session.panes:
+        assert pane.curve.last_time == pytest.approx(0.5)
+        assert pane.time == pytest.approx(0.5)
+        assert pane.trail.time[-1] == pytest.approx(0.5)
     assert session.summary() == {0: pytest.approx(2.5), 1: pytest.approx(2.5)}
 
 
@@ -76,8 +76,8 @@ def test_the_present_is_no_branch():
 
 def test_a_branch_takes_back_what_was_chosen_later():
     session = stepped(begun(RAPF, RPF), 20)
-    session.set_law(session.lanes[0], LLOYD)
-    session.set_limits(Limits(max_speed=0.5))
+    session.set_law(session.panes[0], LLOYD)
+    session.set_limits(TeamSpec(max_speed=0.5))
     session.edit(replace(HALL, obstacles=()), "emptied")
     session.add_robot((1.0, 3.0))
     stepped(session, 20)
@@ -85,11 +85,11 @@ def test_a_branch_takes_back_what_was_chosen_later():
     assert session.environment is HALL
     assert session.numbers == (1, 2, 3)
     session.branch()
-    assert [lane.law for lane in session.lanes] == [RAPF, RPF]
+    assert [pane.law for pane in session.panes] == [RAPF, RPF]
     assert session.scenario.laws == (RAPF, RPF)
-    assert session.scenario.limits == Limits()
+    assert session.scenario.limits == TeamSpec()
     assert session.scenario.environment is HALL
-    assert session.lanes[0].starts.shape == (3, 2)
+    assert session.panes[0].starts.shape == (3, 2)
     assert list(session.events) == []
     assert not session.can_undo
     stepped(session, 5)
@@ -119,7 +119,7 @@ def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
     monkeypatch.setattr(module.Lockstep, "resumed", no_room)
     for touch in (
         session.branch,
-        lambda: session.set_law(session.lanes[0], LLOYD),
+        lambda: session.set_law(session.panes[0], LLOYD),
         lambda: session.fail_robot(1),
     ):
         with pytest.raises(StartError, match="no room"):
@@ -133,13 +133,13 @@ def test_a_branch_that_cannot_be_changes_nothing(monkeypatch):
 def test_a_slider_that_is_dragged_is_one_event():
     session = stepped(begun(RAPF, RPF), 3)
     for k in range(1, 20):
-        session.set_law(session.lanes[0], RAPF.with_gain("k_rep", k / 10))
+        session.set_law(session.panes[0], RAPF.with_gain("k_rep", k / 10))
         session.step()
     for k in range(1, 20):
-        session.set_law(session.lanes[0], session.lanes[0].law.with_gain("k_att", k / 10))
+        session.set_law(session.panes[0], session.panes[0].law.with_gain("k_att", k / 10))
         session.step()
     for k in range(1, 20):
-        session.set_limits(Limits(max_speed=k / 10))
+        session.set_limits(TeamSpec(max_speed=k / 10))
         session.step()
     assert [event.text for event in session.events] == [
         "RAPF: k_rep = 1.9",
@@ -148,7 +148,7 @@ def test_a_slider_that_is_dragged_is_one_event():
     ]
     # later it is another one
     stepped(session, 70)
-    session.set_limits(Limits(max_speed=3.0))
-    session.set_law(session.lanes[0], LLOYD)
-    session.set_law(session.lanes[1], LLOYD)
+    session.set_limits(TeamSpec(max_speed=3.0))
+    session.set_law(session.panes[0], LLOYD)
+    session.set_law(session.panes[1], LLOYD)
     assert [event.text for event in session.events][3:] == ["limits changed", *["Lloyd takes over"] * 2]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from touched_run import LLOYD, RAPF, RPF, begun, stepped
 
-from robocov_app.viewer.session import past as module
-from robocov_app.viewer.session.past import Past
-from robocov_app.viewer.session.scenario import Law
+from robocov_app.viewer.session import decision_replay as module
+from robocov_app.viewer.session.decision_replay import DecisionReplay
+from robocov_app.viewer.session.scenario import ControllerChoice
 
 MINE = """
 from dataclasses import dataclass
@@ -54,12 +54,12 @@ def file(tmp_path_factory):
 @pytest.mark.parametrize("law", [RAPF, RPF, LLOYD])
 def test_the_past_is_explained_as_it_was(law):
     session = begun(law)
-    lane = session.lanes[0]
+    pane = session.panes[0]
     seen = []
     for _ in range(20):
-        seen.append(lane.simulation.snapshot)
+        seen.append(pane.simulation.snapshot)
         session.step()
-    past = Past()
+    past = DecisionReplay()
     for k in (13, 2, 19, 0):
         told = past.snapshot(session.history[k].states[0], session.history.time(k))
         assert told.time == pytest.approx(seen[k].time)
@@ -70,8 +70,8 @@ def test_the_past_is_explained_as_it_was(law):
 
 
 def test_a_controller_may_remember_what_it_did(file):
-    session = stepped(begun(Law(f"{file}:Counting")), 10)
-    past = Past()
+    session = stepped(begun(ControllerChoice(f"{file}:Counting")), 10)
+    past = DecisionReplay()
     for k in (3, 8):
         for _ in range(3):
             told = past.snapshot(session.history[k].states[0], session.history.time(k))
@@ -80,8 +80,8 @@ def test_a_controller_may_remember_what_it_did(file):
 
 @pytest.mark.parametrize("way", range(5))
 def test_a_controller_that_fails_decided_nothing(file, way):
-    session = stepped(begun(Law(f"{file}:Late", {"way": float(way)})), 3)
-    past = Past()
+    session = stepped(begun(ControllerChoice(f"{file}:Late", {"way": float(way)})), 3)
+    past = DecisionReplay()
     state = session.history[2].states[0]
     assert past.snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
     told = past.snapshot(state, 1.0)
@@ -98,7 +98,7 @@ def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
     module._sensor_in.cache_clear()
     session.look_at(0.0)
     for _ in range(5):
-        for lane in session.lanes:
-            session.snapshot(lane)
+        for pane in session.panes:
+            session.snapshot(pane)
     assert len(made) == 1
     module._sensor_in.cache_clear()

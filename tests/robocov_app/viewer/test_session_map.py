@@ -9,7 +9,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, stepped, too_de
 from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import ParameterError, StartError
 from robocov_app.viewer.session.map_edits import without_obstacle
-from robocov_app.viewer.session.scenario import MOST_PANES, Limits
+from robocov_app.viewer.session.scenario import MOST_PANES, TeamSpec
 
 # panes
 
@@ -17,18 +17,18 @@ from robocov_app.viewer.session.scenario import MOST_PANES, Limits
 def test_panes_come_and_go():
     session = stepped(begun(RAPF), 10)
     session.add_pane(LLOYD)
-    assert [lane.law for lane in session.lanes] == [RAPF, LLOYD]
+    assert [pane.law for pane in session.panes] == [RAPF, LLOYD]
     assert session.time == 0.0
     stepped(session, 10)
-    session.remove_pane(session.lanes[0])
-    assert [lane.number for lane in session.lanes] == [1]
+    session.remove_pane(session.panes[0])
+    assert [pane.number for pane in session.panes] == [1]
     assert session.scenario.laws == (LLOYD,)
     stepped(session, 10)
     session.look_at(5 / 60)
-    assert session.positions(session.lanes[0]).shape == (3, 2)
+    assert session.positions(session.panes[0]).shape == (3, 2)
     session.branch()
     stepped(session, 20)
-    assert session.lanes[0].time == pytest.approx(session.end)
+    assert session.panes[0].time == pytest.approx(session.end)
 
 
 def test_there_are_neither_too_many_panes_nor_none():
@@ -37,7 +37,7 @@ def test_there_are_neither_too_many_panes_nor_none():
         session.add_pane(RPF)
     session = begun(RAPF)
     with pytest.raises(ParameterError, match="the last pane stays"):
-        session.remove_pane(session.lanes[0])
+        session.remove_pane(session.panes[0])
 
 
 # the map
@@ -45,7 +45,7 @@ def test_there_are_neither_too_many_panes_nor_none():
 
 def test_an_obstacle_is_drawn_and_pushes_robots():
     session = stepped(begun(RAPF, LLOYD, robots=4), 30)
-    place = tuple(np.round(session.positions(session.lanes[0])[1], 3).tolist())
+    place = tuple(np.round(session.positions(session.panes[0])[1], 3).tolist())
     assert session.edit(with_pillar(pillar=CircleObstacle(place, 0.2)), "circle drawn") >= 1
     assert session.environment.obstacles[-1].center == place
     assert too_deep(session) <= 2e-3
@@ -62,7 +62,7 @@ def test_who_leans_on_a_wall_is_not_pushed():
     for _ in range(10):
         session.advance(0.1)
     session.release()
-    assert session.positions(session.lanes[0])[0, 0] < 0.11
+    assert session.positions(session.panes[0])[0, 0] < 0.11
     assert session.edit(with_pillar(), "circle drawn") == 0
 
 
@@ -84,7 +84,7 @@ def test_edits_are_taken_back_and_done_again():
     assert session.environment == second
     assert [event.text for event in session.events] == ["circle drawn", "pillar deleted"]
     assert {event.kind for event in session.events} == {"obstacle"}
-    assert {lane.circumstances.environment for lane in session.lanes} == {session.environment}
+    assert {pane.setup.environment for pane in session.panes} == {session.environment}
 
 
 def test_a_map_without_room_is_refused():
@@ -104,11 +104,11 @@ def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
     def no_room(wanted):
         raise StartError("no room")
 
-    monkeypatch.setattr(session.lanes[1], "changed", no_room)
-    place = tuple(session.positions(session.lanes[0])[0].tolist())
+    monkeypatch.setattr(session.panes[1], "changed", no_room)
+    place = tuple(session.positions(session.panes[0])[0].tolist())
     for touch in (
         lambda: session.edit(with_pillar(pillar=CircleObstacle(place, 0.3)), "drawn"),
-        lambda: session.set_limits(Limits(radius=0.2)),
+        lambda: session.set_limits(TeamSpec(radius=0.2)),
         lambda: session.add_robot((3.0, 3.0)),
         lambda: session.fail_robot(1),
         lambda: session.place(1, (5.0, 3.0)),
@@ -120,6 +120,6 @@ def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
 
 def test_the_newest_cost_of_each_pane():
     session = begun(RAPF, LLOYD)
-    session.lanes[0].curve.add(0.0, 2.0)
+    session.panes[0].curve.add(0.0, 2.0)
     assert session.summary()[0] == 2.0
     assert np.isnan(session.summary()[1])

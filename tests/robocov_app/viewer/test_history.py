@@ -8,8 +8,8 @@ from touched_run import HALL, RAPF
 
 from robocov.environment import CircleObstacle
 from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import Circumstances, History, Moment, State
-from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.history import History, Moment, PaneSetup, State
+from robocov_app.viewer.session.scenario import TeamSpec
 
 DT = 1 / 60
 FEWEST = 24
@@ -22,11 +22,11 @@ def few(monkeypatch):
     monkeypatch.setattr(module, "_FEWEST", FEWEST)
 
 
-def circumstances(failed=None) -> Circumstances:
-    return Circumstances(HALL, RAPF, Limits(), (1,), failed or {})
+def setup(failed=None) -> PaneSetup:
+    return PaneSetup(HALL, RAPF, TeamSpec(), (1,), failed or {})
 
 
-THEN = circumstances()
+THEN = setup()
 
 
 def moment(step, there=THEN, n=1, memory=None, pane=0) -> Moment:
@@ -95,7 +95,7 @@ def test_whatever_happens_nothing_gets_out_of_order(run):
         if kind == "robots":
             n = number
         if kind in ("touch", "amend", "robots"):
-            there = circumstances()
+            there = setup()
             history.amend(moment(step, there, n))
             touched |= {step}
         for _ in range(number if kind == "step" else 1):
@@ -116,7 +116,7 @@ def test_whatever_happens_nothing_gets_out_of_order(run):
 
 
 def test_what_was_touched_is_kept():
-    events = {101: circumstances(), 203: circumstances(), 747: circumstances()}
+    events = {101: setup(), 203: setup(), 747: setup()}
 
     def there(step):
         return events[max((begin for begin in events if begin <= step), default=101)]
@@ -127,7 +127,7 @@ def test_what_was_touched_is_kept():
 
 
 def test_a_run_that_is_touched_all_the_time_is_thinned_too():
-    history = filled(1500, 100 * ONE, lambda step: circumstances())
+    history = filled(1500, 100 * ONE, lambda step: setup())
     assert len(history) <= 100
     assert taken(history) <= 100 * ONE
     assert history.steps[0] == 0
@@ -154,7 +154,7 @@ def test_a_larger_team_takes_more():
 
 @pytest.mark.parametrize(
     "memory",
-    [np.zeros(5000), {"map": np.zeros(5000)}, [(np.zeros(2500), np.zeros(2500))], Limits(np.zeros(5000))],
+    [np.zeros(5000), {"map": np.zeros(5000)}, [(np.zeros(2500), np.zeros(2500))], TeamSpec(np.zeros(5000))],
 )
 def test_what_controllers_remember_counts(memory):
     history = History(DT, 60 * ONE)
@@ -184,16 +184,16 @@ def test_the_last_moment_not_after_a_time():
 
 def test_the_newest_is_replaced_when_something_was_touched():
     history = filled(4)
-    touched = circumstances()
+    touched = setup()
     history.amend(moment(3, touched))
     assert history.steps == [0, 1, 2, 3]
-    assert history.last.states[0].circumstances is touched
+    assert history.last.states[0].setup is touched
     history.amend(moment(4, touched))
     assert history.steps == [0, 1, 2, 3, 4]
     only = filled(1)
     only.amend(moment(0, touched))
     assert only.steps == [0]
-    assert only.last.states[0].circumstances is touched
+    assert only.last.states[0].setup is touched
 
 
 @given(st.integers(1, 400), st.integers(0, 400))
@@ -216,15 +216,15 @@ def test_what_is_cut_off_is_gone_and_takes_no_room(steps, k):
 def test_a_history_of_its_own_leaves_the_other_as_it_is():
     history = filled(10)
     twin = history.until(4)
-    twin.add(moment(5, circumstances()))
+    twin.add(moment(5, setup()))
     assert len(history) == 10
     assert history[5] is not twin[5]
     assert twin.dt == history.dt
 
 
 def test_failed_robots_are_solid():
-    there = circumstances({2: (1.0, 1.0), 5: (2.0, 3.0)})
-    assert circumstances().solid is HALL
+    there = setup({2: (1.0, 1.0), 5: (2.0, 3.0)})
+    assert setup().solid is HALL
     assert there.solid.obstacles[: len(HALL.obstacles)] == HALL.obstacles
     assert there.solid.obstacles[len(HALL.obstacles) :] == (
         CircleObstacle((1.0, 1.0), 0.1),

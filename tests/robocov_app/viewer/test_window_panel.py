@@ -21,10 +21,10 @@ from robocov_app.viewer.panel import TABS, law_labels
 
 def test_a_controller_is_chosen_from_the_menu(driver: Driver) -> None:
     driver.choose("law:0", "RPF")
-    assert driver.session.lanes[0].law.name == "rpf"
+    assert driver.session.panes[0].law.name == "rpf"
     assert driver.find("entry", "k_att") is None
     driver.choose("law:0", "Lloyd")
-    assert driver.session.lanes[0].law.name == "lloyd"
+    assert driver.session.panes[0].law.name == "lloyd"
 
 
 def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path: Path) -> None:
@@ -41,20 +41,20 @@ def test_an_own_controller_of_the_same_name_can_be_told_from_the_other(tmp_path:
     }
     with opened(tmp_path, RAPF, RPF, RPF, RPF) as driver:
         for name in names:
-            driver.desk.attempt(lambda name=name: driver.window.commands.typed(f"controller {name}"))
-        driver.desk.attempt(lambda: driver.desk.set_law(0, "rapf"))
+            driver.viewer.attempt(lambda name=name: driver.window.commands.typed(f"controller {name}"))
+        driver.viewer.attempt(lambda: driver.viewer.set_law(0, "rapf"))
         driver.settle()
         driver.click(*driver.widget("menu", "law:1").rect.center)
         items = driver.window.panel.ui.open_list.options
         assert len(set(items)) == len(items) == len(CONTROLLERS) + 2
         driver.key("escape")
         driver.choose("law:1", items[-1])
-        assert driver.session.lanes[1].law.name == names[1]
+        assert driver.session.panes[1].law.name == names[1]
 
 
 def test_a_map_and_a_start_are_chosen_from_their_menus(driver: Driver) -> None:
     driver.choose("map", "trap")
-    assert driver.desk.map_name == "trap" and driver.session.environment.name == "Trap"
+    assert driver.viewer.map_name == "trap" and driver.session.environment.name == "Trap"
     driver.choose("start", "inside")
     assert driver.session.scenario.start_name == "inside"
 
@@ -76,7 +76,7 @@ def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(
     driver.click_at(MIDDLE)
     driver.settle()
     assert not driver.window.panel.unfolded
-    assert driver.window.canvas._painters[0].camera == camera and driver.desk.map_name == "hall"
+    assert driver.window.canvas._painters[0].camera == camera and driver.viewer.map_name == "hall"
 
 
 def test_escape_closes_a_menu_and_nothing_else(driver: Driver) -> None:
@@ -84,7 +84,7 @@ def test_escape_closes_a_menu_and_nothing_else(driver: Driver) -> None:
     driver.click(*driver.widget("menu", "map").rect.center)
     driver.key("escape")
     driver.settle()
-    assert not driver.window.panel.unfolded and driver.desk.tool.name == "polygon"
+    assert not driver.window.panel.unfolded and driver.viewer.tool.name == "polygon"
 
 
 def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
@@ -94,12 +94,12 @@ def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
     found = driver.window.panel.ui.open_list
     name = found.options[found.at((driver.at[0], step.centery))]
     driver.click(driver.at[0], step.centery)
-    assert driver.session.end == 0.0 and driver.desk.map_name == name
+    assert driver.session.end == 0.0 and driver.viewer.map_name == name
 
 
 def test_a_slider_that_is_dragged_sets_its_gain_as_it_moves(driver: Driver) -> None:
     driver.slide("k_rep", 0.75)
-    value = driver.session.lanes[0].law.value("k_rep")
+    value = driver.session.panes[0].law.value("k_rep")
     assert value == pytest.approx(0.3 * 30**0.5, rel=0.2)
     assert driver.widget("entry", "k_rep").text == f"{value:.4g}"
     assert driver.session.events[-1].kind == "law"
@@ -108,7 +108,7 @@ def test_a_slider_that_is_dragged_sets_its_gain_as_it_moves(driver: Driver) -> N
 def test_a_click_beside_the_knob_brings_it_there(driver: Driver) -> None:
     slider = driver.widget("slider", "team.max_speed")
     driver.click(slider.rect.right - 12, slider.rect.centery)
-    assert driver.session.lanes[0].circumstances.limits.max_speed > 4.0
+    assert driver.session.panes[0].setup.limits.max_speed > 4.0
     assert driver.knob("team.max_speed")[0].collidepoint(driver.at)
 
 
@@ -129,9 +129,9 @@ def test_the_speed_slider_rests_on_speeds(driver: Driver) -> None:
 
 def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -> None:
     driver.write("k_rep", "1.25")
-    assert driver.session.lanes[0].law.value("k_rep") != 1.25 and driver.window.panel.typing
+    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.typing
     driver.key("return")
-    assert driver.session.lanes[0].law.value("k_rep") == 1.25
+    assert driver.session.panes[0].law.value("k_rep") == 1.25
     assert not driver.window.panel.typing
     assert driver.widget("slider", "k_rep").value > 0.5
 
@@ -139,7 +139,7 @@ def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -
 def test_the_enter_of_the_key_pad_does_too(driver: Driver) -> None:
     driver.write("team.max_speed", "0.5")
     driver.key("enter")
-    assert driver.session.lanes[0].circumstances.limits.max_speed == 0.5
+    assert driver.session.panes[0].setup.limits.max_speed == 0.5
 
 
 @pytest.mark.parametrize(("field", "text"), [("k_rep", "much"), ("team.max_speed", "-1"), ("robots", "1.5")])
@@ -150,7 +150,7 @@ def test_a_wrong_value_is_told_and_the_field_shows_the_old_one_again(
     driver.write(field, text)
     assert driver.widget("entry", field).text == text
     driver.key("return")
-    assert driver.desk.trouble and driver.desk.message
+    assert driver.viewer.trouble and driver.viewer.message
     assert driver.widget("entry", field).text == before
 
 
@@ -165,16 +165,16 @@ def test_what_was_typed_without_enter_is_forgotten(how: str, driver: Driver) -> 
         driver.click_at(MIDDLE)
     driver.frames(2)
     assert driver.widget("entry", "k_rep").text == "0.3"
-    assert driver.session.lanes[0].law == RAPF
+    assert driver.session.panes[0].law == RAPF
 
 
 def test_keys_that_are_typed_into_a_field_are_no_shortcuts(driver: Driver) -> None:
-    shown = set(driver.desk.shown)
+    shown = set(driver.viewer.shown)
     driver.write("k_rep", "1r t")
     driver.key("space")
     driver.key("home")
     driver.key("delete")
-    assert driver.desk.shown == shown and driver.desk.theme == "light" and not driver.session.playing
+    assert driver.viewer.shown == shown and driver.viewer.theme == "light" and not driver.session.playing
     driver.key("f1")
     assert driver.window.help
 
@@ -196,11 +196,11 @@ def test_typing_goes_on_in_the_middle_after_a_second_click(driver: Driver) -> No
 
 
 def test_the_reset_button_goes_back_to_the_default(driver: Driver) -> None:
-    driver.desk.attempt(lambda: driver.window.commands.typed("k_rep 4"))
+    driver.viewer.attempt(lambda: driver.window.commands.typed("k_rep 4"))
     driver.settle()
     assert driver.widget("slider", "k_rep").value > 0.7
     driver.push("reset:k_rep")
-    assert driver.session.lanes[0].law.value("k_rep") == 0.3
+    assert driver.session.panes[0].law.value("k_rep") == 0.3
     assert driver.widget("slider", "k_rep").value == pytest.approx(0.5, abs=0.02)
     assert driver.widget("entry", "k_rep").text == "0.3"
 
@@ -227,15 +227,15 @@ def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:
         assert driver.widget("button", f"tab:{tab}").value
     driver.turn("show")
     for name in ("cells", "grid"):
-        assert name in driver.desk.shown
+        assert name in driver.viewer.shown
         driver.tick(name)
-        assert name not in driver.desk.shown and not driver.widget("check", name).value
+        assert name not in driver.viewer.shown and not driver.widget("check", name).value
     box = driver.widget("check", "cells").rect
     driver.click(box.left + 40, box.centery)  # on the words
-    assert "cells" in driver.desk.shown
+    assert "cells" in driver.viewer.shown
     driver.key("1")
     driver.frames(3)
-    assert "cells" not in driver.desk.shown and not driver.widget("check", "cells").value
+    assert "cells" not in driver.viewer.shown and not driver.widget("check", "cells").value
     driver.key("ctrl+tab")
     assert driver.window.panel.tab == "robot"
 
@@ -243,16 +243,16 @@ def test_tabs_turn_pages_and_check_boxes_switch_layers(driver: Driver) -> None:
 def test_panes_are_added_up_to_four_and_closed_again(driver: Driver) -> None:
     for count in (2, 3, 4):
         driver.push("pane:add")
-        assert len(driver.session.lanes) == count
+        assert len(driver.session.panes) == count
     assert driver.find("button", "pane:add") is None
     assert len({box[2:] for box in driver.window.layout.panes}) == 1
     driver.frames(3)
-    laws = [lane.law.name for lane in driver.session.lanes]
+    laws = [pane.law.name for pane in driver.session.panes]
     driver.push("close:1")
-    assert [lane.law.name for lane in driver.session.lanes] == [laws[0], *laws[2:]]
+    assert [pane.law.name for pane in driver.session.panes] == [laws[0], *laws[2:]]
     driver.push("close:0")
     driver.push("close:1")
-    assert [lane.law.name for lane in driver.session.lanes] == [laws[2]]
+    assert [pane.law.name for pane in driver.session.panes] == [laws[2]]
     assert driver.find("button", "close:0") is None
 
 
@@ -260,11 +260,11 @@ def test_the_page_is_of_the_pane_that_was_clicked(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, RPF) as driver:
         assert driver.find("entry", "k_att") is not None
         driver.click(*driver.pixel(MIDDLE, 1))
-        assert driver.desk.active == 1
+        assert driver.viewer.active == 1
         assert driver.find("entry", "k_att") is None
         driver.write("k_rep", "5")
         driver.key("return")
-        assert [lane.law.value("k_rep") for lane in driver.session.lanes] == [0.3, 5.0]
+        assert [pane.law.value("k_rep") for pane in driver.session.panes] == [0.3, 5.0]
 
 
 def test_fail_and_remove_buttons_are_of_the_robot_that_is_asked(driver: Driver) -> None:
@@ -298,12 +298,12 @@ def test_pages_that_were_turned_to_before_look_as_they_did(tmp_path: Path) -> No
             if tab in pictures:
                 assert driver.same(pictures[tab]), tab
             pictures[tab] = driver.picture()
-        driver.desk.active = 1
+        driver.viewer.active = 1
         driver.window.panel.show_tab("parameters")
         driver.frames(2, 0.3)
         assert not driver.same(pictures["parameters"])
-        driver.desk.active = 0
-        driver.desk.version += 1
+        driver.viewer.active = 0
+        driver.viewer.version += 1
         driver.frames(2, 0.3)
         assert driver.same(pictures["parameters"])
 
@@ -321,7 +321,7 @@ def test_after_resizing_and_more_panes_the_panel_is_as_if_it_was_built_so(tmp_pa
         panel(driver)
         resized(driver, (1280, 760))
         panel(driver)
-        driver.desk.attempt(lambda: driver.session.add_pane(RPF))
+        driver.viewer.attempt(lambda: driver.session.add_pane(RPF))
         panel(driver)
         resized(driver, (1100, 700))
         assert np.array_equal(panel(driver), wanted)

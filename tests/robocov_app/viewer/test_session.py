@@ -19,14 +19,14 @@ from touched_run import (
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov_app.viewer.session.map_edits import with_obstacle
-from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 # beginning anew
 
 
 def test_it_begins_anew_as_it_began():
     session = begun(RAPF, LLOYD)
-    start = session.positions(session.lanes[0]).copy()
+    start = session.positions(session.panes[0]).copy()
     stepped(session, 20)
     session.fail_robot(1)
     session.add_robot((3.0, 3.0))
@@ -35,8 +35,8 @@ def test_it_begins_anew_as_it_began():
     assert session.serial == serial + 1
     assert (session.time, session.history.steps, session.live) == (0.0, [0], True)
     assert robots_of(session) == ((1, 2, 3), ())
-    for lane in session.lanes:
-        np.testing.assert_array_equal(session.positions(lane), start)
+    for pane in session.panes:
+        np.testing.assert_array_equal(session.positions(pane), start)
     assert list(session.events) == list(session.ghosts) == []
     assert session.undo() == "begun anew"
     assert robots_of(session) == ((2, 3, 4), (1,)) and session.time == 20 / 60
@@ -60,10 +60,10 @@ def test_it_begins_anew_with_changes():
     assert session.numbers == (1, 2, 3, 4, 5)
     session.restart(start="far", seed=4)
     np.testing.assert_array_equal(
-        session.positions(session.lanes[0]), HALL.start("far").sample(5, seed=4, radius=0.1)
+        session.positions(session.panes[0]), HALL.start("far").sample(5, seed=4, radius=0.1)
     )
-    session.restart(laws=(RPF, LLOYD), limits=Limits(radius=0.15))
-    assert [lane.law for lane in session.lanes] == [RPF, LLOYD]
+    session.restart(laws=(RPF, LLOYD), limits=TeamSpec(radius=0.15))
+    assert [pane.law for pane in session.panes] == [RPF, LLOYD]
     assert session.scenario.start == "far"
     other = Environment("other", ((0, 0), (9, 0), (9, 9), (0, 9)))
     session.restart(environment=other)
@@ -73,25 +73,25 @@ def test_it_begins_anew_with_changes():
 
 def test_what_was_chosen_stays_chosen():
     session = begun(RAPF, RPF)
-    session.set_law(session.lanes[0], LLOYD)
-    session.set_limits(Limits(radius=0.2))
+    session.set_law(session.panes[0], LLOYD)
+    session.set_limits(TeamSpec(radius=0.2))
     session.edit(with_pillar(), "circle drawn")
     session.restart()
-    assert [lane.law for lane in session.lanes] == [LLOYD, RPF]
-    assert session.lanes[0].circumstances.limits == Limits(radius=0.2)
+    assert [pane.law for pane in session.panes] == [LLOYD, RPF]
+    assert session.panes[0].setup.limits == TeamSpec(radius=0.2)
     assert session.environment.obstacles[-1] == PILLAR
 
 
 def test_also_while_the_past_is_looked_at():
     session = stepped(begun(RAPF), 10)
     session.edit(with_pillar(), "circle drawn")
-    session.set_law(session.lanes[0], LLOYD)
+    session.set_law(session.panes[0], LLOYD)
     stepped(session, 10)
     session.look_at(0.0)
     assert session.environment is HALL
     session.restart()
     assert session.environment.obstacles[-1] == PILLAR
-    assert session.lanes[0].law == LLOYD
+    assert session.panes[0].law == LLOYD
 
 
 def test_a_start_that_was_covered_is_not_gone_back_to():
@@ -107,10 +107,10 @@ def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
     given_starts = np.array([[1.0, 1.0], [5.0, 3.0], [3.0, 3.0]])
     session = stepped(begun(given=given_starts), 10)
     session.restart(laws=(RPF,))
-    np.testing.assert_array_equal(session.positions(session.lanes[0]), given_starts)
+    np.testing.assert_array_equal(session.positions(session.panes[0]), given_starts)
     session.restart(seed=1)
     assert session.scenario.given is None
-    assert np.abs(session.positions(session.lanes[0]) - given_starts).max() > 0.1
+    assert np.abs(session.positions(session.panes[0]) - given_starts).max() > 0.1
 
 
 @pytest.mark.parametrize(
@@ -119,10 +119,10 @@ def test_starts_that_were_given_are_gone_back_to_but_not_by_others():
         {"robots": 0},
         {"robots": 700},
         {"start": "nowhere"},
-        {"laws": (Law("nobody"),)},
+        {"laws": (ControllerChoice("nobody"),)},
         {"laws": ()},
-        {"limits": Limits(radius=3.0)},
-        {"limits": Limits(max_speed=-1.0)},
+        {"limits": TeamSpec(radius=3.0)},
+        {"limits": TeamSpec(max_speed=-1.0)},
         {"dt": 7.0},
         {"seed": -1},
     ],
@@ -142,11 +142,11 @@ def test_what_cannot_be_begun_leaves_all_as_it_is(changes):
 
 def test_another_controller_takes_over_in_one_pane():
     session = stepped(begun(RAPF, RAPF), 20)
-    session.set_law(session.lanes[1], LLOYD)
-    assert [lane.law for lane in session.lanes] == [RAPF, LLOYD]
+    session.set_law(session.panes[1], LLOYD)
+    assert [pane.law for pane in session.panes] == [RAPF, LLOYD]
     assert session.scenario.laws == (RAPF, LLOYD)
     assert session.events[-1].text == "Lloyd takes over"
-    session.set_law(session.lanes[0], RAPF.with_gain("k_rep", 0.5))
+    session.set_law(session.panes[0], RAPF.with_gain("k_rep", 0.5))
     assert session.events[-1].text == "RAPF: k_rep = 0.5"
     assert len(session.history) == 21
     stepped(session, 20)
@@ -156,33 +156,33 @@ def test_the_same_controller_again_is_no_event():
     session = stepped(begun(RAPF), 10)
     session.look_at(0.0)
     before = all_told(session)
-    session.set_law(session.lanes[0], Law("rapf"))
-    session.set_limits(Limits())
+    session.set_law(session.panes[0], ControllerChoice("rapf"))
+    session.set_limits(TeamSpec())
     assert all_told(session) == before
 
 
 def test_what_was_then_counts_not_what_is_now():
     session = stepped(begun(), 20)
-    session.set_limits(Limits(max_speed=0.5))
-    session.set_law(session.lanes[0], LLOYD)
+    session.set_limits(TeamSpec(max_speed=0.5))
+    session.set_law(session.panes[0], LLOYD)
     stepped(session, 20)
     session.look_at(0.1)
-    session.set_limits(Limits(max_speed=0.5))
+    session.set_limits(TeamSpec(max_speed=0.5))
     assert session.live
-    assert session.lanes[0].circumstances.limits.max_speed == 0.5
-    assert session.lanes[0].law == RAPF
+    assert session.panes[0].setup.limits.max_speed == 0.5
+    assert session.panes[0].law == RAPF
     assert session.end == pytest.approx(0.1)
 
 
 def test_limits_are_those_of_all():
     session = stepped(begun(RAPF, LLOYD), 20)
-    session.set_limits(Limits(max_speed=0.3, communication_range=0.5))
-    for lane in session.lanes:
-        assert lane.simulation.team.max_speed.tolist() == [0.3] * 3
-        assert not lane.simulation.snapshot.seen.neighbours.complete
+    session.set_limits(TeamSpec(max_speed=0.3, communication_range=0.5))
+    for pane in session.panes:
+        assert pane.simulation.team.max_speed.tolist() == [0.3] * 3
+        assert not pane.simulation.snapshot.seen.neighbours.complete
     assert session.events[-1].kind == "limits"
     before = all_told(session)
-    for limits in (Limits(max_speed=0.0), Limits(radius=1.9)):
+    for limits in (TeamSpec(max_speed=0.0), TeamSpec(radius=1.9)):
         with pytest.raises((ParameterError, StartError)):
             session.set_limits(limits)
         assert all_told(session) == before
@@ -190,8 +190,8 @@ def test_limits_are_those_of_all():
 
 def test_larger_robots_make_room_for_each_other():
     session = begun(robots=6)
-    session.set_limits(Limits(radius=0.3))
-    places = session.positions(session.lanes[0])
+    session.set_limits(TeamSpec(radius=0.3))
+    places = session.positions(session.panes[0])
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     assert apart[np.triu_indices(6, 1)].min() >= 0.6
     assert too_deep(session) <= 0.0

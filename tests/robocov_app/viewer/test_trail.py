@@ -98,11 +98,11 @@ def test_a_trail_of_moments():
 
 def test_the_trail_of_a_past_is_that_which_was_left():
     session = stepped(begun(RAPF, LLOYD), 60)
-    for lane in session.lanes:
-        told = trail_of(session.history, lane.number, 60)
-        np.testing.assert_array_equal(told.positions, lane.trail.positions)
-        assert told.time == pytest.approx(lane.trail.time)
-        np.testing.assert_array_equal(starts_of(session.history, lane.number, 60), lane.starts)
+    for pane in session.panes:
+        told = trail_of(session.history, pane.number, 60)
+        np.testing.assert_array_equal(told.positions, pane.trail.positions)
+        assert told.time == pytest.approx(pane.trail.time)
+        np.testing.assert_array_equal(starts_of(session.history, pane.number, 60), pane.starts)
 
 
 def test_robots_that_came_later_were_nowhere_before():

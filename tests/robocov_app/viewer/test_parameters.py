@@ -12,11 +12,11 @@ from robocov.controllers.gains import Gain, gain, gains_of
 from robocov.errors import ParameterError
 from robocov.robots import UNITS
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
-from robocov_app.viewer.session.scenario import Law, Limits
+from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
-LAWS = [Law("rapf"), Law("rpf"), Law("lloyd")]
+LAWS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
 GAINS = [each for law in LAWS for each in gain_parameters(law)]
-ALL = [each for each in GAINS if isinstance(each, Parameter)] + limit_parameters(Limits())
+ALL = [each for each in GAINS if isinstance(each, Parameter)] + limit_parameters(TeamSpec())
 
 
 class Odd:
@@ -37,13 +37,20 @@ def odd(default, low, high, *, optional=False) -> Parameter:
 def test_every_gain_has_its_slider():
     for law in LAWS:
         assert [each.name for each in gain_parameters(law)] == list(law.known)
-    rapf = {each.name: each for each in gain_parameters(Law("rapf", {"k_rep": 0.7}))}
-    assert (rapf["k_rep"].value, rapf["k_rep"].default) == (0.7, Law("rapf").known["k_rep"].default)
+    rapf = {each.name: each for each in gain_parameters(ControllerChoice("rapf", {"k_rep": 0.7}))}
+    assert (rapf["k_rep"].value, rapf["k_rep"].default) == (
+        0.7,
+        ControllerChoice("rapf").known["k_rep"].default,
+    )
     assert rapf["k_rep"].meaning
 
 
 def test_gains_that_are_words_have_all_of_them():
-    (picked,) = [each for each in gain_parameters(Law("rapf", {"target": "median"})) if each.name == "target"]
+    (picked,) = [
+        each
+        for each in gain_parameters(ControllerChoice("rapf", {"target": "median"}))
+        if each.name == "target"
+    ]
     assert isinstance(picked, Pick)
     assert (picked.value, picked.default, picked.words()) == ("median", "centroid", "median")
     assert picked.offered == ("centroid", "sensing", "median")
@@ -56,7 +63,7 @@ def test_gains_that_are_words_have_all_of_them():
         ):
             picked.read(wrong)
     for word in picked.offered:
-        law = Law("rapf").with_gain("target", word)
+        law = ControllerChoice("rapf").with_gain("target", word)
         assert law.value("target") == word
         assert law.gains == ({} if word == "centroid" else {"target": word})
     near = Pick("n", "n", "", "on", "on", ("on", "once"))
@@ -64,9 +71,9 @@ def test_gains_that_are_words_have_all_of_them():
 
 
 def test_every_limit_but_the_mass_has_its_slider():
-    names = [each.name for each in limit_parameters(Limits())]
+    names = [each.name for each in limit_parameters(TeamSpec())]
     assert {name.removeprefix("team.") for name in names} == set(UNITS) - {"mass"}
-    for each in limit_parameters(Limits(sensing_range=math.inf, radius=0.3)):
+    for each in limit_parameters(TeamSpec(sensing_range=math.inf, radius=0.3)):
         if each.name == "team.sensing_range":
             assert (each.value, each.default, each.optional) == (None, 3.0, True)
         if each.name == "team.radius":
@@ -89,7 +96,7 @@ def test_all_that_a_slider_gives_is_taken(parameter):
         assert value >= before
         before = value
         if parameter.name.startswith("team."):
-            with_limit(Limits(), parameter.name, parameter.at(k / 100)).team(2)
+            with_limit(TeamSpec(), parameter.name, parameter.at(k / 100)).team(2)
     for law in LAWS:
         if parameter in gain_parameters(law):
             for k in range(11):
@@ -190,9 +197,9 @@ def test_with_no_limit_allowed_the_message_says_so():
 
 
 def test_limits_one_by_one():
-    limits = with_limit(Limits(), "team.sensing_range", None)
-    assert limits == Limits(sensing_range=math.inf)
-    assert with_limit(limits, "radius", 0.2) == Limits(radius=0.2, sensing_range=math.inf)
+    limits = with_limit(TeamSpec(), "team.sensing_range", None)
+    assert limits == TeamSpec(sensing_range=math.inf)
+    assert with_limit(limits, "radius", 0.2) == TeamSpec(radius=0.2, sensing_range=math.inf)
     with pytest.raises(ParameterError, match=r"team\.radius: inf m"):
         with_limit(limits, "radius", None).team(1)
 

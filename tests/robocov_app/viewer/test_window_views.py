@@ -61,7 +61,7 @@ def test_what_happened_is_marked_and_told_under_the_mouse(driver: Driver) -> Non
     played(driver, 60)
     driver.move(*at(driver, 0.5))
     quiet = driver.picture()
-    driver.desk.attempt(lambda: driver.session.fail_robot(2))
+    driver.viewer.attempt(lambda: driver.session.fail_robot(2))
     played(driver, 60)
     (event,) = driver.session.events
     assert event.time == pytest.approx(1.0) and event.text == "robot 2 failed"
@@ -104,7 +104,7 @@ def test_the_other_buttons_pan_whatever_tool_there_is(button: int, driver: Drive
     before = driver.pixel(MIDDLE)
     driver.drag((200, 200), (230, 190), (260, 180), button=button)
     assert np.allclose(driver.pixel(MIDDLE), np.add(before, (60, -20)), atol=1)
-    assert driver.desk.tool.preview(driver.session) is None
+    assert driver.viewer.tool.preview(driver.session) is None
 
 
 def test_fitting_shows_the_whole_map_again_after_zooming_and_panning_by_keys(driver: Driver) -> None:

@@ -14,19 +14,19 @@ from robocov.errors import MapError, ParameterError, StartError
 from robocov.robots import Team
 from robocov_app.viewer.session import changes as module
 from robocov_app.viewer.session.changes import nearest_free
-from robocov_app.viewer.session.scenario import Limits
+from robocov_app.viewer.session.scenario import TeamSpec
 
 RADIUS = 0.1
 places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
 
 
 def place_of(session, number, pane=0) -> list[float]:
-    lane = session.lanes[pane]
-    return lane.simulation.positions[lane.row(number)].tolist()
+    its = session.panes[pane]
+    return its.simulation.positions[its.row(number)].tolist()
 
 
 def failed_at(session, number, pane=0) -> tuple[float, float]:
-    return session.lanes[pane].circumstances.failed[number]
+    return session.panes[pane].setup.failed[number]
 
 
 # where there is room
@@ -65,12 +65,12 @@ def test_a_room_that_is_full():
 
 def test_a_robot_is_placed_in_all_panes():
     session = stepped(begun(RAPF, LLOYD), 20)
-    others = [lane.simulation.positions[1:].copy() for lane in session.lanes]
+    others = [pane.simulation.positions[1:].copy() for pane in session.panes]
     session.place(1, (5.0, 3.0))
-    for pane, lane in enumerate(session.lanes):
-        assert place_of(session, 1, pane) == [5.0, 3.0]
-        assert lane.simulation.velocities[0].tolist() == [0.0, 0.0]
-        np.testing.assert_array_equal(lane.simulation.positions[1:], others[pane])
+    for k, pane in enumerate(session.panes):
+        assert place_of(session, 1, k) == [5.0, 3.0]
+        assert pane.simulation.velocities[0].tolist() == [0.0, 0.0]
+        np.testing.assert_array_equal(pane.simulation.positions[1:], others[k])
     assert session.history.last.states[0].positions[0].tolist() == [5.0, 3.0]
     assert len(session.history) == 21
 
@@ -81,9 +81,9 @@ def test_wherever_robots_are_placed_they_fit(drags):
     session = begun(robots=6)
     for number, point in drags:
         others = [k for k in range(6) if k != number - 1]
-        before = session.lanes[0].simulation.positions[others]
+        before = session.panes[0].simulation.positions[others]
         session.place(number, point)
-        np.testing.assert_array_equal(session.lanes[0].simulation.positions[others], before)
+        np.testing.assert_array_equal(session.panes[0].simulation.positions[others], before)
         assert too_deep(session) <= 1e-9
     session.step()
     assert too_deep(session) < 2e-3
@@ -132,15 +132,15 @@ def test_what_has_failed_is_not_pulled():
 
 def test_robots_join_at_rest():
     session = stepped(begun(RAPF, LLOYD), 10)
-    velocities = session.lanes[0].simulation.velocities
+    velocities = session.panes[0].simulation.velocities
     assert session.add_robot((5.0, 3.0)) == 4
     assert session.add_robot((5.0, 3.0)) == 5
-    for lane in session.lanes:
-        assert lane.numbers == (1, 2, 3, 4, 5)
-        assert lane.simulation.positions[3].tolist() == [5.0, 3.0]
-        assert 2 * RADIUS <= np.hypot(*(lane.simulation.positions[4] - (5.0, 3.0))) < 2 * RADIUS + 0.01
-        assert lane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
-    np.testing.assert_array_equal(session.lanes[0].simulation.velocities[:3], velocities)
+    for pane in session.panes:
+        assert pane.numbers == (1, 2, 3, 4, 5)
+        assert pane.simulation.positions[3].tolist() == [5.0, 3.0]
+        assert 2 * RADIUS <= np.hypot(*(pane.simulation.positions[4] - (5.0, 3.0))) < 2 * RADIUS + 0.01
+        assert pane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
+    np.testing.assert_array_equal(session.panes[0].simulation.velocities[:3], velocities)
     assert [event.text for event in session.events] == ["robot 4 joined", "robot 5 joined"]
     assert session.add_robot((1.0, 3.0), 9) == 9
     assert session.add_robot((1.0, 3.0)) == 10
@@ -189,20 +189,20 @@ def test_numbers_are_not_given_twice():
 
 def test_who_fails_is_not_heard_but_sensed():
     session = begun(RPF, robots=3, given=np.array([[3.0, 3.0], [3.4, 3.0], [1.0, 1.0]]))
-    lane = session.lanes[0]
-    before = lane.simulation.snapshot
+    pane = session.panes[0]
+    before = pane.simulation.snapshot
     assert before.seen.neighbours.of(0).tolist() == [1, 2]
     session.fail_robot(2)
-    seen = lane.simulation.snapshot.seen
-    assert lane.numbers == (1, 3)
+    seen = pane.simulation.snapshot.seen
+    assert pane.numbers == (1, 3)
     assert seen.neighbours.count == 2
     assert seen.neighbours.of(0).tolist() == [1]
     # its rim, where there was nothing nearer than a wall
     assert seen.obstacle_points[0] == pytest.approx([3.3, 3.0], abs=2e-3)
-    assert lane.simulation.snapshot.decision.terms["repulsion_obstacle"][0, 0] < 0.0
+    assert pane.simulation.snapshot.decision.terms["repulsion_obstacle"][0, 0] < 0.0
     session.revive_robot(2)
-    assert lane.numbers == (1, 2, 3)
-    after = lane.simulation.snapshot
+    assert pane.numbers == (1, 2, 3)
+    after = pane.simulation.snapshot
     np.testing.assert_array_equal(after.seen.obstacle_points, before.seen.obstacle_points)
     np.testing.assert_array_equal(after.decision.forces, before.decision.forces)
 
@@ -310,15 +310,15 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
     session.remove_robot(2)
     stepped(session, 20)
     session.look_at(10 / 60)
-    then = session.positions(session.lanes[1]).copy()
+    then = session.positions(session.panes[1]).copy()
     # it is not there any more, but was then
     session.remove_robot(2)
     assert session.live
     assert session.end == pytest.approx(10 / 60)
     assert robots_of(session) == ((1, 3), ())
-    np.testing.assert_array_equal(session.positions(session.lanes[1]), then[[0, 2]])
+    np.testing.assert_array_equal(session.positions(session.panes[1]), then[[0, 2]])
     session.undo()
-    np.testing.assert_array_equal(session.positions(session.lanes[1]), then)
+    np.testing.assert_array_equal(session.positions(session.panes[1]), then)
 
 
 @pytest.mark.parametrize(
@@ -330,14 +330,14 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
         lambda session: session.place(4, (1.0, 1.0)),
         lambda session: session.add_robot((1.0, 1.0), 2),
         lambda session: session.edit(replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"),
-        lambda session: session.set_limits(Limits(radius=2.5)),
+        lambda session: session.set_limits(TeamSpec(radius=2.5)),
     ],
 )
 def test_what_could_not_be_then_keeps_what_came_after(touch):
     session = stepped(begun(RAPF, LLOYD), 20)
-    for lane in session.lanes:
+    for pane in session.panes:
         for k in range(20):
-            lane.curve.add(k / 60, 2.0)
+            pane.curve.add(k / 60, 2.0)
     session.add_robot((3.0, 3.0))
     session.undo()
     session.redo()
@@ -373,24 +373,24 @@ def test_undo_is_of_the_present():
 def test_robots_that_differ_keep_what_is_theirs():
     """Under their numbers, whether they work, fail, or work again; new ones are as the first."""
     radius, speeds = np.array([0.1, 0.3, 0.2]), np.array([1.0, 0.3, 0.3])
-    limits = Limits.of(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
+    limits = TeamSpec.of(replace(Team.homogeneous(3), radius=radius, max_speed=speeds))
     session = begun(RAPF, robots=3, limits=limits)
-    team = session.lanes[0].simulation.team
+    team = session.panes[0].simulation.team
     assert team.radius.tolist() == radius.tolist()
-    positions = session.lanes[0].simulation.positions
+    positions = session.panes[0].simulation.positions
     apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))[np.triu_indices(3, 1)]
     assert apart.min() >= 0.6, "room for the largest"
     session.fail_robot(2)
-    assert session.lanes[0].simulation.team.radius.tolist() == [0.1, 0.2]
-    (wreck,) = session.lanes[0].circumstances.solid.obstacles[len(HALL.obstacles) :]
+    assert session.panes[0].simulation.team.radius.tolist() == [0.1, 0.2]
+    (wreck,) = session.panes[0].setup.solid.obstacles[len(HALL.obstacles) :]
     assert wreck.radius == 0.3
     session.revive_robot(2)
-    assert session.lanes[0].simulation.team.radius.tolist() == radius.tolist()
+    assert session.panes[0].simulation.team.radius.tolist() == radius.tolist()
     session.place(3, place_of(session, 2))
     gap = np.hypot(*np.subtract(place_of(session, 3), place_of(session, 2)))
     assert gap >= 0.5 - 1e-6
     session.add_robot((3.0, 2.0))
-    assert session.lanes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
+    assert session.panes[0].simulation.team.max_speed.tolist() == [1.0, 0.3, 0.3, 1.0]
     stepped(session, 3)
-    session.set_limits(Limits())
-    assert set(session.lanes[0].simulation.team.radius.tolist()) == {0.1}
+    session.set_limits(TeamSpec())
+    assert set(session.panes[0].simulation.team.radius.tolist()) == {0.1}

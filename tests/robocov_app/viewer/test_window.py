@@ -15,7 +15,7 @@ from touched_run import RAPF, begun
 
 from robocov_app.toolkit.settings import FOLDER
 from robocov_app.toolkit.window import show_compiling
-from robocov_app.viewer.opening import Opening
+from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.status import cursor_words
 
 # playing
@@ -54,7 +54,7 @@ def test_it_stops_when_the_team_has_settled(tmp_path: Path) -> None:
             if not driver.session.playing:
                 break
         assert driver.session.settled
-        assert driver.desk.message.startswith("settled at ")
+        assert driver.viewer.message.startswith("settled at ")
 
 
 def test_twice_the_speed_is_twice_the_time(driver: Driver) -> None:
@@ -71,12 +71,12 @@ def test_the_status_line_tells_of_the_place_under_the_cursor(tmp_path: Path) -> 
     with opened(tmp_path, lattice=48) as driver:
         driver.frames(3)
         driver.move(*driver.robot(2))
-        assert "robot 2" in cursor_words(driver.desk)
+        assert "robot 2" in cursor_words(driver.viewer)
         driver.move(*driver.pixel((4.2, 1.2)))
-        assert "not free" in cursor_words(driver.desk)
+        assert "not free" in cursor_words(driver.viewer)
         driver.post(pygame.WINDOWLEAVE)
         driver.settle()
-        assert cursor_words(driver.desk) == ""
+        assert cursor_words(driver.viewer) == ""
 
 
 def test_a_screenshot_is_what_is_in_the_window(driver: Driver, tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> Non
     driver.key("ctrl+e")
     driver.window.keeper.finish()
     driver.frames(2)
-    assert not driver.desk.trouble and "saved" in driver.desk.message
+    assert not driver.viewer.trouble and "saved" in driver.viewer.message
     (record,) = tmp_path.rglob("record.npz")
     assert record.parent != tmp_path
 
@@ -105,13 +105,13 @@ def test_a_run_is_saved_beside_the_window(driver: Driver, tmp_path: Path) -> Non
 def test_a_film_is_as_long_as_what_it_shows(driver: Driver, tmp_path: Path) -> None:
     driver.key("space")
     driver.key("f9")
-    assert driver.desk.filming
+    assert driver.viewer.filming
     driver.frames(60)
     resized(driver, (1000, 640))
     driver.frames(15)
     driver.key("f9")
     path = tmp_path / "robocov-1.mp4"
-    assert driver.desk.message.startswith(f"film saved: {path}") and not driver.desk.filming
+    assert driver.viewer.message.startswith(f"film saved: {path}") and not driver.viewer.filming
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
     assert seconds == pytest.approx(75 * FRAME, abs=0.15) and count == pytest.approx(45, abs=4)
     assert next(imageio_ffmpeg.read_frames(str(path)))["size"] == (900, 600)
@@ -131,10 +131,10 @@ def test_a_folder_that_is_none_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with opened(tmp_path / "file") as driver:
         for key in ("f12", "f9", "ctrl+s"):
-            driver.desk.trouble = False
+            driver.viewer.trouble = False
             driver.key(key)
-            assert driver.desk.trouble and driver.desk.message, key
-        assert driver.window.film is None and not driver.desk.filming
+            assert driver.viewer.trouble and driver.viewer.message, key
+        assert driver.window.film is None and not driver.viewer.filming
 
 
 # help, palette, theme, size
@@ -149,7 +149,7 @@ def test_the_keys_are_shown_and_go_with_a_key_or_a_click(key: str, driver: Drive
     assert not driver.window.help
     driver.key(key)
     driver.click(300, 300)
-    assert not driver.window.help and driver.desk.selected is None
+    assert not driver.window.help and driver.viewer.selected is None
 
 
 @pytest.mark.parametrize("key", ["/", "ctrl+k"])
@@ -182,7 +182,7 @@ def test_values_are_set_by_typing(driver: Driver) -> None:
     driver.key("ctrl+k")
     driver.type("k_rep 0.5")
     driver.key("return")
-    assert driver.session.lanes[0].law.value("k_rep") == 0.5
+    assert driver.session.panes[0].law.value("k_rep") == 0.5
     driver.key("ctrl+k")
     driver.type("robots 5")
     driver.key("enter")
@@ -235,7 +235,7 @@ def test_any_size_is_laid_out_and_can_be_used(size: tuple[int, int], panes: int,
         assert not driver.session.playing
         driver.turn("keep")
         driver.click(*driver.robot(1))
-        assert driver.desk.selected == 1
+        assert driver.viewer.selected == 1
         if size[0] >= 900:
             driver.turn("parameters")
             driver.push("reset:k_rep")
@@ -247,7 +247,7 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
         driver.wheel(740, 500, -3)
     driver.write("team.radius", "0.12")
     driver.key("return")
-    assert driver.session.lanes[0].circumstances.limits.radius == 0.12
+    assert driver.session.panes[0].setup.limits.radius == 0.12
     bar = driver.widget("bar", "parameters:rapf").rect
     driver.drag(bar.center, (bar.centerx, bar.centery - 200))
     assert driver.widget("entry", "team.radius").rect.height == 0
@@ -260,17 +260,17 @@ def test_a_page_that_is_too_long_is_scrolled_by_the_wheel_and_by_its_bar(driver:
 
 
 def test_the_lesson_is_played_and_ends_on_a_key(driver: Driver) -> None:
-    shown = set(driver.desk.shown)
+    shown = set(driver.viewer.shown)
     driver.key("f2")
-    assert driver.window.tour is not None and driver.desk.session.playing
+    assert driver.window.tour is not None and driver.viewer.session.playing
     driver.frames(5)
     driver.key("f12")
     driver.key("t")
     assert driver.window.tour is not None
     driver.key("escape")
-    assert driver.window.tour is None and driver.desk.shown == shown
-    assert driver.desk.session is driver.session
-    assert driver.desk.message == "the lesson has ended; what was before it is there again"
+    assert driver.window.tour is None and driver.viewer.shown == shown
+    assert driver.viewer.session is driver.session
+    assert driver.viewer.message == "the lesson has ended; what was before it is there again"
 
 
 def test_the_lesson_waits_while_the_arena_is_touched(driver: Driver) -> None:
@@ -294,7 +294,7 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
     (tmp_path / "settings/window.json").write_text('{"width": 1000, "height": 640}')
 
     def window():
-        return Opening(begun(), "hall", tmp_path, lattice=4).window()
+        return Launcher(begun(), "hall", tmp_path, lattice=4).window()
 
     with window() as first:
         driver = Driver(first)
@@ -308,8 +308,8 @@ def test_settings_are_written_and_read_again(tmp_path: Path, monkeypatch: pytest
     assert "cells" not in kept["shown"] and (kept["width"], kept["height"]) == (1000, 640)
     with window() as second:
         assert second.screen.get_size() == (1000, 640)
-        assert second.desk.theme == "dark" and second.desk.fade and second.panel.tab == "show"
-        assert "cells" not in second.desk.shown and "robots" in second.desk.shown
+        assert second.viewer.theme == "dark" and second.viewer.fade and second.panel.tab == "show"
+        assert "cells" not in second.viewer.shown and "robots" in second.viewer.shown
         second.close()
 
 

@@ -67,7 +67,7 @@ def test_the_keys_are_all_on_one_card(
 def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         before = pixels(driver.window.screen).copy()
-        driver.desk.say("many words " * 40, trouble=True)
+        driver.viewer.say("many words " * 40, trouble=True)
         driver.frames(1)
         after = pixels(driver.window.screen)
         rows, columns = np.nonzero((after != before).any(axis=2))
@@ -79,7 +79,7 @@ def test_a_long_message_is_broken_into_lines_that_stay_in_the_arena(tmp_path: Pa
 def test_a_long_report_is_scrolled_by_the_wheel_and_no_further_than_its_end(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         window = driver.window
-        driver.desk.hand.selected = 1
+        driver.viewer.hand.selected = 1
         window.panel.show_tab("robot")
         driver.session.playing = True
         driver.frames(30)

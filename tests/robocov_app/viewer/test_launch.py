@@ -20,7 +20,7 @@ from robocov_app.cli import main
 from robocov_app.commands.demo import Arguments, session_of
 from robocov_app.toolkit.settings import FOLDER
 from robocov_app.toolkit.window import display, fitting, screen_scale
-from robocov_app.viewer.opening import NO_DISPLAY, Opening
+from robocov_app.viewer.launch import NO_DISPLAY, Launcher
 
 SHORT = ("--lattice", "8", "--size", "900x600")
 
@@ -156,8 +156,8 @@ def test_the_options_are_what_the_session_begins_with() -> None:
         "rooms", ("rpf", "lloyd"), ("k_rep=2",), 4, "kitchen", 7, dt=0.05, radius=0.15, speed=2.0, paused=True
     )
     session = session_of(options)
-    assert [lane.law.name for lane in session.lanes] == ["rpf", "lloyd"]
-    assert session.lanes[0].law.value("k_rep") == 2.0
+    assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
+    assert session.panes[0].law.value("k_rep") == 2.0
     scenario = session.scenario
     assert (scenario.robots, scenario.start_name, scenario.seed, scenario.dt) == (4, "kitchen", 7, 0.05)
     assert scenario.limits.radius == 0.15 and session.clock.speed == 2.0 and not session.playing
@@ -182,8 +182,8 @@ def test_text_is_as_large_as_suits_the_screen(height: int, scale: float, monkeyp
 def test_settings_that_cannot_be_read_are_told_and_not_needed(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv(FOLDER, str(tmp_path))
     (tmp_path / "window.json").write_text("{ nonsense")
-    with Opening(begun(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
-        assert "default settings" in window.desk.message
+    with Launcher(begun(), "hall", tmp_path, lattice=4, size=(900, 600)).window() as window:
+        assert "default settings" in window.viewer.message
         window.close()
     assert '"theme": "light"' in (tmp_path / "window.json").read_text()
 
@@ -194,16 +194,16 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
     kept.write_text('{"width": 1000, "height": 700, "shown": ["cells", "robots"]}')
     asked = {"theme": "dark", "size": (900, 600), "scale": 2.0, "also": frozenset({"scan"})}
     asked["without"] = frozenset({"cells"})
-    with Opening(begun(), "hall", tmp_path, lattice=4, **asked).window() as window:
-        assert window.desk.shown == {"robots", "scan"} and window.desk.theme == "dark"
-        window.desk.shown.add("trails")
+    with Launcher(begun(), "hall", tmp_path, lattice=4, **asked).window() as window:
+        assert window.viewer.shown == {"robots", "scan"} and window.viewer.theme == "dark"
+        window.viewer.shown.add("trails")
     settings = json.loads(kept.read_text())
     assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
     assert settings["shown"] == ["cells", "robots", "trails"]
 
 
 def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
-    asked = Opening(
+    asked = Launcher(
         begun(),
         "hall",
         tmp_path,
@@ -213,5 +213,5 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
         without=frozenset({"cells"}),
     )
     with asked.window() as window:
-        assert "scan" in window.desk.shown and "cells" not in window.desk.shown
+        assert "scan" in window.viewer.shown and "cells" not in window.viewer.shown
         window.close()

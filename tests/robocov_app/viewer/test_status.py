@@ -1,0 +1,77 @@
+"""What the status line says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robocov.mapfile import load_map
+from robocov_app.viewer.costs import Costs
+from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.scenario import Scenario
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.status import cursor_words, facts
+
+
+@pytest.fixture
+def viewer() -> Presenter:
+    session = Session(Scenario(load_map("rooms")))
+    viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "rooms")
+    viewer.costs.ask(0, 0.0, session.panes[0].simulation.positions)
+    viewer.costs.poll()
+    return viewer
+
+
+def test_it_tells_time_cost_and_speed(viewer: Presenter) -> None:
+    said = facts(viewer, 60.0, 60.0, None)
+    assert said[0] == "t = 0.00 s"
+    assert said[1].startswith("J = ") and said[1].endswith(" m³")
+    assert said[-3:] == ["1×", "60 steps/s", "60 fps"]
+
+
+def test_an_old_cost_tells_its_time(viewer: Presenter) -> None:
+    for _ in range(60):
+        viewer.session.step()
+    assert facts(viewer, 60.0, 60.0, None)[1].endswith("(at 0.0 s)")
+
+
+def test_it_tells_of_pausing_filming_and_being_behind(viewer: Presenter) -> None:
+    viewer.session.playing = False
+    said = facts(viewer, 60.0, 0.0, 12.4)
+    assert said[0].startswith("paused · ")
+    assert "● film 12 s" in said
+    viewer.session.playing = True
+    viewer.session.clock.behind = True
+    assert "1×, really 0.5×" in facts(viewer, 60.0, 30.0, None)
+
+
+def test_the_cursor_tells_distance_robot_and_share(viewer: Presenter) -> None:
+    place = viewer.session.panes[0].simulation.positions[3] + np.array([0.1, 0.05])
+    viewer.cursor = float(place[0]), float(place[1])
+    words = cursor_words(viewer)
+    assert words.startswith(f"({place[0]:.2f}, {place[1]:.2f}) m: ")
+    assert "robot 4" in words and words.endswith("× the mean")
+
+
+def test_the_cursor_in_a_wall_or_outside_says_so(viewer: Presenter) -> None:
+    viewer.cursor = 1.0, 8.5  # in the block of the upper left corner
+    assert cursor_words(viewer).endswith(": not free")
+    viewer.cursor = -3.0, -3.0
+    assert cursor_words(viewer).endswith(": not free")
+    viewer.cursor = None
+    assert cursor_words(viewer) == ""
+
+
+def test_a_closed_room_is_told() -> None:
+    from robocov.environment import Environment, WallObstacle
+
+    closed = Environment("two", ((0, 0), (4, 0), (4, 2), (0, 2)), (WallObstacle(((2, 0), (2, 2)), 0.1),))
+    session = Session(Scenario(closed, robots=1, given=np.array([[1.0, 1.0]])))
+    viewer = Presenter(session, Costs(32, direct=True), set(), Path(), "two")
+    viewer.costs.ask(0, 0.0, session.panes[0].simulation.positions)
+    viewer.costs.poll()
+    viewer.cursor = 3.0, 1.0
+    assert cursor_words(viewer).endswith(": no robot can come")
+    assert any(fact.startswith("cut off ") for fact in facts(viewer, 60.0, 60.0, None))
