@@ -47,7 +47,7 @@ def test_a_wall_is_drawn_by_a_drag_too_and_snaps(tmp_path: Path) -> None:
         driver.drag_at((5.0, 0.02), (5.0, 5.98))
         (wall,) = driver.session.environment.obstacles
         assert wall.points == ((5.0, 0.0), (5.0, 6.0))
-        assert driver.desk.message.startswith("wall drawn; ")
+        assert driver.viewer.message.startswith("wall drawn; ")
         driver.drag_at((2.0, 3.0), (2.0, 3.01))  # a hand that shakes in a click
         assert driver.session.environment.obstacles == (wall,)
         driver.click_at((3.0, 3.0))
