@@ -17,7 +17,6 @@ from robocov_app.figures.files import check_figure_path, save_figure
 from robocov_app.figures.runs import plot_cost, plot_environment, plot_trajectories
 
 T = np.linspace(0.0, 60.0, 121)
-KINDS = ["png", "svg", "pdf"]
 CURVES = [("RAPF", "rapf", T, 1 + np.exp(-T / 10)), ("RPF", "rpf", T, 2 + np.exp(-T / 10))]
 
 
@@ -35,7 +34,7 @@ def streams_of(pdf: bytes) -> bytes:
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["png", "svg", pytest.param("pdf", marks=pytest.mark.slow)])
 class TestEveryKind:
     def test_the_same_plot_gives_the_same_bytes(self, tmp_path, kind):
         for name in ("a", "b"):

@@ -124,7 +124,9 @@ def test_the_legend_explains_what_is_shown():
     assert "Voronoi cell" not in words
 
 
-@pytest.mark.parametrize("size", [(900, 600), (480, 360), (1920, 1080)])
+@pytest.mark.parametrize(
+    "size", [(480, 360), *(pytest.param(size, marks=pytest.mark.slow) for size in ((900, 600), (1920, 1080)))]
+)
 @pytest.mark.parametrize("limit", [0.8, 8.0, 15.0, 2500.0])
 def test_the_scale_of_colours_stands_beside_the_map_and_is_whole(size, limit):
     _, what = scene(limit=limit)

@@ -89,7 +89,7 @@ def test_edges_of_cells_are_drawn_between_robots():
 def test_narrow_cells_have_plain_edges(n):
     frame, _ = drawn(scene_of(run_of(SQUARE, n)), "cells")
     colours = {LIGHT.background, LIGHT.cell_edge, *map(LIGHT.cell, range(len(LIGHT.robots)))}
-    assert (set(map(tuple, frame.reshape(-1, 3).tolist())) <= colours) == (n == 1000)
+    assert (set(map(tuple, np.unique(frame.reshape(-1, 3), axis=0).tolist())) <= colours) == (n == 1000)
 
 
 @pytest.mark.parametrize("environment", [ROOMS, HALL], ids=["rooms", "hall"])
