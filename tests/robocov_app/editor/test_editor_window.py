@@ -435,3 +435,8 @@ def test_a_window_that_nobody_touches_is_not_drawn_again(
         drawn.clear()
         hands.frames(1)
         assert drawn
+        hands.key("ctrl+k")  # what is asked does not move by itself
+        hands.frames(320)
+        drawn.clear()
+        hands.frames(20)
+        assert hands.window.dialogs.open and not drawn

@@ -94,27 +94,15 @@ class EditorWindow(BaseWindow):
         if self.trial is not None:
             return self.trial.look()
         editor, arena, ui = self.editor, self.arena, self.panel.ui
-        if ui.busy or ui.stale or editor.moves_since is not None or self.dialogs.open:
+        importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
+        if ui.stale or editor.moves_since is not None or importing:
             return None
         return (
-            *(
-                editor.version,
-                editor.message,
-                editor.trouble,
-                editor.typed,
-                editor.readings.busy,
-                editor.problem,
-            ),
-            *(
-                editor.sketch,
-                editor.selection,
-                editor.measurement,
-                editor.tool,
-                editor.cursor,
-                frozenset(editor.shown),
-            ),
-            *(arena.team, arena.camera, arena.hovered, self.help),
-            *(self._arranged, self._caption, editor.grid, frozenset(editor.snaps)),
+            *(editor.version, editor.message, editor.trouble, editor.typed, editor.readings.busy),
+            *(editor.problem, editor.sketch, editor.selection, editor.measurement, editor.tool),
+            *(editor.cursor, frozenset(editor.shown), editor.grid, frozenset(editor.snaps)),
+            *(arena.team, arena.camera, arena.hovered, self.help, id(editor.asked)),
+            *(self._arranged, self._caption),
         )
 
     def update(self, seconds: float) -> None:
