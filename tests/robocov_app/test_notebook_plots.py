@@ -83,6 +83,7 @@ class TestAxes:
         ours.plot([1, 2], [1, 2], color="k")
         figure.savefig(io.BytesIO(), format="svg")
 
+    @pytest.mark.slow
     def test_axes_of_a_part_of_a_figure_and_of_a_kind_of_ones_own(self, thing):
         class Mine(Axes):
             name = "mine"

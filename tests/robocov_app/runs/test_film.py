@@ -101,6 +101,7 @@ class TestFrames:
         twice = pane_layout([with_goals, with_goals], FilmOptions()).header
         assert (twice == both).all()
 
+    @pytest.mark.slow
     def test_trajectories_have_the_colours_asked_for(self):
         record = run_of(ROOMS, 4)
         reds = []
