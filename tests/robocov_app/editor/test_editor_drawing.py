@@ -271,3 +271,17 @@ def test_two_points_for_a_picture_that_is_not_there(hands: Hands) -> None:
     hands.key("i")
     hands.click_all((2, 2))
     assert hands.editor.trouble and "no picture" in hands.said
+
+
+def test_a_map_is_made_level_along_a_line_that_was_measured(hands: Hands) -> None:
+    hands.key("w")
+    hands.drag_at((1, 1), (2, 1), (5, 2.5))
+    hands.command("level")
+    assert hands.editor.trouble and "two clicks" in hands.said
+    hands.key("m")
+    hands.click_all((1, 1), (5, 2.5))
+    hands.command("level")
+    assert hands.said == "map turned by -20.56°"
+    (_, ay), (bx, by) = hands.shapes[0].points
+    assert ay == by == 1 and bx == pytest.approx(1 + 18.25**0.5, abs=1e-4)
+    assert hands.editor.tool.preview(hands.editor) is None

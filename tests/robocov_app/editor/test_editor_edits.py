@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import affinity
 
+from robocov.density import Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
 from robocov.environment import (
     CircleObstacle,
     DiscStart,
+    ObstaclePath,
     PointsStart,
     PolygonObstacle,
     UniformStart,
@@ -426,3 +428,37 @@ def test_factors_of_maps():
     assert Affine.stretch(-2.0, 2.0, (0.0, 0.0)).factor == pytest.approx(2.0)
     assert Affine.stretch(2.0, 1.0, (0.0, 0.0)).factor is None
     assert Affine(1.0, 0.5, 0.0, 1.0).factor is None
+
+
+def test_a_tilted_scan_is_made_level_by_two_points_on_a_wall():
+    path = ObstaclePath(((6.0, 4.0), (8.0, 4.0)), 0.5)
+    level, keys = Sketch(boundary=HALL, starts=(("a", DiscStart((1.0, 1.0), 0.5)),)).added(
+        [WallObstacle(((2.0, 3.0), (5.0, 3.0)), 0.1), CircleObstacle((6.0, 4.0), 0.5, None, path)]
+    )
+    peaks = (Gaussian((2.0, 2.0), 3.0, covariance=((4.0, 1.0), (1.0, 1.0))), Gaussian((3.0, 1.0), 1.0, 0.5))
+    picture = Background("scan.png", (100, 80), 0.1)
+    level = replace(level, density=Gaussians(peaks), background=picture)
+    everything = replace(Selection.of(*keys, "a"), boundary=True)
+    tilted = transform.rotated(level, everything, 7.0, (0.0, 0.0)).sketch
+    assert transform.levelled(level, (2.0, 3.0), (5.0, 3.0)).sketch == level
+    change = transform.levelled(tilted, *tilted.item(keys[0]).shape.points)
+    after = change.sketch
+    assert change.words == "map turned by -7.00°"
+    (ax, ay), (bx, by) = after.item(keys[0]).shape.points
+    assert (bx - ax, by - ay) == pytest.approx((3.0, 0.0), abs=3e-4)
+    for was, now in zip(level.boundary, after.boundary, strict=True):
+        assert (now[0] - ax + 2.0, now[1] - ay + 3.0) == pytest.approx(was, abs=1e-3)
+    assert after.item(keys[1]).shape.path.points[1][1] == pytest.approx(ay + 1.0, abs=1e-3)
+    assert after.background.turn == pytest.approx(-7.0, abs=0.01)
+    turned, round_one = after.density.peaks
+    assert np.linalg.eigvalsh(turned.covariance) == pytest.approx(np.linalg.eigvalsh(peaks[0].covariance))
+    assert turned.covariance != peaks[0].covariance and round_one.sigma == 0.5
+    apart = np.subtract(turned.center, round_one.center)
+    assert np.hypot(*apart) == pytest.approx(np.hypot(1.0, 1.0), abs=1e-3)
+    areas = WeightedPolygons((WeightedArea(((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)), 2.0),), 1.0)
+    upright = transform.levelled(replace(level, density=areas), (0.0, 0.0), (-0.1, 1.0)).sketch
+    assert upright.density.areas[0].vertices[0] == pytest.approx((1.0945, 0.8955), abs=2e-4)
+    with pytest.raises(MapError, match="cannot be turned"):
+        transform.levelled(replace(level, density=Raster(np.eye(3), (0, 0, 9, 9))), (0.0, 0.0), (3.0, 1.0))
+    with pytest.raises(MapError, match="apart"):
+        transform.levelled(level, (1.0, 1.0), (1.0, 1.0))

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from robocov.arrays import Array
+from robocov.density import Density, Gaussians, WeightedPolygons
 from robocov.environment import (
     CircleObstacle,
     DiscStart,
@@ -26,7 +27,8 @@ from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import free_name
 from robocov_app.editor.edits.vertices import with_places
-from robocov_app.editor.model.geometry import cos_sin, ring_near, rounded, tenths
+from robocov_app.editor.model.background import turned
+from robocov_app.editor.model.geometry import angle_to_level, cos_sin, ring_near, rounded, tenths
 from robocov_app.editor.model.selection import Change, Selection, place_of, ring_points
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
@@ -291,6 +293,43 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
         by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
         low += box[a + 2] - box[a] + gap
     return Change(_each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
+
+
+def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
+    """Turn the whole map about `a` so that the line to `b` becomes level or upright, as of a tilted scan.
+
+    Picture and density turn with it; a density that is a raster is refused.
+    """
+    if math.dist(a, b) < SMALLEST:
+        raise MapError("two points that are apart were wanted")
+    degrees = angle_to_level(a, b)
+    affine = Affine.turn(degrees, a)
+    everything = Selection.of(BOUNDARY, *sketch.places, *dict(sketch.starts)).within(sketch)
+    picture = None if sketch.background is None else turned(sketch.background, degrees, a)
+    after = replace(_placed(sketch, everything, affine), background=picture)
+    after = replace(after, density=_turned_density(sketch.density, affine))
+    return Change(after, Selection(), f"map turned by {degrees:.2f}°")
+
+
+def _turned_density(density: Density | None, affine: Affine) -> Density | None:
+    if isinstance(density, Gaussians):
+        matrix = np.array([[affine.xx, affine.xy], [affine.yx, affine.yy]])
+        peaks = []
+        for peak in density.peaks:
+            if peak.covariance is not None:
+                (p, q), (_, r) = (matrix @ np.array(peak.covariance) @ matrix.T).tolist()
+                peak = replace(peak, covariance=((p, q), (q, r)))
+            peaks.append(replace(peak, center=affine.point(peak.center)))
+        return replace(density, peaks=tuple(peaks))
+    if isinstance(density, WeightedPolygons):
+        areas = tuple(
+            replace(area, vertices=affine.ring(area.vertices), holes=tuple(map(affine.ring, area.holes)))
+            for area in density.areas
+        )
+        return replace(density, areas=areas)
+    if density is None or density.uniform:
+        return density
+    raise MapError(f"a density that is a {density.kind} cannot be turned: “density none” takes it away first")
 
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from robocov.environment import Point
 from robocov.errors import MapError
-from robocov_app.editor.model.geometry import cos_sin
+from robocov_app.editor.model.geometry import angle_to_level, cos_sin
 
 MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
 
@@ -97,12 +97,15 @@ def to_scale(background: Background, a: Point, b: Point, metres: float) -> Backg
 def levelled(background: Background, a: Point, b: Point) -> Background:
     """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
     _require_apart(background, math.dist(a, b))
-    angle = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
-    cos, sin = cos_sin(90.0 * round(angle / 90.0) - angle)
-    dx, dy = background.corner[0] - a[0], background.corner[1] - a[1]
-    corner = a[0] + cos * dx - sin * dy, a[1] + sin * dx + cos * dy
-    turn = math.remainder(background.turn + 90.0 * round(angle / 90.0) - angle, 360.0)
-    return replace(background, corner=corner, turn=turn)
+    return turned(background, angle_to_level(a, b), a)
+
+
+def turned(background: Background, degrees: float, about: Point) -> Background:
+    """Return the picture turned counter-clockwise about a place, m."""
+    cos, sin = cos_sin(degrees)
+    dx, dy = background.corner[0] - about[0], background.corner[1] - about[1]
+    corner = about[0] + cos * dx - sin * dy, about[1] + sin * dx + cos * dy
+    return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
 
 
 def _require_apart(background: Background, apart: float) -> None:

@@ -89,6 +89,16 @@ def cos_sin(degrees: float) -> tuple[float, float]:
     return math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
 
 
+def angle_to_level(a: Point, b: Point) -> float:
+    """Return by how many degrees a line has to be turned to be level or upright, whichever is nearer.
+
+    >>> angle_to_level((1.0, 1.0), (1.0, 3.0)), angle_to_level((0.0, 0.0), (1.0, 1.0))
+    (0.0, -45.0)
+    """
+    angle = math.degrees(math.atan2(b[1] - a[1], b[0] - a[0]))
+    return 90.0 * round(angle / 90.0) - angle
+
+
 def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
     """Return the polygons of a valid geometry, the largest first, with their holes.
 

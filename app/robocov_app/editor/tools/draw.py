@@ -178,12 +178,17 @@ class MeasureTool(DrawTool):
 
     name = "measure"
     title = "Measure"
-    hint = "click points, or drag from one place to another; Esc takes the tape away"
+    hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
 
     def __init__(self) -> None:
         super().__init__()
         self._kept: tuple[Point, ...] = ()
+
+    @property
+    def measured(self) -> tuple[Point, ...]:
+        """The points of the tape."""
+        return tuple(self.points) or self._kept
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
         self._kept = ()

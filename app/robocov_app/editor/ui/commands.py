@@ -25,6 +25,7 @@ from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, 
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.draw import MeasureTool
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
 from robocov_app.toolkit.command import Command, Takes, parted
@@ -132,6 +133,16 @@ def paste(editor: Editor, at: Point | None) -> None:
         raise MapError("the clipboard is empty")
     grid = editor.grid if "grid" in editor.snaps else None
     editor.change(pasted(editor.sketch, text, at, grid))
+
+
+def level(editor: Editor) -> None:
+    """Turn the whole map so that the line that was measured is level or upright."""
+    tape = editor.tools["measure"]
+    assert isinstance(tape, MeasureTool)
+    if len(tape.measured) != 2:
+        raise MapError("measure along a wall first: the tool Measure, two clicks")
+    editor.change(transform.levelled(editor.sketch, *tape.measured))
+    tape.cancel(editor)
 
 
 def nudge(x: int, y: int) -> Callable[[Editor], None]:
@@ -491,6 +502,7 @@ _ROWS: dict[str, tuple[Row, ...]] = {
     "Arrange": (
         Row("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0), repeats=True),
         Row("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0), repeats=True),
+        Row("level", "Level: turn the map so that the measured line is level or upright", "", level),
         Row("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
         Row("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
         Row("align:left", "Align left sides", "alt+left", edited(transform.aligned, "left", single=True)),
