@@ -35,8 +35,8 @@ def picture(theme: str, name: str) -> None:
     )
     session.clock.speed = 2.0
     also = frozenset({"force_attraction", "force_repulsion_obstacle", "force_repulsion_robots"})
-    opening = Launcher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
-    with opening.window() as window:
+    launcher = Launcher(session, "rooms", HERE, theme=theme, size=SIZE, also=also, headless=True)
+    with launcher.window() as window:
         for frame in range(12 * HEADLESS_FPS):
             if frame == 6 * HEADLESS_FPS:
                 session.fail_robot(5)
@@ -54,8 +54,8 @@ def editor(theme: str, name: str) -> None:
     """Draw a show-case into a museum, and drag it until it is in line with the others."""
     path = map_file("museum")
     with EditorLauncher(path, HERE, theme=theme, size=SIZE, headless=True).window() as window:
-        viewer = window.viewer
-        viewer.change(rectangle_drawn(viewer.sketch, (15.6, 7.0), (17.9, 7.6)))
+        editor = window.editor
+        editor.change(rectangle_drawn(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
         window.frame(0.5)
         to = window.arena.to_pixel
@@ -86,8 +86,8 @@ def film(name: str) -> None:
         *("-movflags", "+faststart", str(HERE / name)),
     ]
     session = Session(Scenario(load_map("rooms")))
-    opening = Launcher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
-    with opening.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
+    launcher = Launcher(session, "rooms", HERE, theme="light", size=SIZE, headless=True)
+    with launcher.window() as window, subprocess.Popen(command, stdin=subprocess.PIPE) as encoder:
         assert encoder.stdin is not None
         window.do("tour")
         assert window.tour is not None
