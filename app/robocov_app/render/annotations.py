@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
 
 import numpy as np
@@ -19,22 +19,34 @@ MARGIN = 14.0
 EDGE = MARGIN + 2.0
 LEGEND_ROW = 22.0
 STRIP = 34.0
+_SMALL = 240.0
 _GLYPH = 28.0
 _GAP = 18.0  # pixels at scale 1
 
 
+def is_small(height: float, scale: float, shown: Set[str]) -> bool:
+    """Return whether a pane is too low for a strip at its foot; its scale bar stands in the caption."""
+    return "caption" in shown and height < _SMALL * scale
+
+
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
     """Draw a bar of a round length at the foot of a canvas, with its length."""
+    height = canvas.surface.get_height()
+    if not is_small(height, canvas.scale, canvas.shown):
+        _draw_bar(canvas, EDGE * canvas.scale, height - 0.5 * STRIP * canvas.scale)
+
+
+def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
+    """Draw a bar of a round length, with its length, and return how wide both are, px."""
     length = bar_length(canvas)
     pixels = length * canvas.camera.zoom
-    left = EDGE * canvas.scale
-    y = canvas.surface.get_height() - 0.5 * STRIP * canvas.scale
     tick, width = 4.0 * canvas.scale, canvas.width(1.5)
     ink = canvas.theme.ink
     for x in (left, left + pixels):
         canvas.surface.fill(ink, (round(x - width / 2), round(y - tick), width, round(2 * tick)))
     canvas.surface.fill(ink, (round(left), round(y - width / 2), round(pixels), width))
-    canvas.text(length_label(length), (left + pixels + 8 * canvas.scale, y), bold=True)
+    space = pixels + 8 * canvas.scale
+    return space + canvas.text(length_label(length), (left + space, y), bold=True)
 
 
 def bar_length(canvas: Canvas) -> float:
@@ -54,6 +66,15 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     room = right - left - gap - canvas.text_width(costs[-1])
     name = shortened(scene.label, canvas.text_size(size), room, bold=True)
     left += canvas.text(name, (left, y), size=size, bold=True) + gap
+    if "scale_bar" in canvas.shown and is_small(canvas.surface.get_height(), canvas.scale, canvas.shown):
+        _draw_bar(canvas, left, y)
+        bar = bar_length(canvas)
+        left += (
+            bar * canvas.camera.zoom
+            + canvas.text_width(length_label(bar), bold=True)
+            + 8 * canvas.scale
+            + gap
+        )
     cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
     canvas.text(cost, (right, y), anchor="right")
 

@@ -24,6 +24,7 @@ from robocov_app.render.annotations import (
     draw_caption,
     draw_scale_bar,
     draw_status,
+    is_small,
     legend_rows,
 )
 from robocov_app.render.camera import Camera
@@ -232,7 +233,8 @@ class Painter:
         top = MARGIN * self.scale
         if rows:
             top = (6 + LEGEND_ROW * rows + 6) * self.scale
-        below = bool({"scale_bar", "status"} & self.visible)
+        small = is_small(height, self.scale, self.visible)
+        below = bool({"scale_bar", "status"} & self.visible) and not small
         bottom = (STRIP if below else MARGIN) * self.scale
         view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
         if self._camera is None or self._follows:

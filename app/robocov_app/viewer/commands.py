@@ -135,7 +135,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("forward:second", "On by a second", lambda: look_on(1.0), "shift+right", REPEATS),
             Row("first", "To the beginning", lambda: viewer.look_at(0.0), "home"),
             Row("live", "To the present", lambda: viewer.session.look_at(viewer.session.end), "end"),
-            Row("branch:here", "Go on from the moment that is shown", viewer.branch, "b"),
+            Row("branch:here", "Go on from the moment shown", viewer.branch, "b"),
             Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
             taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
@@ -161,7 +161,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row(
                 "robot:previous", "Ask the previous robot", lambda: viewer.ask_next(-1), "shift+tab", REPEATS
             ),
-            Row("robot:fail", "Let the robot that is asked fail, or revive it", fail, "shift+d"),
+            Row("robot:fail", "Fail or revive the robot asked", fail, "shift+d"),
             Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
             Row("finish", "Finish what is being drawn", finish, "return, enter"),
             Row("cancel", "Give up; close", viewer.cancel, "escape"),
@@ -173,7 +173,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             "View",
             Row("theme", "Light or dark", viewer.switch_theme, "t"),
             Row("fade", "Trajectories fade", viewer.switch_fade, "shift+t"),
-            Row("suggestions", "Suggestions once the team has settled", viewer.switch_suggestions, "shift+h"),
+            Row("suggestions", "Suggestions when settled", viewer.switch_suggestions, "shift+h"),
             Row("panel", "Hide or show the panel", viewer.switch_panel, "h"),
         ),
         *grouped(

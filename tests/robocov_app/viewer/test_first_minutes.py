@@ -86,6 +86,15 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
             assert any(value in each for each in words), (size, boxes)
         columns = len({left for left, *_ in boxes})
         assert columns == {900: 2, 1280: 2, 1600: 4, 2560: 2}[size[0]]
+        low, high = (
+            driver.window.canvas.to_pixel((0.0, y), 0)[1]
+            for y in driver.session.environment.region.bounds[1::2]
+        )
+        across = (
+            driver.window.canvas.to_pixel((1.0, 0.0), 0)[0] - driver.window.canvas.to_pixel((0.0, 0.0), 0)[0]
+        )
+        bounds = driver.session.environment.region.bounds
+        assert low - high > 0.65 * boxes[0][3] or across * (bounds[2] - bounds[0]) > 0.85 * boxes[0][2]
         (left, _, width, _), scale = driver.window.layout.chart, driver.window.layout.scale
         room = left + width - driver.window.chart._span[1] - 9 * scale
         name = max((pane.law.label for pane in driver.session.panes), key=len)
