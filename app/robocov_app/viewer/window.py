@@ -337,13 +337,23 @@ class Window(BaseWindow):
         self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
-        """Ask who is here for the first time whether to begin with the lesson."""
+        """Ask who is here for the first time whether to begin with the lesson; until then the team waits."""
+        session = self.viewer.session
+        playing, session.playing = session.playing, False
+
+        def go_on() -> None:
+            session.playing = playing
+
+        def begin_lesson() -> None:
+            go_on()
+            self._start_tour()
+
         words = (
             "A team of robots spreads over a map that it does not know. The lesson shows what holds it back "
             "and what helps, in a few minutes; it is also there later, by F2."
         )
-        answers = [Answer("Lesson 1", self._start_tour), Answer("Just let me play", key="escape")]
-        self.dialogs.ask(Question("Welcome to robocov", words, answers))
+        answers = [Answer("Lesson 1", begin_lesson), Answer("Just let me play", go_on)]
+        self.dialogs.ask(Question("Welcome to robocov", words, answers, go_on))
 
     def _toggle_help(self) -> None:
         self.help = not self.help

@@ -145,17 +145,22 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
 ) -> None:
     for chosen, lesson in (("return", True), ("escape", False)):
         folder = tmp_path / chosen
-        with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
+        launcher = opened_for_a_person(monkeypatch, folder, offers_lesson=True)
+        launcher.session.playing = True
+        with launcher.window() as window:
             assert isinstance(window.dialogs.asked, Question)
             assert [answer.text for answer in window.dialogs.asked.answers] == [
                 "Lesson 1",
                 "Just let me play",
             ]
-            window.frame(0.0)
+            window.frame(0.5)
+            assert window.viewer.session.time == 0.0  # nobody looks at the team yet
             key = pygame.K_RETURN if chosen == "return" else pygame.K_ESCAPE
             pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
             window.frame(0.0)
             assert window.dialogs.asked is None and (window.tour is not None) is lesson
+            window.frame(0.5)
+            assert window.viewer.session.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.asked is None
 
