@@ -133,9 +133,8 @@ def gain_parameters(law: ControllerChoice) -> list[Parameter | Pick]:
 def limit_parameters(limits: TeamSpec) -> list[Parameter]:
     """Return a slider for each limit of the team; what it sets, it sets for all robots."""
     usual, found = TeamSpec(), []
-    mixed = {name for name, _ in limits.different}
     for name, (label, meaning, (low, high)) in _LIMITS.items():
-        if name in mixed:
+        if name in limits.different:
             label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
         value, default = (_finite(getattr(each, name)) for each in (limits, usual))
         ranged = name.endswith("_range")
@@ -150,7 +149,7 @@ def with_limit(limits: TeamSpec, name: str, value: float | None) -> TeamSpec:
     name = name.removeprefix("team.")
     number = math.inf if value is None else value
     # set for all: what robots had of their own is gone
-    different = tuple(each for each in limits.different if each[0] != name)
+    different = {each: values for each, values in limits.different.items() if each != name}
     return replace(limits, **{name: number}, different=different)
 
 

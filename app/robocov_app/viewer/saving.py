@@ -113,7 +113,7 @@ def own_controllers(document: Document) -> list[str]:
     """Return the names of the controllers of a session that are the user's own."""
     names: dict[str, None] = {}
     for node in document.nodes:
-        for _, change in node.changes:
+        for change in node.changes:
             if isinstance(change, Restart):
                 names |= dict.fromkeys(law.name for law in change.scenario.laws)
             elif isinstance(change, SetController):

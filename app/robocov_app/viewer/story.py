@@ -76,8 +76,8 @@ def retold(document: Document, node: Node, end: int) -> Iterator[tuple[Lockstep,
 
 
 def _apply(run: Lockstep, node: Node) -> None:
-    for step, change in node.changes:
-        if step == run.step and not isinstance(change, Restart):
+    for change in node.changes:
+        if change.step == run.step and not isinstance(change, Restart):
             run.apply(change)
 
 
@@ -122,7 +122,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
         for pane in run.panes:
             part.recorders[pane.number].add(pane.simulation.snapshot)
         held = {run.hand[0]} if run.hand is not None else set()
-        held |= {each.robot for step, each in here.changes if step == run.step and isinstance(each, Place)}
+        held |= {each.robot for each in here.changes if each.step == run.step and isinstance(each, Place)}
         for robot in held:
             last = next((each for each in part.touched if each[2] == robot and each[1] >= run.step - 1), None)
             if last is None:

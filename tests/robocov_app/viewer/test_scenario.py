@@ -108,7 +108,7 @@ class TestLimits:
         assert equal.team(3).mass.tolist() == [2.0, 1.0, 1.0]
         assert [each.label for each in limit_parameters(limits) if "≠" in each.label] == ["radius ≠"]
         with pytest.raises(ParameterError, match="radius"):
-            replace(limits, different=(("radius", ((1, -1.0),)),)).team(1)
+            replace(limits, different={"radius": {1: -1.0}}).team(1)
 
     def test_they_are_the_papers_by_default(self):
         assert TeamSpec.of(Team.homogeneous(2)) == TeamSpec()

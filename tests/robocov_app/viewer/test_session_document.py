@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from touched_run import HALL, LLOYD, RAPF, begun, positions_of, stepped, with_curves
 
 from robocov.conditions import Conditions, Failure, Join
+from robocov.density import Gaussian, Gaussians
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import InputError, MapError, RobocovError
 from robocov.mapfile import load_map
@@ -156,6 +157,16 @@ def test_all_of_a_gesture_while_paused_is_kept() -> None:
     stepped(session, 20)
     for mine, theirs in zip(positions_of(again(session)), positions_of(session), strict=True):
         np.testing.assert_array_equal(mine, theirs)
+
+
+def test_any_density_is_in_the_file_and_out_of_it() -> None:
+    session = stepped(begun(RAPF), 5)
+    for density in (Gaussians((Gaussian((2.0, 2.0), 0.5, 3.0),), 0.2), None):
+        session.set_density(replace(HALL, density=density), "density changed")
+        stepped(session, 5)
+        twin = again(session)
+        assert twin.environment.density == density
+        np.testing.assert_array_equal(positions_of(twin)[0], positions_of(session)[0])
 
 
 def test_limits_hold_for_controllers_without_memory_also_when_a_moment_is_resumed() -> None:

@@ -1,49 +1,121 @@
-"""Atomic changes of a session: what a touch consists of, and what each does to a pane.
+"""Atomic changes of a session: what a touch consists of, as files have it, and what each does to a pane.
 
-A change is a value that can be written to a file. Those of panes say how one is to go on; `Lockstep` carries
-them out in all panes or in none. Robots that do not fit where they are wanted go as near as they fit.
+Those of panes say how one is to go on; `Lockstep` carries them out in all panes or in none. Robots that do
+not fit where they are wanted go as near as they fit.
 """
 
 from __future__ import annotations
 
 from bisect import bisect
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from pydantic import ConfigDict, Field, WrapValidator
 
 from robocov.density import Density
 from robocov.environment import Environment, Obstacle, Point
-from robocov.errors import ParameterError
+from robocov.errors import MapError, ParameterError, RobocovError
+from robocov.mapfile import density_of, to_json
+from robocov.mapfile.models import DensityModel, ObstacleModel, plain
 from robocov.world.relocation import nearest_free
 from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import painted, with_obstacles
 from robocov_app.viewer.session.pane import Continuation, Pane
-from robocov_app.viewer.session.scenario import MOST_ROBOTS, ControllerChoice, Scenario, TeamSpec
+from robocov_app.viewer.session.scenario import (
+    MOST_ROBOTS,
+    Law,
+    Limits,
+    Position,
+    Scenario,
+    read_as,
+    refused,
+)
+
+Robot: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=1_000_000, description="Number of a robot")]
+_Pane: TypeAlias = Annotated[int, Field(strict=True, ge=0, le=100, description="Number of a pane")]
+_Count: TypeAlias = Annotated[int, Field(strict=True, ge=0)]
+Step: TypeAlias = Annotated[
+    int, Field(strict=True, ge=0, le=100_000_000, description="Control steps since time 0")
+]
+_OBSTACLES = read_as(
+    list[ObstacleModel],
+    lambda models, _: tuple(model.built() for model in models),
+    lambda obstacles, _: [plain(each) for each in obstacles],
+)
+
+
+def _density_of(model: Any, context: Any) -> Density | None:
+    if model is None:
+        return None
+    boundary = context.environment(0).boundary
+    return density_of(model.model_dump(exclude_none=True, warnings=False), boundary, context.where)
+
+
+def _density_json(density: Density | None, context: object = None) -> object:
+    """Return a density as maps have it."""
+    square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
+    return to_json(square.with_density(density)).get("density")
+
+
+_DENSITY = read_as(DensityModel | None, _density_of, _density_json)
+
+
+def _begun(value: object, read: Any) -> Scenario:
+    """Return a scenario of a file; what cannot be begun is told with its place."""
+    try:
+        scenario: Scenario = read(value)
+    except MapError:
+        raise
+    except RobocovError as error:
+        raise refused(error) from None
+    return scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Change:
+    """`step`: at which it is made; -1 before that. `do`: what it is called in files.
+
+    `of` tells how a pane goes on then, `on` what becomes of the map; an error says why that cannot be.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="forbid", validate_default=True)
+
+    step: Step = -1
+    do: str
 
 
 @dataclass(frozen=True)
-class Drag:
+class OfRobot(_Change):
+    """What is done to a robot."""
+
+    robot: Robot
+
+
+@dataclass(frozen=True)
+class Drag(OfRobot):
     """The hand holds a robot and pulls it towards a point, m, by a spring."""
 
-    robot: int
-    to: Point
+    to: Position
+    do: Literal["drag"] = field(default="drag", kw_only=True)
 
 
 @dataclass(frozen=True)
-class Release:
+class Release(_Change):
     """The hand lets go; a robot that was swung flies on."""
 
+    do: Literal["release"] = field(default="release", kw_only=True)
+
 
 @dataclass(frozen=True)
-class Place:
+class Place(OfRobot):
     """Put a robot, working or failed, at a point, m."""
 
-    robot: int
-    at: Point
+    at: Position
+    do: Literal["place"] = field(default="place", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         setup, row = pane.setup, _row(pane, self.robot)
         if row is None:
             others, radii = pane.simulation.positions, pane.simulation.team.radius
@@ -57,14 +129,13 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Join:
+class Join(OfRobot):
     """One robot more, at rest at a point, m."""
 
-    robot: int
-    at: Point
+    at: Position
+    do: Literal["join"] = field(default="join", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         there = _there(pane)
         if len(there) >= MOST_ROBOTS:
             raise ParameterError(f"there are {MOST_ROBOTS} robots already")
@@ -74,26 +145,24 @@ class Join:
 
 
 @dataclass(frozen=True)
-class Leave:
+class Leave(OfRobot):
     """Take a robot out, whether it works or not."""
 
-    robot: int
+    do: Literal["leave"] = field(default="leave", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         _row(pane, self.robot)
         _need_another(pane, self.robot)
         return _without_robot(pane, self.robot)
 
 
 @dataclass(frozen=True)
-class Fail:
+class Fail(OfRobot):
     """A robot stops where it is, and is not heard any more; the others sense it as they do any obstacle."""
 
-    robot: int
+    do: Literal["fail"] = field(default="fail", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         row = _row(pane, self.robot)
         if row is None:
             raise ParameterError(f"robot {self.robot} has failed already")
@@ -105,13 +174,12 @@ class Fail:
 
 
 @dataclass(frozen=True)
-class Revive:
+class Revive(OfRobot):
     """A robot that failed works again, where it stands or as near as it fits."""
 
-    robot: int
+    do: Literal["revive"] = field(default="revive", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         if _row(pane, self.robot) is not None:
             raise ParameterError(f"robot {self.robot} works")
         setup = pane.setup
@@ -119,15 +187,15 @@ class Revive:
 
 
 @dataclass(frozen=True)
-class EditObstacles:
+class EditObstacles(_Change):
     """Obstacles number `first` to `first + removed - 1` are replaced by others."""
 
-    first: int
-    removed: int
-    added: tuple[Obstacle, ...]
+    first: _Count
+    removed: _Count
+    added: Annotated[tuple[Obstacle, ...], _OBSTACLES]
+    do: Literal["obstacles"] = field(default="obstacles", kw_only=True)
 
     def on(self, environment: Environment) -> Environment:
-        """Return the changed map, without starts that are covered; MapError where it breaks a rule."""
         there = environment.obstacles
         return with_obstacles(
             environment, (*there[: self.first], *self.added, *there[self.first + self.removed :])
@@ -135,65 +203,67 @@ class EditObstacles:
 
 
 @dataclass(frozen=True)
-class Paint:
+class Paint(_Change):
     """Dabs of a brush of `radius`, m, that raise the density, or lower it."""
 
-    dabs: tuple[Point, ...]
-    radius: float
-    lowers: bool
+    dabs: tuple[Position, ...]
+    radius: Annotated[float, Field(strict=True, gt=0, le=1e6)]
+    lowers: Annotated[bool, Field(strict=True)]
+    do: Literal["paint"] = field(default="paint", kw_only=True)
 
     def on(self, environment: Environment) -> Environment:
-        """Return the map with the density that it has then."""
         return environment.with_density(painted(environment, self.dabs, self.radius, lowers=self.lowers))
 
 
 @dataclass(frozen=True, eq=False)
-class SetDensity:
+class SetDensity(_Change):
     """Places count by another density; None: all the same."""
 
-    density: Density | None
+    density: Annotated[Density | None, _DENSITY]
+    do: Literal["density"] = field(default="density", kw_only=True)
 
     def on(self, environment: Environment) -> Environment:
-        """Return the map with that density."""
         return environment.with_density(self.density)
 
 
 @dataclass(frozen=True)
-class SetController:
+class SetController(_Change):
     """Another controller, or other gains, take over in a pane."""
 
-    pane: int
-    law: ControllerChoice
+    pane: _Pane
+    law: Annotated[Law, Field(alias="controller")]
+    do: Literal["controller"] = field(default="controller", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         setup = pane.setup
         return Continuation(replace(setup, law=self.law) if pane.number == self.pane else setup)
 
 
 @dataclass(frozen=True)
-class SetLimits:
+class SetLimits(_Change):
     """All robots are, and can do, something else."""
 
-    limits: TeamSpec
+    limits: Annotated[Limits, Field(alias="team")]
+    do: Literal["team"] = field(default="team", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        """Return how a pane goes on."""
         return Continuation(replace(pane.setup, limits=self.limits))
 
 
 @dataclass(frozen=True)
-class RemovePane:
+class RemovePane(_Change):
     """A pane is left out from now on."""
 
-    pane: int
+    pane: _Pane
+    do: Literal["remove-pane"] = field(default="remove-pane", kw_only=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Restart:
+class Restart(_Change):
     """All begin anew, at time 0: the first change of every session, too."""
 
-    scenario: Scenario
+    scenario: Annotated[Scenario, WrapValidator(_begun)]
+    do: Literal["restart"] = field(default="restart", kw_only=True)
 
 
 MapChange: TypeAlias = EditObstacles | Paint | SetDensity
@@ -204,13 +274,14 @@ Change: TypeAlias = PaneChange | MapChange | Drag | Release | RemovePane | Resta
 def map_change(before: Environment, after: Environment) -> EditObstacles:
     """Return the change from one map to another of the same place that differs in some obstacles."""
     old, new = before.obstacles, after.obstacles
-    first = 0
-    while first < min(len(old), len(new)) and old[first] == new[first]:
-        first += 1
-    last = 0
-    while last < min(len(old), len(new)) - first and old[-1 - last] == new[-1 - last]:
-        last += 1
+    first = _alike(old, new)
+    last = _alike(old[first:][::-1], new[first:][::-1])
     return EditObstacles(first, len(old) - first - last, new[first : len(new) - last])
+
+
+def _alike(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
+    """Return how many obstacles are the same at the beginning."""
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False)))
 
 
 def _there(pane: Pane) -> set[int]:

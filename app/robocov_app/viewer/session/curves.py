@@ -137,7 +137,7 @@ def speeds_of(session: Session, pane: Pane) -> Array | None:
     Robots that have failed are remembered: who is left may be equally fast, and the curve goes on.
     """
     there = session.setup(pane)
-    if "max_speed" not in dict(there.limits.different):
+    if "max_speed" not in there.limits.different:
         return None
     return there.limits.team(there.numbers).max_speed
 

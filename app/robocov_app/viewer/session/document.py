@@ -7,7 +7,7 @@ out of the tree: undo goes back to the node before, a touch in the past is one m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -38,7 +38,7 @@ class Node:
     at: int
     kind: str
     words: str
-    changes: list[tuple[int, Change]]
+    changes: list[Change]
     end: int
     name: str = ""
     redo: Node | None = field(default=None, repr=False)
@@ -50,7 +50,7 @@ class Node:
     @property
     def scenario(self) -> Scenario | None:
         """The scenario that begins here; None where the run goes on."""
-        change = self.changes[0][1]
+        change = self.changes[0]
         return change.scenario if isinstance(change, Restart) else None
 
     @property
@@ -102,7 +102,7 @@ class Document:
     def add(self, parent: Node | None, at: int, kind: str, words: str, change: Change) -> Node:
         """Add a touch in a node's time."""
         begin = 0 if isinstance(change, Restart) else at
-        node = Node(len(self.nodes), parent, at, kind, words, [(begin, change)], begin)
+        node = Node(len(self.nodes), parent, at, kind, words, [replace(change, step=begin)], begin)
         self.nodes.append(node)
         return node
 

@@ -165,8 +165,7 @@ def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
         return LostController(record.controller, dict(record.gains), record.label, reason)
     try:
         law.made()
-        gains = {name: value for name, value in law.gains.items() if value != law.known[name].default}
-        return replace(law, gains=gains)
+        return law.plain()
     except RobocovError as error:
         return LostController(record.controller, dict(record.gains), record.label, str(error))
 

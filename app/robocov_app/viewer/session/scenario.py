@@ -1,27 +1,25 @@
-"""What a run in the window begins with: map, controllers, team and starts."""
+"""What a run begins with: map, controllers, team and starts; and how these stand in session files."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, WrapSerializer
+from pydantic_core import PydanticCustomError, core_schema
 
-from robocov.controllers import controller_kind, gains_of, make_controller
-from robocov.controllers.gains import value_text
-from robocov.errors import ParameterError, shown
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.controllers import CONTROLLERS, controller_kind, gains_of, make_controller
+from robocov.controllers.base import Controller
+from robocov.controllers.gains import Gain, Option, Value, value_text
+from robocov.environment import Environment
+from robocov.errors import ParameterError, RobocovError, shown
 from robocov.robots import UNITS, Team
 from robocov.simulation import DEFAULT_DT
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from robocov.arrays import Array
-    from robocov.conditions import Conditions
-    from robocov.controllers.base import Controller
-    from robocov.controllers.gains import Gain, Option, Value
-    from robocov.environment import Environment
 
 MOST_ROBOTS = 1000
 """So many robots can be asked for in the window."""
@@ -33,18 +31,84 @@ MOST_PANES = 4
 """So many controllers can be compared side by side."""
 
 
+def read_as(kind: Any, made: Callable[[Any, Any], object], plain: Callable[[Any, Any], object]) -> Any:
+    """Let a field stand in files as a `kind`; `made` and `plain` also get the context of the file."""
+
+    def schema(_: object, handler: Any) -> Any:
+        return core_schema.with_info_after_validator_function(
+            lambda value, info: made(value, info.context),
+            handler.generate_schema(kind),
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value, info: plain(value, info.context), info_arg=True
+            ),
+        )
+
+    return GetPydanticSchema(schema)
+
+
+def refused(error: object) -> PydanticCustomError:
+    """Return an error as pydantic notes it, with the place in the file."""
+    return PydanticCustomError("refused", "{words}", {"words": str(error)})
+
+
+def _known(law: ControllerChoice, info: Any) -> ControllerChoice:
+    """Return a controller of a file as the user has named it: none is run because a file says so."""
+    kind, own = law.name.rpartition(":")[2], info.context.controllers
+    if law.name not in CONTROLLERS and law.name not in own:
+        named = next((each for each in own if each.rpartition(":")[2] == kind), None)
+        if named is None:
+            how = f"to run it, open the session with --controller {law.name}"
+            raise refused(f"{law.name!r} is none of robocov's controllers; {how}")
+        law = replace(law, name=named)
+    try:
+        law.made()
+    except RobocovError as error:
+        raise refused(error) from None
+    return law
+
+
+Text: TypeAlias = Annotated[str, Field(strict=True, max_length=10_000)]
+Coordinate: TypeAlias = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
+Position: TypeAlias = Annotated[tuple[Coordinate, Coordinate], Field(description="[x, y] in metres")]
+_GAINS = read_as(
+    dict[str, Annotated[float, Field(strict=True)] | Annotated[str, Field(strict=True)] | None],
+    lambda gains, _: gains,
+    lambda gains, _: dict(gains),
+)
+_LIMIT = read_as(
+    Annotated[float | None, Field(strict=True, ge=0, le=1e9, description="null: no limit")],
+    lambda value, _: np.inf if value is None else value,
+    lambda value, _: value if np.isfinite(value) else None,
+)
+_ROWS = read_as(
+    list[Position] | None,
+    lambda rows, _: None if rows is None else np.array(rows),
+    lambda rows, _: None if rows is None else np.asarray(rows).tolist(),
+)
+_MAP = read_as(
+    Annotated[int, Field(strict=True, ge=0, description="Number of the map in `maps`")],
+    lambda number, context: context.environment(number),
+    lambda environment, context: context.number(environment),
+)
+_CONDITIONS = read_as(
+    dict[str, Any] | None,
+    lambda plain, _: None if plain is None else Conditions.from_dict(plain),
+    lambda conditions, _: None if conditions is None else conditions.to_dict(),
+)
+Limit: TypeAlias = Annotated[float, _LIMIT]
+
+
 @dataclass(frozen=True)
 class ControllerChoice:
-    """A controller as the user chose it.
+    """A controller, by name as `make_controller` takes it, with gains that differ from their defaults."""
 
-    `name`: as `make_controller` takes it. `gains`: those that differ from their defaults.
-    """
+    __pydantic_config__ = ConfigDict(extra="forbid")
 
-    name: str
-    gains: Mapping[str, Value] = field(default_factory=dict)
+    name: Annotated[str, Field(strict=True, min_length=1, max_length=10_000)]
+    gains: Annotated[Mapping[str, Value], _GAINS] = field(default_factory=dict)
 
     def made(self) -> Controller:
-        """Return the controller. Raises ParameterError as `make_controller`."""
+        """Return the controller; ParameterError as `make_controller`."""
         return make_controller(self.name, self.gains)
 
     # kept, for to look at a controller in a file is to run that file
@@ -64,13 +128,17 @@ class ControllerChoice:
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
     def with_gain(self, gain: str, value: Value) -> ControllerChoice:
-        """Return the law with another value of one gain.
+        """Return the law with another value of one gain; ParameterError as `made`."""
+        changed = replace(self, gains={**self.gains, gain: value})
+        changed.made()
+        return changed.plain()
 
-        Raises ParameterError when there is no such gain, or the value is out of range.
-        """
-        gains = {**self.gains, gain: value}
-        replace(self, gains=gains).made()
-        return replace(self, gains={name: v for name, v in gains.items() if v != self.known[name].default})
+    def plain(self) -> ControllerChoice:
+        """Return the law without gains that are as by default."""
+        usual = {name: gain.default for name, gain in self.known.items()}.items()
+        return replace(
+            self, gains={name: value for name, value in self.gains.items() if (name, value) not in usual}
+        )
 
 
 def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
@@ -81,10 +149,7 @@ def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
 
 def branch_words(law: ControllerChoice) -> str:
     """Return how a branch that was left is called."""
-    gains = ", ".join(
-        f"{name} {_said(value)}" for name, value in law.gains.items() if value != law.known[name].default
-    )
-    return f"{law.label}, {gains}" if gains else law.label
+    return ", ".join([law.label, *(f"{name} {_said(value)}" for name, value in law.plain().gains.items())])
 
 
 def _said(value: Value) -> str:
@@ -93,33 +158,29 @@ def _said(value: Value) -> str:
 
 @dataclass(frozen=True)
 class TeamSpec:
-    """What each robot of the team is and can do; SI units, infinite for no limit.
+    """What each robot is and can do, as `Team` has it; SI units, infinite for no limit.
 
-    `radius`, `mass`, `max_speed`, `max_acceleration`, `viscosity`, `sensing_range`, `communication_range`: as
-    `Team` has them. `different`: parameters in which robots differ, with the values of those that have one of
-    their own.
+    `different`: values of single robots, by parameter and number.
     """
 
-    radius: float = 0.1
-    mass: float = 1.0
-    max_speed: float = 1.0
-    max_acceleration: float = 2.0
-    viscosity: float = 2.0
-    sensing_range: float = 3.0
-    communication_range: float = np.inf
-    different: tuple[tuple[str, tuple[tuple[int, float], ...]], ...] = ()
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    radius: Limit = 0.1
+    mass: Limit = 1.0
+    max_speed: Limit = 1.0
+    max_acceleration: Limit = 2.0
+    viscosity: Limit = 2.0
+    sensing_range: Limit = 3.0
+    communication_range: Limit = np.inf
+    different: Mapping[str, Mapping[int, Limit]] = field(default_factory=dict)
 
     def team(self, robots: int | Sequence[int]) -> Team:
-        """Return a team of so many robots, or of those with such numbers.
-
-        Raises ParameterError when a value is out of range.
-        """
+        """Return a team of so many robots, or of those with such numbers; ParameterError as `Team`."""
         numbers = range(1, robots + 1) if isinstance(robots, int) else robots
         team = Team.homogeneous(len(numbers), **{name: getattr(self, name) for name in UNITS})
-        own = {name: dict(values) for name, values in self.different}
         changed = {
             name: np.array([values.get(number, getattr(self, name)) for number in numbers])
-            for name, values in own.items()
+            for name, values in self.different.items()
         }
         return replace(team, **changed) if changed else team
 
@@ -132,12 +193,20 @@ class TeamSpec:
         """Return what the robots of a team are and can do; by default they are numbered from 1."""
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
-        different = tuple(
-            (name, tuple(zip(numbers, values, strict=True)))
+        different = {
+            name: dict(zip(numbers, values, strict=True))
             for name, values in columns.items()
             if len(set(values)) > 1
-        )
+        }
         return cls(**{name: values[0] for name, values in columns.items()}, different=different)
+
+
+Law: TypeAlias = Annotated[ControllerChoice, AfterValidator(_known)]
+Limits: TypeAlias = Annotated[TeamSpec, WrapSerializer(lambda team, plain: _filled(plain(team)))]
+
+
+def _filled(plain: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in plain.items() if value != {}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,21 +214,22 @@ class Scenario:
     """What a run begins with; immutable.
 
     `laws`: one for each pane. `start`: named start of the map, its first by default. `seed`: of the starts.
-    `dt`, s: control period. `given`, (n, 2) m or None: starts that come from somewhere else, as from a saved
-    run. `moving`, (n, 2) m/s or None: velocities there; at rest by default. `conditions`: what goes wrong,
-    and when robots fail and join by themselves.
+    `dt`, s: control period. `given`, (n, 2) m, `moving`, (n, 2) m/s: starts from elsewhere, as a saved run.
+    `conditions`: what goes wrong, and when robots fail and join by themselves.
     """
 
-    environment: Environment
-    laws: tuple[ControllerChoice, ...] = (ControllerChoice("rapf"),)
-    robots: int = 6
-    start: str | None = None
-    seed: int = 0
-    limits: TeamSpec = TeamSpec()
-    dt: float = DEFAULT_DT
-    given: Array | None = None
-    moving: Array | None = None
-    conditions: Conditions | None = None
+    __pydantic_config__ = ConfigDict(extra="forbid")
+
+    environment: Annotated[Environment, _MAP, Field(alias="map")]
+    laws: Annotated[tuple[Law, ...], Field(alias="controllers")] = (ControllerChoice("rapf"),)
+    robots: Annotated[int, Field(strict=True, ge=1, le=MOST_ROBOTS)] = 6
+    start: Text | None = None
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    limits: Annotated[Limits, Field(alias="team")] = TeamSpec()
+    dt: Annotated[float, Field(strict=True, alias="dt_s", ge=1e-4, le=1)] = DEFAULT_DT
+    given: Annotated[Array | None, _ROWS, Field(alias="starts_m")] = None
+    moving: Annotated[Array | None, _ROWS, Field(alias="start_velocities_m_per_s")] = None
+    conditions: Annotated[Conditions | None, _CONDITIONS] = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
@@ -182,7 +252,7 @@ class Scenario:
         return self.environment.start(self.start).name
 
     def positions(self) -> Array:
-        """Return the starts, (robots, 2) m. Raises StartError when there is no room for the team."""
+        """Return the starts, (robots, 2) m; StartError when there is no room for the team."""
         if self.given is not None:
             return self.given
         start = self.environment.start(self.start)

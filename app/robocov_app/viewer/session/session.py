@@ -325,8 +325,8 @@ class Session:
 
     def _advance(self) -> None:
         self.head.happenings.update(self._run.advance())
-        for when, change in self.head.changes:
-            if when == self._run.step:  # it goes on amid a touch that lasted, as a drag
+        for change in self.head.changes:
+            if change.step == self._run.step:  # it goes on amid a touch that lasted, as a drag
                 self._run.apply(change)
         self.head.end = max(self.head.end, self._run.step)
         self.history.add(self._run.moment(self.head.number))
@@ -366,7 +366,7 @@ class Session:
             if node.at != step:
                 break
             self.head = node
-            todo += [change for when, change in node.changes if when == step]
+            todo += [change for change in node.changes if change.step == step]
         for change in todo:
             self._run.apply(change)
         if todo:
@@ -473,8 +473,8 @@ class Session:
             else:
                 at += 1
                 here = path[at]
-            for when, change in here.changes:
-                if when == run.step:
+            for change in here.changes:
+                if change.step == run.step:
                     run.apply(change)
             history.amend(run.moment(here.number))
             yield (run.step - begun) / max(step - begun, 1)
@@ -581,15 +581,15 @@ class Session:
             and (kind == "hand" or self.end - self._gesture[1] < _SLIDE)
         ):
             head, last = self.head, self.head.changes[-1]
-            both_pull = isinstance(change, Drag) and isinstance(last[1], Drag)
-            if both_pull and last[0] == run.step and len(head.changes) > 1:  # other changes add up
+            both_pull = isinstance(change, Drag) and isinstance(last, Drag)
+            if both_pull and last.step == run.step and len(head.changes) > 1:  # other changes add up
                 head.changes.pop()
-            head.changes.append((run.step, change))
+            head.changes.append(replace(change, step=run.step))
             head.kind, head.words = kind, words
         else:
             self.head = self.document.add(self.head, run.step, kind, words, change)
             if let_go:  # of what was dragged at that moment of the past
-                self.head.changes.insert(0, (run.step, Release()))
+                self.head.changes.insert(0, Release(step=run.step))
         self._gesture = None if gesture is None else (gesture, self.end)
         self.revision += 1
         self._ghosts = None
