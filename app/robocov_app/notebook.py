@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
-from robocov.cost import CoverageResult
+from robocov.cost import LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, counted, shown
 from robocov.metrics import CostHistory, cost_history
@@ -35,7 +35,6 @@ if TYPE_CHECKING:  # pages of HTML need no matplotlib
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COST_LATTICE = 64  # lattice of the cost that is shown with a run in a notebook
 COST_SAMPLES = 120  # at so many moments of the run it is evaluated, at the most
 COST_VERTICES = 2500  # of the free space, up to which it is shown: beyond, notebooks would wait for seconds
 
@@ -183,7 +182,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
     span = float(record.time[-1] - record.time[0])
     rate = min(COST_SAMPLES / span, 10.0) if span > 0.0 else 0.0
     try:
-        return cost_history(record, built_cost(record.environment, COST_LATTICE, quiet=True), rate)
+        return cost_history(record, built_cost(record.environment, LATTICE, quiet=True), rate)
     except RobocovError:  # a map without a free site, a robot in an obstacle
         return None
 

@@ -46,7 +46,7 @@ def test_cost(maps, capsys) -> None:
     assert "φ" not in told(capsys, "cost", plain, "--positions", robots)
     assert "weighed by φ    gaussians, 0.5 to 4.5" in told(capsys, "cost", heavy, "--positions", robots)
     answer = json.loads(told(capsys, "cost", heavy, "--positions", robots, "--json"))
-    result = CoverageCost(HEAVY, 64)([[1.0, 1.0], [4.0, 4.5]])
+    result = CoverageCost(HEAVY)([[1.0, 1.0], [4.0, 4.5]])
     assert answer["mean_distance_m"] == pytest.approx(result.mean_distance)
     assert answer["cost_m3"] == pytest.approx(result.value) and answer["density"] == "gaussians"
 

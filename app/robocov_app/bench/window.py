@@ -10,11 +10,12 @@ from time import perf_counter
 
 import pygame
 
+from robocov.cost import LATTICE
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Row
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
-from robocov_app.viewer.costs import LATTICE, Costs
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session

@@ -24,7 +24,7 @@ from robocov_app.terminal.output import finite
 class Arguments(PlotOptions):
     """Evaluate the exact coverage cost (22) of given positions; --plot draws a map of the distances.
 
-    Example: robocov cost rooms --positions robots.json --lattice 128
+    Example: robocov cost rooms --positions robots.json --lattice 256
     """
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")]
@@ -34,7 +34,7 @@ class Arguments(PlotOptions):
     speeds: tuple[float, ...] = ()
     """How fast each robot goes in m/s, in the order of the positions; one number stands for all. Then the one
     counts that is first at a place, and the cost is in seconds as well."""
-    lattice: int = 64
+    lattice: int = 128
     """Evaluate on N x N sites over the map."""
     sites: Annotated[Path | None, tyro.conf.arg(metavar="FILE.npz")] = None
     """Save per-site points (m,2), distances (m,) and owner (m,) there, with speeds also times (m,)."""

@@ -45,7 +45,7 @@ class Arguments(PlotOptions):
     """How many; 6 unless said otherwise, with --run as many as there."""
     restarts: int = 24
     """Searches from other seeds, of which the best counts."""
-    lattice: int = 64
+    lattice: int = 128
     """Evaluate on N x N sites over the map."""
     seed: int = 0
     """Another seed, other restarts."""

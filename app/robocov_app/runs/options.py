@@ -200,7 +200,7 @@ class RunOptions(JsonOption):
     team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
     """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
     says how many there are, and what a group leaves open is as the options above say."""
-    lattice: int = 64
+    lattice: int = 128
     """The coverage cost is evaluated on a lattice of N x N sites over the map."""
     out: Path | None = None
     """Folder for the results."""

@@ -10,13 +10,11 @@ from functools import cache, cached_property
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
+from robocov.cost import LATTICE, CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov.environment import Environment
 from robocov.errors import InputError, RobocovError
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
-
-LATTICE = 128  # sites along a side
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
 
@@ -52,7 +50,7 @@ class Costs:
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
         self.known: dict[int, Known] = {}
         self.state = ""
-        self._lattice = lattice
+        self.lattice = lattice
         self._worker: Worker[Known | _Sites] = (
             DirectWorker(CostService(), _CostWire())
             if direct
@@ -68,7 +66,7 @@ class Costs:
     def environment(self, environment: Environment) -> None:
         """Take another map from now on."""
         self._number += 1
-        self._map = CostQuestion(self._number, environment, self._lattice)
+        self._map = CostQuestion(self._number, environment, self.lattice)
         self.known, self._waiting = {}, {}
         self._prepare()
         self.poll()

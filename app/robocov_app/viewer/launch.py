@@ -7,11 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robocov.cost import LATTICE
 from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
-from robocov_app.viewer.costs import LATTICE, Costs
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings

@@ -20,9 +20,6 @@ from robocov_app.viewer.session.document import Document
 from robocov_app.viewer.session.file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
 
-LATTICE = 64
-"""Sites along a side, of the coverage cost."""
-
 
 class Said(NamedTuple):
     """Something to tell."""
@@ -42,7 +39,7 @@ class _Job:
 class RunSaver:
     """Has runs saved by other processes. No call but `finish` waits for them."""
 
-    def __init__(self, lattice: int = LATTICE) -> None:
+    def __init__(self, lattice: int) -> None:
         self._lattice = lattice
         self._jobs: list[_Job] = []
         self._said: list[Said] = []

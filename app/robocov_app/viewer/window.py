@@ -71,7 +71,7 @@ class Window(BaseWindow):
         self.help = False
         self.tour: LessonPlayer | None = None
         self.film: Film | None = None
-        self.keeper = RunSaver()
+        self.keeper = RunSaver(viewer.costs.lattice)
         self.titles = {layer.name: layer.title for layer in standard_layers()}
         pygame.display.set_caption("robocov")
         self.canvas = ViewerCanvas(viewer, theme_named(viewer.theme))

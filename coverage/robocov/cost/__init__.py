@@ -22,6 +22,9 @@ from robocov.geodesic import BINS, Geodesics
 from robocov.geodesic.visibility import AngularWallIndex
 from robocov.geodesic.walls import along_z_curve, box_tree
 
+LATTICE = 128
+"""Cells along a side, unless something else is said."""
+
 MAX_LATTICE = 4096
 """Finest lattice, in cells along a side."""
 
@@ -173,7 +176,7 @@ class CoverageCost:
     Examples
     --------
     >>> from robocov.environment import Environment
-    >>> cost = CoverageCost(Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1))), lattice=64)
+    >>> cost = CoverageCost(Environment("square", ((0, 0), (1, 0), (1, 1), (0, 1))))
     >>> round(cost([[0.5, 0.5]]).mean_distance, 3)
     0.383
     """
@@ -181,7 +184,7 @@ class CoverageCost:
     def __init__(
         self,
         environment: Environment,
-        lattice: int = 64,
+        lattice: int = LATTICE,
         *,
         progress: Callable[[float], None] | None = None,
         geodesics: Geodesics | None = None,

@@ -2,9 +2,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov.cost import CoverageCost
+from robocov.environment import Environment
 from robocov.errors import ParameterError
+from robocov_app.commands import cost, demo, optimum
 from robocov_app.runs.options import FilmOptions, RunOptions
 from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.viewer.costs import Costs
+
+SQUARE = Environment("square", ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)))
 
 
 def test_gains_are_json_values() -> None:
@@ -64,3 +70,9 @@ def test_defaults_that_stand_here_for_the_sake_of_quick_help_are_the_librarys() 
     assert Run().controller == Compare().controllers[0] == FLAGSHIP
     assert RunOptions().dt == DEFAULT_DT
     assert RunOptions().made_team().to_dict() == Team.homogeneous(6).to_dict()
+
+
+def test_every_cost_is_evaluated_on_the_same_lattice_unless_told() -> None:
+    commands = (cost.Arguments, optimum.Arguments, demo.Arguments, RunOptions)
+    told = {each.__dataclass_fields__["lattice"].default for each in commands}
+    assert told == {Costs().lattice, CoverageCost(SQUARE).lattice}

@@ -251,7 +251,7 @@ class TestWall:
         tool, session = Wall(), begun()
         clicked(tool, session, (3.2, 3.0), (4.0, 3.0), (4.0, 3.8), (3.2, 3.8), (3.2, 3.0))
         assert tool.finish(session) == (
-            "wall drawn; 0.2 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
+            "wall drawn; 0.5 m² cut off; a gap of 15 cm, too narrow for a robot"  # to the wall above
         )
         assert len(session.environment.obstacles[-1].points) == 5
 

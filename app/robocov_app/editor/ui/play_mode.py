@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import pygame
 
 from robocov.controllers import controller_kinds
+from robocov.cost import LATTICE
 from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
-from robocov_app.viewer.costs import LATTICE, Costs
+from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session

@@ -98,9 +98,11 @@ def passage_words(before: Environment, after: Environment, radius: float) -> str
     rooms = [shapely.get_parts(each.free.buffer(-radius, quad_segs=4)) for each in (before, after)]
     inside = shapely.STRtree(rooms[0]).query(shapely.point_on_surface(rooms[1]), predicate="intersects")
     for room in range(len(rooms[0])):  # of what hung together the largest part counts as what is left of it
-        lost = np.sort(shapely.area(rooms[1][inside[0][inside[1] == room]]))[:-1].sum()
-        if lost > radius * radius:
-            words.append(f"{lost:.1f} m² cut off")
+        parts = rooms[1][inside[0][inside[1] == room]]
+        lost = shapely.union_all(parts[np.argsort(shapely.area(parts))[:-1]])  # of places of centres
+        area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost, radius)))
+        if area > radius * radius:
+            words.append(f"{area:.1f} m² cut off")
     width = 2 * radius * (1 - 1e-6)  # what is just wide enough is wide enough
     known = {gap.between for gap in gaps_narrower(before.free, width)}
     new = [gap for gap in gaps_narrower(after.free, width) if gap.between not in known]
