@@ -49,7 +49,7 @@ def all_told(session: Session) -> list[object]:
     told: list[object] = [session.scenario, session.hand, session.settled, session.playing, session.serial]
     told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
     told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
-    told += [session.head.number, session.can_undo, session.can_redo]
+    told += [session.head.number, session.head.parent is not None, session.head.redo is not None]
     for pane in session.panes:
         told += [pane.number, pane.setup, pane.time]
         told += [

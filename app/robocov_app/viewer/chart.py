@@ -18,7 +18,7 @@ from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared, curve_of
+from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared
 from robocov_app.viewer.session.pane import Pane
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20
@@ -141,7 +141,7 @@ class Chart:
     def draw(self, screen: pygame.Surface) -> None:
         """Draw both."""
         session, layout = self.viewer.session, self.layout
-        curves = [curve_of(pane, self.plotted) for pane in session.panes]
+        curves = [pane.curves[self.plotted.name] for pane in session.panes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
         panes = tuple(pane.number for pane in session.panes)
         rest = (
@@ -190,7 +190,7 @@ class Chart:
                 self.viewer.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right"
             )
         ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
-        values = [curve_of(pane, what).value for pane in session.panes] + [ghost.value for ghost in ghosts]
+        values = [pane.curves[what.name].value for pane in session.panes] + [ghost.value for ghost in ghosts]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
@@ -222,7 +222,7 @@ class Chart:
                 x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
                 self._note(canvas, ghost.words, (x, points[-1][1] - 9 * scale), "right", colour)
         for pane in session.panes:
-            curve = curve_of(pane, what)
+            curve = pane.curves[what.name]
             points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
                 ends = np.hstack([points[:-1], points[1:]])
@@ -347,7 +347,7 @@ class Chart:
             words = "; ".join(f"{event.time:.1f} s: {event.text}" for event in near[-3:])
         else:
             what = self.plotted
-            values = [(pane.law.label, curve_of(pane, what).at(time)) for pane in session.panes]
+            values = [(pane.law.label, pane.curves[what.name].at(time)) for pane in session.panes]
             known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
         x = round(self.column(time))

@@ -7,6 +7,7 @@ and hand a task over afterwards. It ends by conditions of the simulation, howeve
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -104,8 +105,7 @@ class LessonPlayer:
         self.lesson: LessonModel = saved.lesson
         self._viewer, self._fit, self.alone = viewer, fit, alone
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
-        self.session = Session(saved.document.path(saved.document.nodes[0])[0].scenario)  # type: ignore[arg-type]
-        self.session.document, self.session.head = saved.document, saved.document.nodes[0]
+        self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
         self.number, self.state, self.done = 0, "plays", False
@@ -226,7 +226,7 @@ class LessonPlayer:
         chapter, viewer, session = self.chapter, self._viewer, self.session
         target = session.document.nodes[chapter.touch]
         session.enter(session.document.path(target)[0], 0)
-        session.finish_remaking()
+        session.remake()
         session.follow(target)
         session.playing, session.stop_when_settled = chapter.question is None, False
         session.clock.speed = chapter.speed
@@ -241,14 +241,17 @@ class LessonPlayer:
         self._turn("asks" if chapter.question is not None else "plays")
 
 
+def _begun(saved: SavedSession) -> Session:
+    return Session.opened(replace(saved, head=saved.document.nodes[0], step=0))
+
+
 def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
     """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter.
 
     Raises what touches that cannot be raise.
     """
     assert saved.lesson is not None
-    session = Session(saved.document.path(saved.document.nodes[0])[0].scenario)  # type: ignore[arg-type]
-    session.document, session.head = saved.document, saved.document.nodes[0]
+    session = _begun(saved)
     session.clock.budget = np.inf
     found = []
     for chapter in saved.lesson.chapters:

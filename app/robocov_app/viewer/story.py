@@ -34,10 +34,9 @@ from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
 from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
-from robocov_app.viewer.session.changes import Place, Restart
-from robocov_app.viewer.session.document import Document, Node
+from robocov_app.viewer.session.changes import Place
+from robocov_app.viewer.session.document import Document, Node, replayed
 from robocov_app.viewer.session.history import PaneSetup
-from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.map_edits import with_obstacle
 
 if TYPE_CHECKING:
@@ -52,33 +51,6 @@ STORY = "story.json"
 
 STRIP = 30
 """Height of a film's strip with what was done, px at scale 1."""
-
-
-def retold(document: Document, node: Node, end: int) -> Iterator[tuple[Lockstep, Node]]:
-    """Make a branch again from time 0: yield the run at each step, with the touch in whose time it is.
-
-    The run is one object that goes on. Raises what the controllers, or touches that cannot be, raise.
-    """
-    path, limits = document.path(node), document.limits(node, end)
-    scenario = path[0].scenario
-    assert scenario is not None
-    run, at = Lockstep(scenario), 0
-    _apply(run, path[0])
-    while True:
-        while path[at] is not node and run.step >= limits[path[at].number]:
-            at += 1
-            _apply(run, path[at])
-        yield run, path[at]
-        if path[at] is node and run.step >= end:
-            return
-        run.advance()
-        _apply(run, path[at])
-
-
-def _apply(run: Lockstep, node: Node) -> None:
-    for change in node.changes:
-        if change.step == run.step and not isinstance(change, Restart):
-            run.apply(change)
 
 
 @dataclass(eq=False)
@@ -107,7 +79,7 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
     """Return the parts of a branch, with records of all their steps."""
     parts: list[Part] = []
     dt = 0.0
-    for run, here in retold(document, node, end):
+    for run, here in replayed(document, node, end):
         dt = run.scenario.dt
         setups = {pane.number: pane.setup for pane in run.panes}
         if not parts or parts[-1].setups != setups:
@@ -291,7 +263,7 @@ def story_frames(
         scenes = [scene for part in parts for scene in part.scenes]
         layout = pane_layout(records_of_part(widest, root), film, (width, height - strip), legend_of=scenes)
     due, frame = 0.0, None
-    for run, here in retold(document, node, end):
+    for run, here in replayed(document, node, end):
         last = here is node and run.step >= end
         if run.time + 1e-9 < due and not last:
             continue

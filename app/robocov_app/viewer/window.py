@@ -168,7 +168,7 @@ class Window(BaseWindow):
                 if pane.number == number and known.time <= pane.time + 1e-9:
                     pane.curve.add(known.time, known.result.mean_distance)
                     if known.travel_time is not None:
-                        pane.times.add(known.time, known.travel_time)
+                        pane.curves["time"].add(known.time, known.travel_time)
 
     def _arrange(self) -> None:
         """Lay the window out anew when its size, look or number of panes is another."""

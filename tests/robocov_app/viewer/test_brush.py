@@ -61,7 +61,7 @@ def test_a_stroke_is_undone_as_a_whole_and_done_again():
     assert session.environment == painted
     session.undo()
     assert session.environment == before and session.environment.density is None
-    assert not session.can_undo
+    assert session.head.parent is None
     session.redo()
     assert session.environment == painted
     assert [event.kind for event in session.events] == ["density"]
@@ -78,10 +78,10 @@ def test_robots_know_of_it_while_it_is_painted():
         for pane in session.panes:
             assert pane.simulation.snapshot.seen.density is session.environment.density
     assert session.environment.density is not None
-    assert session.can_undo
+    assert session.head.parent is not None
     assert brush.painting
     brush.release(session, (4.6, 3.0))
-    assert not brush.painting and session.can_undo
+    assert not brush.painting and session.head.parent is not None
 
 
 def test_it_does_not_tell_the_robots_more_often_than_is_seen():
@@ -101,7 +101,7 @@ def test_escape_gives_the_stroke_up():
     brush.press(session, (1.0, 1.0), REACH, None)
     assert session.environment != before
     assert brush.cancel(session)
-    assert session.environment == before and not session.can_undo
+    assert session.environment == before and session.head.parent is None
     assert brush.release(session, (1.0, 1.0)) is None
     assert brush.preview(session) is None
 

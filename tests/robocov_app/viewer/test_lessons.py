@@ -148,7 +148,7 @@ def test_a_script_goes_the_same_way_bit_for_bit() -> None:
     twin = Session(session.document.nodes[0].scenario)
     twin.document, twin.head = session.document, session.document.nodes[0]
     twin.enter(twin.head, 0)
-    twin.finish_remaking()
+    twin.remake()
     twin.follow(session.head)
     while twin.step_now < end:
         twin.step()

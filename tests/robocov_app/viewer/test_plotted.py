@@ -10,7 +10,7 @@ from driven_window import opened
 
 from robocov.cost import CoverageCost
 from robocov.robots import Team
-from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, curve_of, speeds_of
+from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, speeds_of
 from robocov_app.viewer.session.scenario import TeamSpec
 
 MIXED = TeamSpec.of(Team.joined([Team.homogeneous(2, max_speed=1.0), Team.homogeneous(1, max_speed=0.25)]))
@@ -27,13 +27,13 @@ def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path
         assert chosen(session, TIME) is TIME
         places = session.positions(pane)
         expected = CoverageCost(session.environment, 16)(places, np.array([1.0, 1.0, 0.25])).mean_time
-        assert curve_of(pane, TIME).value[-1] == expected
+        assert pane.curves["time"].value[-1] == expected
         assert compared(session, TIME) == (session.time, {pane.number: pytest.approx(expected)})
         # who has failed does not come, but who is left is still told of
         session.fail_robot(3)
         driver.frames(2)
         assert speeds_of(session, pane).tolist() == [1.0, 1.0]
-        assert pane.times.value[-1] == pytest.approx(pane.curve.value[-1])
+        assert pane.curves["time"].value[-1] == pytest.approx(pane.curve.value[-1])
 
 
 def test_a_key_and_a_click_choose(tmp_path: Path) -> None:
@@ -65,7 +65,7 @@ def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
         driver.session.branch()
         assert [ghost.of for ghost in driver.session.ghosts] == ["distance", "time"]
         pane = driver.session.panes[0]
-        assert pane.curve.last_time <= 0.4 + 1e-6 and pane.times.last_time <= 0.4 + 1e-6
+        assert pane.curve.last_time <= 0.4 + 1e-6 and pane.curves["time"].last_time <= 0.4 + 1e-6
 
 
 def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_a_random_story_is_made_again_bit_for_bit(seed: int) -> None:
     for branch in session.branches:
         for one, node in ((session, branch.node), (twin, twin.document.nodes[branch.node.number])):
             one.enter(node)
-            one.finish_remaking()
+            one.remake()
         compare(session, twin)
 
 

@@ -121,5 +121,5 @@ def test_if_one_pane_cannot_be_changed_none_is(monkeypatch):
 def test_the_newest_cost_of_each_pane():
     session = begun(RAPF, LLOYD)
     session.panes[0].curve.add(0.0, 2.0)
-    assert session.summary()[0] == 2.0
-    assert np.isnan(session.summary()[1])
+    assert session.panes[0].curve.at(session.time) == 2.0
+    assert np.isnan(session.panes[1].curve.at(session.time))

@@ -13,10 +13,16 @@ from robocov.environment import CircleObstacle, Environment
 from robocov.errors import MapError, ParameterError, StartError
 from robocov.robots import Team
 from robocov_app.viewer.session import changes as module
-from robocov_app.viewer.session.changes import nearest_free
+from robocov_app.viewer.session.changes import Join, nearest_free
 from robocov_app.viewer.session.scenario import TeamSpec
 
 RADIUS = 0.1
+
+
+def joined(session, point, number) -> None:
+    session.do(Join(number, point), "robot", f"robot {number} joined")
+
+
 places = st.tuples(st.floats(-1.0, 7.0), st.floats(-1.0, 5.0))
 
 
@@ -142,7 +148,7 @@ def test_robots_join_at_rest():
         assert pane.simulation.velocities[3:].tolist() == [[0.0, 0.0]] * 2
     np.testing.assert_array_equal(session.panes[0].simulation.velocities[:3], velocities)
     assert [event.text for event in session.events] == ["robot 4 joined", "robot 5 joined"]
-    assert session.add_robot((1.0, 3.0), 9) == 9
+    joined(session, (1.0, 3.0), 9)
     assert session.add_robot((1.0, 3.0)) == 10
 
 
@@ -181,7 +187,7 @@ def test_numbers_are_not_given_twice():
     assert session.add_robot((3.0, 3.0)) == 4
     for number in (1, 3):
         with pytest.raises(ParameterError, match=f"there is a robot {number} already"):
-            session.add_robot((3.0, 3.0), number)
+            joined(session, (3.0, 3.0), number)
 
 
 # failing
@@ -267,7 +273,7 @@ def test_what_cannot_be_changes_nothing():
             (lambda: session.remove_robot(9), "there is no robot 9"),
             (lambda: session.place(9, (1.0, 1.0)), "there is no robot 9"),
             (lambda: session.grab(9, (1.0, 1.0)), "there is no robot 9"),
-            (lambda: session.add_robot((1.0, 1.0), 3), "there is a robot 3 already"),
+            (lambda: joined(session, (1.0, 1.0), 3), "there is a robot 3 already"),
         ):
             with pytest.raises(ParameterError, match=match):
                 touch()
@@ -328,7 +334,7 @@ def test_a_touch_goes_on_from_the_moment_that_is_looked_at():
         lambda session: session.revive_robot(1),
         lambda session: session.remove_robot(4),
         lambda session: session.place(4, (1.0, 1.0)),
-        lambda session: session.add_robot((1.0, 1.0), 2),
+        lambda session: joined(session, (1.0, 1.0), 2),
         lambda session: session.edit(replace(HALL, obstacles=(CircleObstacle((3.0, 2.0), 9.0),)), "filled"),
         lambda session: session.set_limits(TeamSpec(radius=2.5)),
     ],

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from touched_run import LLOYD, RAPF, begun, stepped
 
-from robocov_app.viewer.session import trail as module
-from robocov_app.viewer.session.trail import MOST_ROWS, RATE, Trail, starts_of, trail_of
+from robocov_app.viewer.session import history as module
+from robocov_app.viewer.session.history import MOST_ROWS, RATE, Trail, starts_of, trail_of
 
 STEP = 1 / 60
 
@@ -92,7 +92,9 @@ def test_until_a_time_and_cut_at_it():
 
 
 def test_a_trail_of_moments():
-    trail = Trail.of(1, [(k * STEP, np.full((1, 2), float(k))) for k in range(7)])
+    trail = Trail(1)
+    for k in range(7):
+        trail.add(k * STEP, np.full((1, 2), float(k)))
     assert trail.positions[:, 0, 0].tolist() == [0.0, 2.0, 4.0, 6.0]
 
 

@@ -144,12 +144,7 @@ def speeds_of(session: Session, pane: Pane) -> Array | None:
 
 def chosen(session: Session, wanted: Plotted) -> Plotted:
     """Return what is plotted: what is wanted, if there is a choice."""
-    return wanted if any(len(pane.times) for pane in session.panes) else DISTANCE
-
-
-def curve_of(pane: Pane, what: Plotted) -> Curve:
-    """Return a pane's curve of what is plotted."""
-    return pane.times if what is TIME else pane.curve
+    return wanted if any(len(pane.curves["time"]) for pane in session.panes) else DISTANCE
 
 
 def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
@@ -157,7 +152,7 @@ def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[in
 
     They come in one after the other; a pane without any yet is left out.
     """
-    curves = {pane.number: curve_of(pane, what) for pane in session.panes if len(curve_of(pane, what))}
+    curves = {pane.number: curve for pane in session.panes if len(curve := pane.curves[what.name])}
     time = min([session.time, *(curve.last_time for curve in curves.values())])
     values = {number: curve.at(time) for number, curve in curves.items()}
     return time, {number: value for number, value in values.items() if np.isfinite(value)}

@@ -15,7 +15,7 @@ from robocov.errors import ParameterError
 from robocov_app.viewer.session.changes import Change, Restart
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Moment
-from robocov_app.viewer.session.lockstep import Happening
+from robocov_app.viewer.session.lockstep import Happening, Lockstep
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
 MOST_KEPT = 160
@@ -26,11 +26,10 @@ MOST_KEPT = 160
 class Node:
     """One touch, and the time that passed after it until the next.
 
-    `at`: step of the parent's time at which it was made. `kind`, `words`: as of an `Event`. `changes`: what
-    the touch consists of, in its own time. `end`: step up to which the run has come. `name`: what people call
-    the branch that ends here; empty for none. `redo`: the child that was left by undo. `kept`, `curves`,
-    `controllers`, `happenings`: remembered while another branch is shown: moments, cost curves by pane and
-    kind, controllers of the panes, who failed and joined by itself. It can be made again, and is in no file.
+    `at`: step of the parent's time at which it was made. `kind`, `words`: as of an `Event`. `end`: step up to
+    which the run has come. `name`: what people call the branch that ends here. `redo`: the child that was
+    left by undo. The rest is remembered while another branch is shown: moments, cost curves by pane and kind,
+    controllers of the panes, who failed and joined by itself. It can be made again, and is in no file.
     """
 
     number: int
@@ -54,9 +53,21 @@ class Node:
         return change.scenario if isinstance(change, Restart) else None
 
     @property
+    def begun(self) -> Scenario:
+        """The scenario that begins here, where one does."""
+        assert self.scenario is not None
+        return self.scenario
+
+    @property
     def begin(self) -> int:
         """The step at which it begins, in its own time."""
         return self.at if self.scenario is None else 0
+
+    def carry_out(self, run: Lockstep) -> None:
+        """Change a run that goes on from one step to the next as was done at this step."""
+        for change in self.changes:
+            if change.step == run.step and not isinstance(change, Restart):
+                run.apply(change)
 
     def keep(self, moments: list[Moment]) -> None:
         """Remember some of the moments, the last among them."""
@@ -65,10 +76,7 @@ class Node:
 
 
 class Branch(NamedTuple):
-    """A story that can be gone back to: the end of a node after which nothing else was done.
-
-    `end`: its last step. `words`: what people call it, or else its newest touch.
-    """
+    """A story that can be gone back to, up to a node after which nothing else was done; with its name."""
 
     node: Node
     end: int
@@ -76,28 +84,21 @@ class Branch(NamedTuple):
 
     def told(self, dt: float) -> str:
         """Return when it ends and, where that is known, each pane's mean distance then."""
-        ends = {
-            pane: curve.at(self.end * dt)
-            for (pane, what), curve in self.node.curves.items()
-            if what == "distance"
-        }
-        known = [f"{self.node.controllers[pane].label} {value:.3f} m" for pane, value in sorted(ends.items())]
-        return " · ".join([f"{self.end * dt:.1f} s", *known])
+        words = [f"{self.end * dt:.1f} s"]
+        for pane, what in sorted(self.node.curves):
+            if what == "distance":
+                value = self.node.curves[pane, what].at(self.end * dt)
+                words.append(f"{self.node.controllers[pane].label} {value:.3f} m")
+        return " · ".join(words)
 
 
 class Document:
     """Nodes in the order in which they came to be; the first begins with a scenario."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self.nodes: list[Node] = []
-        self.add(None, 0, "begin", "begun", Restart(scenario))
-
-    @classmethod
-    def of(cls, nodes: list[Node]) -> Document:
-        """Return a document of nodes whose numbers are their places."""
-        document = cls.__new__(cls)
-        document.nodes = nodes
-        return document
+    def __init__(self, scenario: Scenario | None = None, nodes: list[Node] | None = None) -> None:
+        self.nodes = nodes or []
+        if scenario is not None:
+            self.add(None, 0, "begin", "begun", Restart(scenario))
 
     def add(self, parent: Node | None, at: int, kind: str, words: str, change: Change) -> Node:
         """Add a touch in a node's time."""
@@ -138,3 +139,23 @@ class Document:
                 return each
         known = ", ".join(f"{k} ({each.words})" for k, each in enumerate(branches, 1))
         raise ParameterError(f"branch: {name!r}, but one of {known} was wanted")
+
+
+def replayed(
+    document: Document, node: Node, step: int, run: Lockstep | None = None, since: Node | None = None
+) -> Iterator[tuple[Lockstep, Node]]:
+    """Simulate the way to a step of a node again: yield the run at each step, and the node of its time.
+
+    It goes on from time 0, or from a step of the node `since`. Controllers and touches may raise anything.
+    """
+    path, limits = document.path(node), document.limits(node, step)
+    run, at = run or Lockstep(path[0].begun), 0 if since is None else path.index(since)
+    while True:
+        while path[at] is not node and run.step >= limits[path[at].number]:
+            at += 1
+            path[at].carry_out(run)
+        yield run, path[at]
+        if path[at] is node and run.step >= step:
+            return
+        path[at].happenings.update(run.advance())
+        path[at].carry_out(run)

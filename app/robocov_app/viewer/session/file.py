@@ -258,7 +258,7 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
             at("touch", value=chapter.touch, wanted=wanted)
         if asked is not None and asked.right > len(asked.answers):
             at("question", "right", value=asked.right, wanted="the number of an answer")
-    return SavedSession(Document.of(nodes), head, model.step, model.view, model.lesson)
+    return SavedSession(Document(nodes=nodes), head, model.step, model.view, model.lesson)
 
 
 def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> Node:

@@ -14,8 +14,7 @@ from robocov.world.relocation import relocated
 from robocov_app.render.scene import Sensed
 from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
-from robocov_app.viewer.session.history import PaneSetup, State
-from robocov_app.viewer.session.trail import Trail
+from robocov_app.viewer.session.history import PaneSetup, State, Trail
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,7 +49,8 @@ class Pane:
         self.starts = simulation.positions
         self.trail = Trail(len(self.starts))
         self.trail.add(simulation.time, self.starts)
-        self.curve, self.times = Curve(), Curve()
+        self.curves = {"distance": Curve(), "time": Curve()}
+        self.curve = self.curves["distance"]
         self.sensed = Sensed()
         self._steps = 0
 

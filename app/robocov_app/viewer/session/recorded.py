@@ -292,11 +292,10 @@ def _put(pane: Pane, saved: Saved, history: History) -> None:
         numbers = history[k].states[pane.number].setup.numbers
         pane.sensed.add(k * record.dt, numbers, record.obstacle_points[k][record.working[k]])
     if saved.history is not None:
-        for time, value in zip(saved.history.time, saved.history.mean_distance, strict=True):
-            pane.curve.add(float(time), float(value))
-        if saved.history.mean_time is not None:
-            for time, value in zip(saved.history.time, saved.history.mean_time, strict=True):
-                pane.times.add(float(time), float(value))
+        told = {"distance": saved.history.mean_distance, "time": saved.history.mean_time}
+        for what, values in told.items():
+            for time, value in zip(saved.history.time, () if values is None else values, strict=False):
+                pane.curves[what].add(float(time), float(value))
 
 
 def _fixed(array: Array) -> Array:

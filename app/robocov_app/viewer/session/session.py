@@ -7,7 +7,7 @@ then taken over.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from operator import itemgetter
 from time import perf_counter
@@ -23,37 +23,20 @@ from robocov.observation import Snapshot
 from robocov.sensor import RangeSensor
 from robocov.world.solid import movers, solid_pieces
 from robocov_app.render.scene import Sensed
-from robocov_app.viewer.session.changes import (
-    Change,
-    Drag,
-    Fail,
-    Join,
-    Leave,
-    Paint,
-    Place,
-    Release,
-    RemovePane,
-    Restart,
-    Revive,
-    SetController,
-    SetDensity,
-    SetLimits,
-    map_change,
-)
+from robocov_app.viewer.session import changes
+from robocov_app.viewer.session.changes import Change, Drag, Release, map_change
 from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.curves import Curve, Event, Ghost
 from robocov_app.viewer.session.decision_replay import DecisionReplay
-from robocov_app.viewer.session.document import Branch, Document, Node
-from robocov_app.viewer.session.history import History, Moment, PaneSetup
+from robocov_app.viewer.session.document import Branch, Document, Node, replayed
+from robocov_app.viewer.session.history import History, Moment, PaneSetup, State, Trail, starts_of, trail_of
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.scenario import MOST_PANES, branch_words, gain_words
-from robocov_app.viewer.session.trail import starts_of, trail_of
 
 if TYPE_CHECKING:
     from robocov_app.viewer.session.file import SavedSession
     from robocov_app.viewer.session.pane import Pane
     from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
-    from robocov_app.viewer.session.trail import Trail
 
 MOST_GHOSTS = 8
 """Branches whose curves are shown."""
@@ -74,11 +57,10 @@ _SLICE = 0.03
 class Session:
     """What is going on in the window; StartError, ParameterError when the scenario cannot be begun.
 
-    What touches it goes on from the moment that is looked at. What cannot be is refused with an error, and
-    nothing has changed then. `head`: where in the document the present is. `settled`: whether no robot has
-    got anywhere for a while. `recorded_until`, s: up to there the run is a record; None where there is none.
-    `serial`: grows when what is known of times so far does not hold any more. `revision`: grows with every
-    touch.
+    What touches it goes on from the moment that is looked at; what cannot be is refused, and nothing has
+    changed then. `head`: where in the document the present is. `recorded_until`, s: up to there the run is a
+    record, which its scenario leads to where `repeatable`. `serial`: grows when what is known of times so far
+    does not hold any more, `revision` with every touch.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -86,25 +68,22 @@ class Session:
         self.playing, self.stop_when_settled, self.settled = True, False, False
         self.recorded_until: float | None = None
         self.repeatable = True
-        """Whether a record that the run began with is what its scenario leads to."""
         self.serial = self.revision = 0
         self._past = DecisionReplay()
         self._run = Lockstep(scenario)
         self.document = Document(scenario)
         self.head = self.document.nodes[0]
-        self._remaking: Iterator[float] | None = None
+        self._remaking: Iterator[None] | None = None
         self._script: list[Node] = []
-        self.progress = 0.0
-        """How much of the branch that is being made again is there, 0 to 1."""
         self._begin_time_line()
 
     @classmethod
     def opened(cls, saved: SavedSession) -> Session:
         """Return the session of a file, made again up to its present; paused."""
-        scenario = _scenario_of(saved.document.path(saved.head)[0])
-        session = cls(scenario)
+        root = saved.document.path(saved.head)[0]
+        session = cls(root.begun)
         session.playing = False
-        session.document, session.head = saved.document, saved.document.path(saved.head)[0]
+        session.document, session.head = saved.document, root
         session._begin_time_line()
         for _ in session._remade(saved.head, saved.step):
             pass
@@ -112,9 +91,8 @@ class Session:
 
     def _begin_time_line(self) -> None:
         """Take note of a run that begins at `head`."""
-        scenario = self._run.scenario
-        self.clock.dt = self._past.dt = scenario.dt
-        self.history = History(scenario.dt)
+        self.clock.dt = self._past.dt = self.scenario.dt
+        self.history = History(self.scenario.dt)
         self.history.add(self._run.moment(self.head.number))
         self._cursor: int | None = None
         self._waited = 0
@@ -161,7 +139,7 @@ class Session:
     @property
     def time(self) -> float:
         """Time of the moment that is looked at, s."""
-        return self.history.time(self._cursor) if self._cursor is not None else self.end
+        return self.end if self._cursor is None else self.history.time(self._cursor)
 
     @property
     def end(self) -> float:
@@ -200,11 +178,17 @@ class Session:
         """Whether the present is the end of a record that nobody has gone on from."""
         return self.recorded_until is not None and self.end <= self.recorded_until + 1e-9
 
+    @property
+    def _number(self) -> int:
+        """Which moment is looked at."""
+        return len(self.history) - 1 if self._cursor is None else self._cursor
+
+    def _state(self, pane: Pane) -> State:
+        return self.history[self._number].states[pane.number]
+
     def setup(self, pane: Pane) -> PaneSetup:
         """Return what holds for a pane at the moment that is looked at."""
-        if self._cursor is None:
-            return pane.setup
-        return self.history[self._cursor].states[pane.number].setup
+        return pane.setup if self._cursor is None else self._state(pane).setup
 
     def snapshot(self, pane: Pane) -> Snapshot:
         """Return the moment that is looked at; a controller that fails on it has decided nothing."""
@@ -212,14 +196,12 @@ class Session:
             try:
                 return pane.simulation.snapshot
             except RobocovError:
-                return self._past.snapshot(self.history.last.states[pane.number], self.time)
-        return self._past.snapshot(self.history[self._cursor].states[pane.number], self.time)
+                pass
+        return self._past.snapshot(self._state(pane), self.time)
 
     def positions(self, pane: Pane) -> Array:
         """Return where the robots are at the moment that is looked at, (n, 2) m."""
-        if self._cursor is None:
-            return pane.simulation.positions
-        return self.history[self._cursor].states[pane.number].positions
+        return pane.simulation.positions if self._cursor is None else self._state(pane).positions
 
     def trail(self, pane: Pane) -> tuple[Array, Array]:
         """Return where the robots went up to the moment that is looked at: (k, n, 2) m and (k,) s."""
@@ -240,10 +222,8 @@ class Session:
             happened = [] if node.scenario is not None else [(node.at, node.kind, node.words)]
             happened += sorted((each.step, each.kind, each.words) for each in node.happenings)
             found += [each for each in happened if each[0] <= limits[node.number]]
-        return [
-            Event(step * self.scenario.dt, kind, words)
-            for step, kind, words in sorted(found, key=itemgetter(0))
-        ]
+        dt = self.scenario.dt
+        return [Event(step * dt, kind, words) for step, kind, words in sorted(found, key=itemgetter(0))]
 
     @property
     def ghosts(self) -> list[Ghost]:
@@ -252,14 +232,9 @@ class Session:
             self._ghosts = self._other_curves()[-2 * MOST_GHOSTS * len(self.panes) :]
         return self._ghosts
 
-    def summary(self) -> Mapping[int, float]:
-        """Return the newest mean distance of each pane, m, by its number."""
-        return {pane.number: pane.curve.at(self.time) for pane in self.panes}
-
     def recent(self, pane: Pane, number: int) -> Array:
         """Return where a robot was during the last seconds before the moment looked at, (k, 2) m."""
-        last = self._cursor if self._cursor is not None else len(self.history) - 1
-        first = self.history.at(self.time - SETTLED_WINDOW)
+        last, first = self._number, self.history.at(self.time - SETTLED_WINDOW)
         places = []
         for k in range(first, last + 1, max(1, (last - first) // 30)):
             state = self.history[k].states.get(pane.number)
@@ -280,7 +255,7 @@ class Session:
         """Make a single step, or show the next moment of the past; it pauses what is playing."""
         self.playing = False
         if self._cursor is not None:
-            self._show_next()
+            self._show_next(self._cursor)
         else:
             self._advance()
 
@@ -292,8 +267,7 @@ class Session:
 
     def look_by(self, moments: int) -> None:
         """Look so many moments further on, or back."""
-        now = self._cursor if self._cursor is not None else len(self.history) - 1
-        self.look_at(self.history.time(min(max(now + moments, 0), len(self.history) - 1)))
+        self.look_at(self.history.time(min(max(self._number + moments, 0), len(self.history) - 1)))
 
     def _play_on(self) -> bool:
         """Make one step, or show the next moment of the past; say whether to go on."""
@@ -302,7 +276,7 @@ class Session:
             self._waited += 1
             # where the past was thinned, moments stay for as many steps as are missing
             if self._waited >= steps[self._cursor + 1] - steps[self._cursor]:
-                self._show_next()
+                self._show_next(self._cursor)
             if self._cursor is None and self.at_end_of_record:
                 self.playing = False  # to go on from there is for people to decide
             return self.playing
@@ -313,21 +287,15 @@ class Session:
             raise
         if self.stop_when_settled and self.settled:
             self.playing = False
-            return False
-        return True
+        return self.playing
 
-    def _show_next(self) -> None:
-        assert self._cursor is not None
+    def _show_next(self, now: int) -> None:
         self._waited = 0
-        self._cursor += 1
-        if self._cursor >= len(self.history) - 1:
-            self._cursor = None
+        self._cursor = now + 1 if now + 1 < len(self.history) - 1 else None
 
     def _advance(self) -> None:
         self.head.happenings.update(self._run.advance())
-        for change in self.head.changes:
-            if change.step == self._run.step:  # it goes on amid a touch that lasted, as a drag
-                self._run.apply(change)
+        self.head.carry_out(self._run)  # it goes on amid a touch that lasted, as a drag
         self.head.end = max(self.head.end, self._run.step)
         self.history.add(self._run.moment(self.head.number))
         if self._script:
@@ -345,7 +313,7 @@ class Session:
             if state is None or state.setup is not pane.setup:
                 return False
             moved = np.hypot(*(pane.simulation.positions - state.positions).T)
-            if len(moved) and float(moved.max()) >= SETTLED_DISTANCE:
+            if moved.max(initial=0.0) >= SETTLED_DISTANCE:
                 return False
         return True
 
@@ -357,18 +325,15 @@ class Session:
 
     def _follow(self) -> None:
         """Carry out what the script says of this step."""
-        step = self._run.step
         if self.head not in self._script:
             self._script = []
             return
-        todo: list[Change] = []
+        todo = False
         for node in self._script[self._script.index(self.head) + 1 :]:
-            if node.at != step:
+            if node.at != self._run.step:
                 break
-            self.head = node
-            todo += [change for change in node.changes if change.step == step]
-        for change in todo:
-            self._run.apply(change)
+            self.head, todo = node, True
+            node.carry_out(self._run)
         if todo:
             self.settled = False
             self.history.amend(self._run.moment(self.head.number))
@@ -392,24 +357,18 @@ class Session:
     def enter(self, node: Node, step: int | None = None) -> None:
         """Go to a step of a node, its end by default: to what was kept, and from there by simulating again.
 
-        Where that takes long, `remaking` says so, and it goes on with every `advance`.
+        Where that takes long it goes on with every `advance`; until then the present stays as it was.
         """
-        self.finish_remaking()
+        self.remake()
         self._remaking = self._remade(node, node.end if step is None else step)
-        self.progress = 0.0
         self.remake(np.inf if np.isinf(self.clock.budget) else 4 * _SLICE)
 
-    @property
-    def remaking(self) -> bool:
-        """Whether a branch is still being made again; until then the present stays as it was."""
-        return self._remaking is not None
-
-    def remake(self, seconds: float) -> None:
-        """Go on with making a branch again for so many seconds."""
+    def remake(self, seconds: float = np.inf) -> None:
+        """Go on with making a branch again for so many seconds, by default to its end."""
         began = perf_counter()
         while self._remaking is not None:
             try:
-                self.progress = next(self._remaking)
+                next(self._remaking)
             except StopIteration:
                 self._remaking = None
             except BaseException:
@@ -417,14 +376,6 @@ class Session:
                 raise
             if perf_counter() - began > seconds:
                 return
-
-    def finish_remaking(self) -> None:
-        """Make all of a branch again."""
-        self.remake(np.inf)
-
-    def give_up_remaking(self) -> None:
-        """Stay where we are."""
-        self._remaking = None
 
     def undo(self) -> str | None:
         """Go back to right before the newest touch; return what it was, None if there is none."""
@@ -443,18 +394,8 @@ class Session:
         self.enter(node)
         return node.words
 
-    @property
-    def can_undo(self) -> bool:
-        """Whether there is a touch to take back."""
-        return self.head.parent is not None
-
-    @property
-    def can_redo(self) -> bool:
-        """Whether something was taken back."""
-        return self.head.redo is not None
-
-    def _remade(self, node: Node, step: int) -> Iterator[float]:
-        """Make the run up to a step of a node again, and take it over; yield how much of it is there."""
+    def _remade(self, node: Node, step: int) -> Iterator[None]:
+        """Make the run up to a step of a node again, and take it over; stop for breath after each step."""
         path, limits = self.document.path(node), self.document.limits(node, step)
         rank = {each.number: k for k, each in enumerate(path)}
         on_the_way = set(rank) & {each.number for each in self.document.path(self.head)}
@@ -462,22 +403,14 @@ class Session:
         kept += [moment for each in path if each.number not in on_the_way for moment in each.kept]
         kept = [moment for moment in kept if moment.step <= limits[moment.node]]
         kept.sort(key=lambda moment: (rank[moment.node], moment.step))
-        run = Lockstep.resumed(kept[-1]) if kept else Lockstep(_scenario_of(path[0]))
+        run = Lockstep.resumed(kept[-1]) if kept else Lockstep(path[0].begun)
         history = History(run.scenario.dt, self.history.most_bytes)
         for moment in kept or [run.moment(path[0].number)]:
             history.amend(moment)
-        at, begun = rank[history.last.node], run.step
-        while (here := path[at]) is not node or run.step < step:
-            if run.step < limits[here.number]:
-                here.happenings.update(run.advance())
-            else:
-                at += 1
-                here = path[at]
-            for change in here.changes:
-                if change.step == run.step:
-                    run.apply(change)
-            history.amend(run.moment(here.number))
-            yield (run.step - begun) / max(step - begun, 1)
+        for _, here in replayed(self.document, node, step, run, path[rank[history.last.node]]):
+            if (run.step, here.number) != (history.last.step, history.last.node):
+                history.amend(run.moment(here.number))
+            yield
         self._take_over(run, node.number, history)
 
     def _take_over(self, run: Lockstep, node: int, history: History, change: Change | None = None) -> None:
@@ -486,17 +419,17 @@ class Session:
         left = self.document.limits(self.head, self._run.step)
         on_the_way, head = run.step <= left.get(node, -1), self.document.nodes[node]
         path, limits = self.document.path(head), self.document.limits(head, run.step)
+        before = {pane.number: pane for pane in self.panes} if on_the_way else {}
         for pane in run.panes:
             last = len(history) - 1
             pane.starts = starts_of(history, pane.number, last)
             pane.trail = trail_of(history, pane.number, last)
-            for what, curve in (("distance", pane.curve), ("time", pane.times)):
+            for what, curve in pane.curves.items():
                 for each in path:
                     if (pane.number, what) in each.curves:
                         curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
-            before = next((each for each in self.panes if each.number == pane.number), None)
-            if before is not None and on_the_way:
-                pane.sensed = before.sensed.copy()
+            if pane.number in before:
+                pane.sensed = before[pane.number].sensed.copy()
                 pane.sensed.cut(run.time)
             else:
                 pane.sensed = _sensed_in(history, pane.number)
@@ -513,19 +446,15 @@ class Session:
         moments: dict[int, list[Moment]] = {}
         for moment in self.history.since(0):
             moments.setdefault(moment.node, []).append(moment)
-        path = self.document.path(self.head)
-        for k, node in enumerate(path):
-            if node is self.head or node.number not in moments:
-                later = [each for each in node.kept if each.step > self._run.step]
-            else:
-                later = []
-            node.keep([*moments.get(node.number, []), *later])
-            begin = node.begin * self.scenario.dt
-            end = path[k + 1].at * self.scenario.dt if k + 1 < len(path) else np.inf
+        path, dt = self.document.path(self.head), self.scenario.dt
+        for node, after in zip(path, [*path[1:], None], strict=True):
+            now = moments.get(node.number, [])
+            later = node.kept if after is None or not now else []
+            node.keep([*now, *(each for each in later if each.step > self._run.step)])
             for pane in self.panes:
                 node.controllers[pane.number] = pane.law
-                for what, curve in (("distance", pane.curve), ("time", pane.times)):
-                    known = curve.between(begin, end)
+                for what, curve in pane.curves.items():
+                    known = curve.between(node.begin * dt, np.inf if after is None else after.at * dt)
                     if (pane.number, what) in node.curves:
                         known.extend(node.curves[pane.number, what], np.inf)
                     if len(known):
@@ -543,11 +472,10 @@ class Session:
                 for what in ("distance", "time"):
                     curve = Curve()
                     for node in path:
-                        since = limits.get(node.number, -1)
+                        since = limits.get(node.number, -np.inf)
                         if (pane, what) in node.curves and theirs[node.number] > since:
-                            known = node.curves[pane, what]
-                            begin = since * dt if since >= 0 else -np.inf
-                            curve.extend(known.between(begin, theirs[node.number] * dt), np.inf)
+                            known = node.curves[pane, what].between(since * dt, theirs[node.number] * dt)
+                            curve.extend(known, np.inf)
                     if len(curve) > 1:
                         words = branch_words(law)
                         found.append(
@@ -562,7 +490,7 @@ class Session:
 
         Changes of the same `gesture`, not None, without anything else between, are one touch.
         """
-        self.finish_remaking()
+        self.remake()
         self._script = []
         let_go = False
         if self._cursor is None:
@@ -570,16 +498,11 @@ class Session:
         else:
             moment, history = self.history[self._cursor], self.history.until(self._cursor)
             resumed = Lockstep.resumed(moment)
-            let_go = resumed.hand is not None and not isinstance(change, (Drag, Release))
+            let_go = resumed.hand is not None and not isinstance(change, Drag | Release)
             resumed.hand = None if let_go else resumed.hand
             self._take_over(resumed, moment.node, history, change)
-        run = self._run
-        if (
-            gesture is not None
-            and self._gesture is not None
-            and self._gesture[0] == gesture
-            and (kind == "hand" or self.end - self._gesture[1] < _SLIDE)
-        ):
+        run, (now, since) = self._run, self._gesture or (None, 0.0)
+        if gesture is not None and gesture == now and (kind == "hand" or self.end - since < _SLIDE):
             head, last = self.head, self.head.changes[-1]
             both_pull = isinstance(change, Drag) and isinstance(last, Drag)
             if both_pull and last.step == run.step and len(head.changes) > 1:  # other changes add up
@@ -596,24 +519,23 @@ class Session:
         self.settled = False
         self.history.amend(run.moment(self.head.number))
 
-    def restart(self, **changes: object) -> None:
+    def restart(self, **changed: object) -> None:
         """Begin anew, with changes of the scenario if there are any."""
         scenario = self.scenario
-        if "environment" in changes or "robots" in changes or "start" in changes or "seed" in changes:
-            changes.setdefault("given", None)
-        if "environment" in changes:
-            changes.setdefault("start", None)
-        elif scenario.start not in {None, "uniform", *scenario.environment.starts}:
-            # an obstacle has covered it
-            changes.setdefault("start", None)
-        self.begin(replace(scenario, **changes), "begun anew")  # type: ignore[arg-type]
+        if changed.keys() & {"environment", "robots", "start", "seed"}:
+            changed.setdefault("given", None)
+        known = {None, "uniform", *scenario.environment.starts}  # an obstacle may have covered it
+        if "environment" in changed or scenario.start not in known:
+            changed.setdefault("start", None)
+        self.begin(replace(scenario, **changed), "begun anew")  # type: ignore[arg-type]
 
     def begin(self, scenario: Scenario, words: str) -> None:
         """Begin another scenario at time 0; undo comes back to this one."""
-        self.finish_remaking()
+        self.remake()
         run = Lockstep(scenario)
         self.stow()
-        self.head = self.document.add(self.head, self._run.step, "begin", words, Restart(scenario))
+        restart = changes.Restart(scenario)
+        self.head = self.document.add(self.head, self._run.step, "begin", words, restart)
         self._run = run
         self.recorded_until = None
         self.revision += 1
@@ -621,21 +543,21 @@ class Session:
 
     def set_law(self, pane: Pane, law: ControllerChoice) -> None:
         """Let another controller, or other gains, take over in a pane."""
-        before = self.setup(pane).law
+        before, change = self.setup(pane).law, changes.SetController(pane.number, law)
         if law == before:
             return
         law.made()
         if law.name != before.name:
-            self.do(SetController(pane.number, law), "law", f"{law.label} takes over")
+            self.do(change, "law", f"{law.label} takes over")
         else:
             words = gain_words(before, law)
             gesture = "gain", pane.number, words.partition(" = ")[0]
-            self.do(SetController(pane.number, law), "law", f"{law.label}: {words}", gesture)
+            self.do(change, "law", f"{law.label}: {words}", gesture)
 
     def set_limits(self, limits: TeamSpec) -> None:
         """Change what all robots are and can do."""
         if limits != self.setup(self.panes[0]).limits:
-            self.do(SetLimits(limits), "limits", "limits changed", "limits")
+            self.do(changes.SetLimits(limits), "limits", "limits changed", "limits")
 
     def add_pane(self, law: ControllerChoice) -> None:
         """Compare with one controller more; all begin anew, from the same starts."""
@@ -645,7 +567,7 @@ class Session:
 
     def remove_pane(self, pane: Pane) -> None:
         """Leave a pane out from now on; the others go on."""
-        self.do(RemovePane(pane.number), "pane", f"{pane.law.label} left out")
+        self.do(changes.RemovePane(pane.number), "pane", f"{pane.law.label} left out")
 
     def edit(self, environment: Environment, words: str) -> int:
         """Go on with other obstacles; return how many robots had to be pushed out of the way."""
@@ -658,22 +580,18 @@ class Session:
     def paint(self, dabs: tuple[Point, ...], radius: float, *, lowers: bool, stroke: object) -> None:
         """Dab the density with a brush; the dabs of a stroke are one touch."""
         words = "density lowered" if lowers else "density raised"
-        self.do(Paint(dabs, radius, lowers), "density", words, ("stroke", stroke))
-
-    def set_density(self, environment: Environment, words: str) -> None:
-        """Go on with the density of another map of the same place."""
-        self.do(SetDensity(environment.density), "density", words)
+        self.do(changes.Paint(dabs, radius, lowers), "density", words, ("stroke", stroke))
 
     def grab(self, number: int, point: Point) -> None:
         """Drag a robot towards a point: by a spring while the run goes on, at once while it is paused.
 
         One that failed comes at once.
         """
-        to = round(float(point[0]), 4), round(float(point[1]), 4)
-        if not self.playing or number not in self.numbers:
-            self._place(number, point)
-        else:
+        if self.playing and number in self.numbers:
+            to = round(float(point[0]), 4), round(float(point[1]), 4)
             self.do(Drag(number, to), "hand", f"robot {number} was dragged", ("hand", number))
+        else:
+            self._place(number, point)
 
     def release(self) -> None:
         """Let go of a robot that is dragged; one that was swung flies on."""
@@ -689,33 +607,26 @@ class Session:
 
     def _place(self, number: int, point: Point) -> None:
         at = float(point[0]), float(point[1])
-        self.do(Place(number, at), "hand", f"robot {number} was moved", ("place", number))
+        self.do(changes.Place(number, at), "hand", f"robot {number} was moved", ("place", number))
 
-    def add_robot(self, point: Point, number: int | None = None) -> int:
+    def add_robot(self, point: Point) -> int:
         """Let one robot more join at a point, or as near as it fits; return its number."""
-        there = {*self.numbers, *self.setup(self.panes[0]).failed}
-        new = max(there) + 1 if number is None else number
+        new = max({*self.numbers, *self.setup(self.panes[0]).failed}) + 1
         at = float(point[0]), float(point[1])
-        self.do(Join(new, at), "robot", f"robot {new} joined")
+        self.do(changes.Join(new, at), "robot", f"robot {new} joined")
         return new
 
     def remove_robot(self, number: int) -> None:
         """Take a robot out, whether it works or not."""
-        self.do(Leave(number), "robot", f"robot {number} taken out")
+        self.do(changes.Leave(number), "robot", f"robot {number} taken out")
 
     def fail_robot(self, number: int) -> None:
         """Let a robot fail: it stays where it is, stops, and is not heard any more."""
-        self.do(Fail(number), "failure", f"robot {number} failed")
+        self.do(changes.Fail(number), "failure", f"robot {number} failed")
 
     def revive_robot(self, number: int) -> None:
         """Let a robot that failed work again, where it stands or as near as it fits."""
-        self.do(Revive(number), "robot", f"robot {number} works again")
-
-
-def _scenario_of(node: Node) -> Scenario:
-    scenario = node.scenario
-    assert scenario is not None
-    return scenario
+        self.do(changes.Revive(number), "robot", f"robot {number} works again")
 
 
 def _sensed_in(history: History, pane: int) -> Sensed:
