@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,7 +46,8 @@ class Known:
 class Costs:
     """Costs for a window, computed in another process, or `direct` where pictures must not depend on it.
 
-    `known`: by pane, of the map as it is. `state`: how far a new map is, or why there is no cost.
+    `known`: by pane, of the map as it is. `state`: how far a new map is, or why there is no cost. `lattice`:
+    sites along a side.
     """
 
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
@@ -76,43 +79,35 @@ class Costs:
         self._waiting, self.known, self._pane = {}, {}, None
 
     def ask(
-        self,
-        pane: int,
-        time: float,
-        positions: Array,
-        point: Array | None = None,
-        speeds: Array | None = None,
+        self, pane: int, time: float, at: Array, point: Array | None = None, speeds: Array | None = None
     ) -> None:
-        """Ask for the cost of (n, 2) m positions, and for a path from a point.
+        """Ask for the cost of (n, 2) m positions, a path from a point and, with (n,) m/s, the mean time.
 
-        With `speeds`, (n,) m/s, for the mean time until the first robot is at a place too. What was asked
-        about the pane before and is not yet on its way is forgotten.
+        What was asked about the pane before and is not yet on its way is forgotten.
         """
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
-            self._waiting[pane] = replace(
-                self._map, time=time, positions=np.array(positions), point=point, speeds=speeds
-            )
+            asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
+            self._waiting[pane] = asked
 
     def poll(self) -> list[tuple[int, Known]]:
         """Return what has been answered since the last call, by pane."""
-        answers = []
+        answers, worker = [], self._worker
         while self._asked is not None or self._ask_next():
-            answer = self._worker.poll()
-            if self._worker.busy:
-                if self._worker.progress is not None:
-                    fraction, seconds = self._worker.progress
+            answer = worker.poll()
+            if worker.busy:
+                if worker.progress is not None:
+                    fraction, seconds = worker.progress
                     left = f", {seconds:.0f} s left" if seconds >= 1.0 else ""
                     self.state = f"cost: preparing the map, {fraction:.0%}{left}"
                 break
             asked, self._asked = self._asked, None
-            if answer is None and asked is self._map:
-                self.state = f"no cost: {self._worker.trouble}"
+            if asked is self._map:
+                self._ready = answer is not None
+                self.state = "" if self._ready else f"no cost: {worker.trouble}"
             elif answer is None:
-                if not self._worker.lives:
+                if not worker.lives:
                     self._prepare()  # it is started again; not if it dies of that too
-            elif asked is self._map:
-                self._ready, self.state = True, ""
             elif self._pane is not None and isinstance(answer, Known):
                 self.known[self._pane] = answer
                 answers.append((self._pane, answer))
@@ -139,10 +134,7 @@ class Costs:
 
 @dataclass(frozen=True, eq=False)
 class CostQuestion:
-    """What is the cost of positions on a map? Without positions: prepare the map.
-
-    `number`: of the map. `environment`: none where the process knows it.
-    """
+    """What is the cost of positions on map `number`, which is told once? Without positions: prepare it."""
 
     number: int
     environment: Environment | None
@@ -153,8 +145,7 @@ class CostQuestion:
     speeds: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Sites:
+class _Sites(NamedTuple):
     """What is the same in all results on a map."""
 
     sites: Sites
@@ -162,8 +153,7 @@ class _Sites:
     weights: Array | None
 
 
-@dataclass(frozen=True, eq=False)
-class _Answer:
+class _Answer(NamedTuple):
     """Answer on its way: sites only where they are others than before."""
 
     sites: _Sites | None
@@ -195,18 +185,11 @@ class _CostWire(Wire):
         assert self._sites is not None and self._lattice is not None
         if answer.result is None:
             return self._sites
-        result = replace(
-            answer.result,
-            **{name: getattr(answer.result, name).astype(np.intp) for name in _INDICES},
-            points=self._sites.sites.points,
-            corners=self._sites.corners,
-            weights=self._sites.weights,
-        )
+        sites, corners, weights = self._sites
+        same: dict[str, Any] = {"points": sites.points, "corners": corners, "weights": weights}
+        indices = {name: getattr(answer.result, name).astype(np.intp) for name in _INDICES}
+        result = replace(answer.result, **indices, **same)
         return Known(answer.time, result, answer.path, self._lattice, answer.travel_time)
-
-
-class _NewerError(RobocovError):
-    """There is a newer map."""
 
 
 class CostService:
@@ -227,47 +210,20 @@ class CostService:
         cost, momentary, question = self._cost, self._momentary, questions[-1]
         if cost is None or momentary is None:
             raise InputError("the map has no cost")
-        if question.positions is None:
-            return _Answer(self._sites_of(cost))
-        return self._evaluated(momentary, question, question.positions)
-
-    def _evaluated(self, momentary: MomentaryCost, question: CostQuestion, positions: Array) -> _Answer:
-        now = question.time
-        result = momentary.of_all(now, positions)
-        if result is None:
-            raise InputError("positions: none is free, but at least one robot was wanted")
-        cost, path, travel_time = momentary.at(now), None, None
-        if question.speeds is not None:
-            first = momentary(now, positions, speeds=question.speeds)
-            travel_time = None if first is None else first.mean_time
-        if question.point is not None:
-            try:
-                path = cost.path(positions[momentary.counted(now, positions)], question.point)
-            except RobocovError:
-                path = None  # the point is not free
-        # half as long on the way
-        indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
-        nothing = np.empty((0, 2))
-        result = replace(
-            result, **indices, points=nothing, corners=nothing, weights=None, environment=None, sites=None
-        )
-        return _Answer(self._sites_of(cost), now, result, path, travel_time)
-
-    def _sites_of(self, cost: CoverageCost) -> _Sites | None:
-        """Return the sites of a cost, None if they are those told last."""
-        if cost is self._told:
-            return None
+        answer = _Answer(None)
+        if question.positions is not None:
+            answer, cost = _evaluated(momentary, question), momentary.at(question.time)
+        sites = None if cost is self._told else _Sites(cost.sites, cost.corners, cost.weights)
         self._told = cost
-        return _Sites(cost.sites, cost.corners, cost.weights)
+        return answer._replace(sites=sites)
 
     def _prepare(self, asked: CostQuestion, line: Line) -> None:
-        environment, before, began = asked.environment, self._cost, time.perf_counter()
+        environment, before, said = asked.environment, self._cost, (began := time.perf_counter())
         assert environment is not None
-        said = began
 
         def give_up(done: float) -> None:
             if any(question.environment is not None for question in line.newer()):
-                raise _NewerError("there is a newer map")
+                raise RobocovError("there is a newer map")
 
         def tell(done: float) -> None:
             nonlocal said
@@ -278,12 +234,35 @@ class CostService:
                 line.tell((done, (now - began) * (1.0 - done) / done))
 
         self._momentary = None
-        if (
-            before is not None
-            and before.lattice == asked.lattice
-            and before.environment.same_place(environment)
-        ):
+        known = before is not None and before.lattice == asked.lattice
+        if before is not None and known and before.environment.same_place(environment):
             self._cost = before.with_density(environment)
         else:
             self._cost = CoverageCost(environment, asked.lattice, progress=tell)
         self._momentary = MomentaryCost(self._cost, progress=give_up)
+
+
+def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
+    now, positions = question.time, question.positions
+    assert positions is not None
+    result = momentary.of_all(now, positions)
+    if result is None:
+        raise InputError("positions: none is free, but at least one robot was wanted")
+    path = travel_time = None
+    if question.speeds is not None:
+        first = momentary(now, positions, speeds=question.speeds)
+        travel_time = None if first is None else first.mean_time
+    if question.point is not None:
+        with suppress(RobocovError):  # the point is not free
+            path = momentary.at(now).path(positions[momentary.counted(now, positions)], question.point)
+    # half as long on the way
+    indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
+    nothing = np.empty((0, 2))
+    same: dict[str, Any] = {
+        "points": nothing,
+        "corners": nothing,
+        "weights": None,
+        "environment": None,
+        "sites": None,
+    }
+    return _Answer(None, now, replace(result, **indices, **same), path, travel_time)

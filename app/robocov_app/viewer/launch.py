@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,6 @@ from robocov_app.viewer.settings import Settings
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from robocov_app.viewer.costs import Costs
     from robocov_app.viewer.session.session import Session
     from robocov_app.viewer.window import Window
 
@@ -33,57 +33,34 @@ HEADLESS_FPS = 30
 """Frames per second of what is rendered without a display."""
 
 
+@dataclass
 class Launcher:
     """How a window is opened.
 
-    Parameters
-    ----------
-    session : Session
-    map_name : str
-    folder : Path
-        Where things are saved.
-    theme, size, scale
-        None for what was used last.
-    shown : names of layers or None
-    headless : bool
-        Draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes.
-    laws : names of controllers
-        To choose from beside the built-in ones.
+    `folder`: where things are saved. `theme`, `size`, `scale`: None for what was used last. `also`,
+    `without`: names of layers. `headless`: draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever
+    that takes. `laws`: names of controllers to choose from beside the built-in ones.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        map_name: str,
-        folder: Path,
-        *,
-        theme: str | None = None,
-        size: tuple[int, int] | None = None,
-        scale: float | None = None,
-        also: frozenset[str] = frozenset(),
-        without: frozenset[str] = frozenset(),
-        headless: bool = False,
-        laws: tuple[str, ...] = (),
-        lattice: int = LATTICE,
-        file: Path | None = None,
-        offers_lesson: bool = False,
-    ) -> None:
-        self._offers_lesson = offers_lesson
-        self.session, self.map_name, self.folder = session, map_name, folder
-        self.theme, self.size, self.scale = theme, size, scale
-        self.also, self.without = also, without
-        self._only_now = self._not_now = frozenset[str]()
-        self.headless, self.laws, self.lattice, self.file = headless, laws, lattice, file
+    session: Session
+    map_name: str
+    folder: Path
+    theme: str | None = None
+    size: tuple[int, int] | None = None
+    scale: float | None = None
+    also: frozenset[str] = frozenset()
+    without: frozenset[str] = frozenset()
+    headless: bool = False
+    laws: tuple[str, ...] = ()
+    lattice: int = LATTICE
+    file: Path | None = None
+    offers_lesson: bool = False
+    _only_now: frozenset[str] = field(default=frozenset(), init=False)
+    _not_now: frozenset[str] = field(default=frozenset(), init=False)
 
     @contextmanager
     def window(self) -> Iterator[Window]:
-        """Give the window; settings are read before and kept afterwards.
-
-        Raises
-        ------
-        InputError
-            When there is no display.
-        """
+        """Give the window, with settings from before, which are kept; InputError when there is no display."""
         keeper = None
         try:
             with display(headless=self.headless, otherwise=NO_DISPLAY):
@@ -93,7 +70,7 @@ class Launcher:
                 window.viewer.say(trouble)
                 if not self.headless and (left := recoverable(autosave_folder())):
                     window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
-                elif self._offers_lesson and file is not None and not file.exists():
+                elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)
                 try:
@@ -129,38 +106,32 @@ class Launcher:
             size = fitting(size)
         if self.headless:
             self.session.clock.budget = float("inf")
-        costs: Costs = Costs(self.lattice, direct=True) if self.headless else Costs(self.lattice)
+        costs = Costs(self.lattice, direct=self.headless)
         try:
             kept_in = None if self.headless else autosave_folder()
-            viewer = Presenter(
-                self.session, costs, shown, self.folder, self.map_name, self.laws, kept_in, self.file
-            )
+            known = self.session, costs, shown, self.folder, self.map_name, self.laws
+            viewer = Presenter(*known, kept_in, self.file)
             viewer.theme = self.theme or settings.theme
             viewer.fade, viewer.suggests, viewer.recent = settings.fade, settings.suggests, [*settings.recent]
             window = Window(viewer, size, scale, patient=self.headless)
-            if self.scale is not None and window.layout.scale < self.scale:
-                wide, high = (round(each * self.scale) for each in SMALLEST)
-                viewer.say(
-                    f"scale {self.scale:g} needs a window of {wide} × {high}: {window.layout.scale:g} it is"
-                )
         except BaseException:
             costs.close()
             raise
+        if self.scale is not None and window.layout.scale < self.scale:
+            wide, high = (round(each * self.scale) for each in SMALLEST)
+            needs = f"scale {self.scale:g} needs a window of {wide} × {high}"
+            viewer.say(f"{needs}: {window.layout.scale:g} it is")
         window.panel.show_tab(settings.tab)
         return window
 
     def _settings_of(self, window: Window, before: Settings) -> Settings:
         """Return how a window looks, but for layers that options showed or hid."""
-        from robocov_app.viewer.panel import TABS
-
-        width, height = window.windowed or window.screen.get_size()
+        viewer, (width, height) = window.viewer, window.windowed or window.screen.get_size()
         changes = {
-            "theme": window.viewer.theme,
-            "fade": window.viewer.fade,
-            "suggests": window.viewer.suggests,
-            "recent": tuple(window.viewer.recent),
-            "shown": tuple(sorted((window.viewer.shown - self._only_now) | self._not_now)),
-            "tab": window.panel.tab if window.panel.tab in TABS else before.tab,
+            **{name: getattr(viewer, name) for name in ("theme", "fade", "suggests")},
+            "recent": tuple(viewer.recent),
+            "shown": tuple(sorted((viewer.shown - self._only_now) | self._not_now)),
+            "tab": window.panel.tab,
             "width": min(max(width, 900), 7680),
             "height": min(max(height, 600), 4320),
         }

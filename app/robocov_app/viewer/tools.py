@@ -5,26 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import dist
 from time import perf_counter
+from typing import ClassVar
 
 import numpy as np
 
 from robocov.environment import Environment, Obstacle, Point, Ring
 from robocov.errors import RobocovError
 from robocov_app.toolkit.draw_tools import SAME, Outline
-from robocov_app.viewer.session.map_edits import (
-    circle_of,
-    moved,
-    obstacle_at,
-    passage_words,
-    polygon_of,
-    snapped,
-    wall_of,
-    with_moved,
-    with_obstacle,
-    without_obstacle,
-    words_for,
-)
+from robocov_app.viewer.session import map_edits
 from robocov_app.viewer.session.session import Session
 
 SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
@@ -37,10 +27,7 @@ _RING = 48  # corners of the circle that shows the brush's size
 
 @dataclass(frozen=True)
 class Preview:
-    """What a tool shows of what it is about to do.
-
-    A `line`, with a mark at each point, the obstacle as it would be, and words beside the last point.
-    """
+    """What a tool is about to do: a `line` with marks, the obstacle, words beside the last point."""
 
     line: tuple[Point, ...] = ()
     closed: bool = False
@@ -49,38 +36,34 @@ class Preview:
     marks: bool = True
 
 
-@dataclass
 class Tool:
-    """What the mouse does; this one does nothing."""
+    """What the mouse does; this one does nothing. Returned words are told.
+
+    `press`: of the left button; `reach` is so many metres as a finger is wide, `number` the robot under the
+    cursor. `move`: pressed or not. `finish`: Enter, a double or a right click. `cancel`: Escape; says whether
+    there was something to give up.
+    """
 
     name: str = ""
     title: str = ""
     hint: str = ""
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        """Take a press of the left button; return what to tell.
-
-        `reach` is so many metres as a finger is wide; `number` the robot under the cursor.
-        """
         return None
 
     def move(self, session: Session, point: Point) -> None:
-        """Take a move of the mouse, pressed or not."""
+        pass
 
     def release(self, session: Session, point: Point) -> str | None:
-        """Take the button's release; return what to tell."""
         return None
 
     def finish(self, session: Session) -> str | None:
-        """Take Enter, a double or a right click; return what to tell."""
         return None
 
     def cancel(self, session: Session) -> bool:
-        """Take Escape; say whether there was something to give up."""
         return False
 
     def preview(self, session: Session) -> Preview | None:
-        """Return what to show."""
         return None
 
 
@@ -93,21 +76,17 @@ def edited(session: Session, environment: Environment, words: str) -> str:
         words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
-    return "; ".join(filter(None, [words, passage_words(before, environment, float(radius.min()))]))
-
-
-def apart(a: Point, b: Point) -> float:
-    """Return the distance of two points, m."""
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+    passage = map_edits.passage_words(before, environment, float(radius.min()))
+    return "; ".join(filter(None, [words, passage]))
 
 
 @dataclass
 class Hand(Tool):
-    """Drags and throws robots, and moves obstacles."""
+    """Drags and throws robots, and moves obstacles; `selected` is the robot that is asked about."""
 
-    name: str = "hand"
-    title: str = "Hand"
-    hint: str = "drag a robot or an obstacle; click a robot to ask it; drag the floor to pan"
+    name = "hand"
+    title = "Hand"
+    hint = "drag a robot or an obstacle; click a robot to ask it; drag the floor to pan"
     selected: int | None = None
     robot: int | None = None
     obstacle: int | None = None
@@ -122,7 +101,7 @@ class Hand(Tool):
         if number is not None:
             self.selected = number
             return None
-        self.obstacle = obstacle_at(session.environment, point)
+        self.obstacle = map_edits.obstacle_at(session.environment, point)
         if self.obstacle is not None:
             self._taken = session.environment.obstacles[self.obstacle]
         return None
@@ -135,11 +114,10 @@ class Hand(Tool):
     def move(self, session: Session, point: Point) -> None:
         self._at = point
         # a click is no pull
-        self._drags = self._drags or bool(np.hypot(*self._by()) > 0.02)
-        if self.robot is None or not self._drags:
-            return
+        self._drags = self._drags or dist(self._from, point) > 0.02
         # meanwhile it may have been taken out
-        if self.robot in {*session.numbers, *session.setup(session.panes[0]).failed}:
+        there = {*session.numbers, *session.setup(session.panes[0]).failed}
+        if self.robot is not None and self._drags and self.robot in there:
             session.grab(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:
@@ -148,11 +126,10 @@ class Hand(Tool):
         self.robot = self.obstacle = None
         if robot is not None:
             session.release()
-            return None
-        if obstacle is None:
-            return None
-        words = f"{words_for(session.environment.obstacles[obstacle])} moved"
-        return edited(session, with_moved(session.environment, obstacle, *self._by()), words)
+        elif obstacle is not None:
+            words = f"{map_edits.words_for(session.environment.obstacles[obstacle])} moved"
+            return edited(session, map_edits.with_moved(session.environment, obstacle, *self._by()), words)
+        return None
 
     def cancel(self, session: Session) -> bool:
         something = self.holds or self.selected is not None
@@ -167,16 +144,15 @@ class Hand(Tool):
         obstacle = self._dragged(session)
         if obstacle is None:
             return None
-        dx, dy = self._by()
-        shape = moved(session.environment.obstacles[obstacle], dx, dy)
-        return Preview((self._from, self._at), False, shape, f"{np.hypot(dx, dy):.2f} m")
+        shape = map_edits.moved(session.environment.obstacles[obstacle], *self._by())
+        return Preview((self._from, self._at), False, shape, f"{dist(self._from, self._at):.2f} m")
 
     def _dragged(self, session: Session) -> int | None:
         """Return the number of the obstacle that is dragged somewhere; meanwhile there may be another map."""
         there = session.environment.obstacles
         if self.obstacle is None or self.obstacle >= len(there) or there[self.obstacle] != self._taken:
             return None
-        return self.obstacle if np.hypot(*self._by()) >= 1e-3 else None
+        return self.obstacle if dist(self._from, self._at) >= 1e-3 else None
 
     def _by(self) -> tuple[float, float]:
         return self._at[0] - self._from[0], self._at[1] - self._from[1]
@@ -186,31 +162,31 @@ class Hand(Tool):
 class Polygon(Tool):
     """Draws a polygon, corner by corner."""
 
-    name: str = "polygon"
-    title: str = "Polygon"
-    hint: str = "click the corners; Enter, a double click or a click on the first corner closes it"
+    name = "polygon"
+    title = "Polygon"
+    hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     outline: Outline = field(default_factory=lambda: Outline(least=3, closes=True), repr=False)
     _reach: float = 0.0
+    _same: ClassVar[float] = 0.0  # part of a finger's width from the last point within which a press ends it
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         self._reach = reach
-        ended = self.outline.press(self._snapped(session, point), point, reach, self._same(reach))
+        same = max(SAME, self._same * reach)
+        ended = self.outline.press(self._snapped(session, point), point, reach, same)
         return self.finish(session) if ended else None
 
     def move(self, session: Session, point: Point) -> None:
         self.outline.at = self._snapped(session, point) if self.outline.points else point
 
     def release(self, session: Session, point: Point) -> str | None:
-        if self.outline.release(self._snapped(session, point), point, self._reach):
-            self.outline.points.append(self.outline.at)
-            return self.finish(session)
-        return None
+        if not self.outline.release(self._snapped(session, point), point, self._reach):
+            return None
+        self.outline.points.append(self.outline.at)
+        return self.finish(session)
 
     def finish(self, session: Session) -> str | None:
         corners = self.outline.take()
-        if not corners:
-            return None
-        return edited(session, with_obstacle(session.environment, self._made(corners)), f"{self.name} drawn")
+        return _drawn(session, self._made(corners), self.name) if corners else None
 
     def cancel(self, session: Session) -> bool:
         return self.outline.cancel()
@@ -219,57 +195,50 @@ class Polygon(Tool):
         if not self.outline.points:
             return None
         points = (*self.outline.points, self.outline.at)
-        return Preview(points, len(points) > 2, None, f"{apart(points[-1], points[-2]):.2f} m")
+        return self._previewed(points, f"{dist(*points[-2:]):.2f} m")
+
+    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
+        return Preview(points, len(points) > 2, None, words)
 
     def _snapped(self, session: Session, point: Point) -> Point:
-        return snapped(session.environment, point, SNAPS_WITHIN * self._reach)
-
-    def _same(self, reach: float) -> float:
-        """Return how near to the last point a press ends it, m."""
-        return SAME
+        return map_edits.snapped(session.environment, point, SNAPS_WITHIN * self._reach)
 
     def _made(self, corners: list[Point]) -> Obstacle:
-        return polygon_of(corners)
+        return map_edits.polygon_of(corners)
 
 
 @dataclass
 class Wall(Polygon):
     """Draws a wall, point by point."""
 
-    name: str = "wall"
-    title: str = "Wall"
-    hint: str = "drag, or click its points, Enter or a double click ends it; [ and ] change its width"
+    name = "wall"
+    title = "Wall"
+    hint = "drag, or click its points, Enter or a double click ends it; [ and ] change its width"
     outline: Outline = field(default_factory=lambda: Outline(drags=True), repr=False)
     width: float = WALL_WIDTH
-
-    def preview(self, session: Session) -> Preview | None:
-        if not self.outline.points:
-            return None
-        points = (*self.outline.points, self.outline.at)
-        words = f"{apart(points[-1], points[-2]):.2f} m, {self.width:g} m wide"
-        wall = None
-        with suppress(RobocovError):
-            wall = self._made(list(points))
-        return Preview(points, False, wall, words)
+    _same = 0.3
 
     def widen(self, factor: float) -> None:
         """Draw wider walls, or narrower ones."""
         self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
 
-    def _same(self, reach: float) -> float:
-        return 0.3 * reach
+    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
+        wall = None
+        with suppress(RobocovError):
+            wall = self._made(list(points))
+        return Preview(points, False, wall, f"{words}, {self.width:g} m wide")
 
     def _made(self, corners: list[Point]) -> Obstacle:
-        return wall_of(corners, self.width)
+        return map_edits.wall_of(corners, self.width)
 
 
 @dataclass
 class Ruler(Tool):
     """Measures."""
 
-    name: str = "ruler"
-    title: str = "Ruler"
-    hint: str = "drag from one place to another"
+    name = "ruler"
+    title = "Ruler"
+    hint = "drag from one place to another"
     _from: Point | None = None
     _at: Point = (0.0, 0.0)
     _pressed: bool = False
@@ -292,62 +261,57 @@ class Ruler(Tool):
         return had
 
     def preview(self, session: Session) -> Preview | None:
-        if self._from is None:
-            return None
-        dx, dy = self._at[0] - self._from[0], self._at[1] - self._from[1]
+        return None if self._from is None else self._measured(self._from)
+
+    def _measured(self, begin: Point) -> Preview:
+        dx, dy = self._at[0] - begin[0], self._at[1] - begin[1]
         words = f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})"
-        return Preview((self._from, self._at), False, None, words)
+        return Preview((begin, self._at), False, None, words)
 
 
 @dataclass
 class Circle(Ruler):
     """Draws a round pillar from its middle."""
 
-    name: str = "circle"
-    title: str = "Circle"
-    hint: str = "drag from the middle to the rim"
+    name = "circle"
+    title = "Circle"
+    hint = "drag from the middle to the rim"
 
     def release(self, session: Session, point: Point) -> str | None:
         middle, self._from = self._from, None
-        if middle is None:
-            return None
-        circle = circle_of(middle, point)
-        return edited(session, with_obstacle(session.environment, circle), "circle drawn")
+        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), self.name)
 
-    def preview(self, session: Session) -> Preview | None:
-        if self._from is None:
-            return None
-        words = f"radius {apart(self._from, self._at):.2f} m"
+    def _measured(self, begin: Point) -> Preview:
         circle = None
         with suppress(RobocovError):
-            circle = circle_of(self._from, self._at)
-        return Preview((self._from, self._at), False, circle, words)
+            circle = map_edits.circle_of(begin, self._at)
+        return Preview((begin, self._at), False, circle, f"radius {dist(begin, self._at):.2f} m")
+
+
+def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
+    return edited(session, map_edits.with_obstacle(session.environment, obstacle), f"{name} drawn")
 
 
 @dataclass
 class Brush(Tool):
     """Paints the density: the left button raises it, the right one lowers it.
 
-    `radius` is None until it is first needed: then a tenth of the map. `lowers`: what a press does.
+    `radius`: None until it is first needed: then a tenth of the map. `lowers`: what a press does. `painting`:
+    whether a stroke has begun and not yet ended.
     """
 
-    name: str = "brush"
-    title: str = "Brush"
-    hint: str = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
+    name = "brush"
+    title = "Brush"
+    hint = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
     radius: float | None = None
     lowers: bool = False
     clock: Callable[[], float] = field(default=perf_counter, repr=False)
+    painting: bool = False
     _dabs: list[Point] = field(default_factory=list, repr=False)
     _stroke: int = 0
-    _painting: bool = False
     _boundary: Ring = ()
     _at: Point | None = None
     _shown: float = -1e9
-
-    @property
-    def painting(self) -> bool:
-        """Whether a stroke has begun and not yet ended."""
-        return self._painting
 
     def size(self, session: Session) -> float:
         """Return the radius, m."""
@@ -362,7 +326,7 @@ class Brush(Tool):
         return f"the brush has a radius of {self.radius:g} m"
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
-        self._painting, self._at, self._shown = True, point, -1e9
+        self.painting, self._at, self._shown = True, point, -1e9
         self._boundary = session.environment.boundary
         self._stroke += 1
         self._dabs = [point]
@@ -370,26 +334,26 @@ class Brush(Tool):
         return None
 
     def move(self, session: Session, point: Point) -> None:
-        if not self._painting or self._at is None:
+        if not self.painting or self._at is None:
             self._at = point
             return
         if session.environment.boundary != self._boundary:
-            self._painting = False  # meanwhile there is another map
+            self.painting = False  # meanwhile there is another map
             return
-        spacing = _SPACING * self.size(session)
-        count, begin = int(apart(self._at, point) / spacing), self._at
-        for k in range(1, count + 1):
-            part = k * spacing / apart(begin, point)
+        spacing, begin = _SPACING * self.size(session), self._at
+        away = dist(begin, point)
+        for k in range(1, int(away / spacing) + 1):
+            part = k * spacing / away
             x, y = (round(a + part * (b - a), 4) for a, b in zip(begin, point, strict=True))
-            self._dabs.append((x, y))
             self._at = x, y
+            self._dabs.append(self._at)
         if self._dabs and self.clock() - self._shown >= _PAUSE:
             self._show(session)
 
     def release(self, session: Session, point: Point) -> str | None:
-        if self._painting:
+        if self.painting:
             self.move(session, point)
-        painting, self._painting = self._painting, False
+        painting, self.painting = self.painting, False
         if not painting:
             return None
         if self._dabs:
@@ -397,7 +361,7 @@ class Brush(Tool):
         return "density lowered" if self.lowers else "density raised"
 
     def cancel(self, session: Session) -> bool:
-        painting, self._painting, self._at = self._painting, False, None
+        painting, self.painting, self._at = self.painting, False, None
         if painting:
             session.undo()
         return painting
@@ -405,8 +369,7 @@ class Brush(Tool):
     def preview(self, session: Session) -> Preview | None:
         if self._at is None:
             return None
-        turn = np.linspace(0.0, 2.0 * np.pi, _RING + 1)
-        radius = self.size(session)
+        turn, radius = np.linspace(0.0, 2.0 * np.pi, _RING + 1), self.size(session)
         x, y = self._at[0] + radius * np.cos(turn), self._at[1] + radius * np.sin(turn)
         outline = tuple(zip(x.tolist(), y.tolist(), strict=True))
         density = session.environment.density
@@ -424,7 +387,10 @@ class Brush(Tool):
 class Click(Tool):
     """Does something at a place, or to the robot there; returns what to tell."""
 
-    does: Callable[[Session, Point, float, int | None], str | None] = lambda *_: None
+    name: str
+    title: str
+    hint: str
+    does: Callable[[Session, Point, float, int | None], str | None] = field(kw_only=True)
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         return self.does(session, point, reach, number)
@@ -434,11 +400,11 @@ def _erase(session: Session, point: Point, reach: float, number: int | None) -> 
     if number is not None:
         session.remove_robot(number)
         return f"robot {number} taken out"
-    index = obstacle_at(session.environment, point, 0.5 * reach)
+    index = map_edits.obstacle_at(session.environment, point, 0.5 * reach)
     if index is None:
         return None
-    words = f"{words_for(session.environment.obstacles[index])} deleted"
-    return edited(session, without_obstacle(session.environment, index), words)
+    words = f"{map_edits.words_for(session.environment.obstacles[index])} deleted"
+    return edited(session, map_edits.without_obstacle(session.environment, index), words)
 
 
 def _add(session: Session, point: Point, reach: float, number: int | None) -> str:
@@ -460,9 +426,9 @@ def toolbox() -> dict[str, Tool]:
     fails = "click a robot to let it fail; click it again to revive it"
     tools: list[Tool] = [
         *(Hand(), Polygon(), Wall(), Circle(), Brush()),
-        Click("eraser", "Delete", "click an obstacle or a robot to delete it", _erase),
-        Click("robot", "Robot", "click where a robot is to join", _add),
-        Click("failure", "Failure", fails, _fail),
+        Click("eraser", "Delete", "click an obstacle or a robot to delete it", does=_erase),
+        Click("robot", "Robot", "click where a robot is to join", does=_add),
+        Click("failure", "Failure", fails, does=_fail),
         Ruler(),
     ]
     return {tool.name: tool for tool in tools}
