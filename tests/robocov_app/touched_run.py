@@ -26,8 +26,6 @@ def begun(*laws: ControllerChoice, robots: int = 3, environment: Environment = H
     """Return a session that is paused at its beginning."""
     session = Session(Scenario(environment, laws or (RAPF,), robots, **changes))
     session.playing = False
-    # as many steps as are due, whatever they take
-    session.clock.budget = float("inf")
     return session
 
 

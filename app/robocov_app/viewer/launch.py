@@ -15,6 +15,7 @@ from robocov_app.toolkit.settings import changed_settings, loaded, save_settings
 from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
+from robocov_app.viewer.session.clock import FRAME_BUDGET
 from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.settings import Settings
 
@@ -104,8 +105,8 @@ class Launcher:
             size = max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale))
         if self.size is None and not self.headless:
             size = fitting(size)
-        if self.headless:
-            self.session.clock.budget = float("inf")
+        if not self.headless:
+            self.session.clock.budget = FRAME_BUDGET
         costs = Costs(self.lattice, direct=self.headless)
         try:
             kept_in = None if self.headless else autosave_folder()

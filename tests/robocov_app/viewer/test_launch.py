@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from robocov_app.commands.demo import Arguments, session_of
 from robocov_app.toolkit.settings import FOLDER
 from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.launch import NO_DISPLAY, Launcher
+from robocov_app.viewer.session.clock import FRAME_BUDGET
 
 SHORT = ("--lattice", "8", "--size", "900x600")
 
@@ -196,6 +198,7 @@ def test_what_options_ask_for_is_not_remembered(tmp_path: Path, monkeypatch) -> 
     asked["without"] = frozenset({"cells"})
     with Launcher(begun(), "hall", tmp_path, lattice=4, **asked).window() as window:
         assert window.viewer.shown == {"robots", "scan"} and window.viewer.theme == "dark"
+        assert window.viewer.session.clock.budget == FRAME_BUDGET, "people look at it"
         window.viewer.shown.add("trails")
     settings = json.loads(kept.read_text())
     assert [settings[name] for name in ("theme", "width", "height", "scale")] == ["light", 1000, 700, None]
@@ -214,4 +217,5 @@ def test_layers_are_shown_and_hidden_as_was_asked(tmp_path: Path) -> None:
     )
     with asked.window() as window:
         assert "scan" in window.viewer.shown and "cells" not in window.viewer.shown
+        assert math.isinf(window.viewer.session.clock.budget), "nobody does"
         window.close()

@@ -35,7 +35,6 @@ class Monkey:
             Conditions(failures=(Failure(2, 0.4),), seed=seed),
         ]
         self.session = begun(*laws, robots=4, start="spread", conditions=r.choice(conditions))
-        self.session.clock.budget = np.inf
 
     def point(self) -> tuple[float, float]:
         return self.random.uniform(0.2, 5.8), self.random.uniform(0.2, 3.8)

@@ -16,6 +16,9 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 LONGEST_FRAME = 0.1
 """What a frame took beyond so many seconds is not made up for."""
 
+FRAME_BUDGET = 0.008
+"""So many seconds of a frame a window that people look at gives to the steps of the simulation."""
+
 _PATIENT = 16.0
 """Where no time runs out, "as fast as it goes" is a speed like any other: this one."""
 
@@ -53,7 +56,7 @@ class Clock:
 
     dt: float
     speed: float = 1.0
-    budget: float = 0.008
+    budget: float = math.inf
     behind: bool = False
     _due: float = 0.0
 
