@@ -281,7 +281,8 @@ class Panel:
         ui.row(0, 0, 0, 0, below=8)
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
-        for text, action in (("Fail", "robot:fail"), ("Remove", "robot:remove")):
+        failed = self.viewer.selected in self.viewer.session.setup(self.viewer.pane).failed
+        for text, action in (("Revive" if failed else "Fail", "robot:fail"), ("Remove", "robot:remove")):
             if ui.button(text, key=action, tip=self._commands[action].tip, why=why):
                 self._do(action)
         report = self.report

@@ -270,8 +270,9 @@ def test_the_page_is_of_the_pane_that_was_clicked(tmp_path: Path) -> None:
 def test_fail_and_remove_buttons_are_of_the_robot_that_is_asked(driver: Driver) -> None:
     driver.click(*driver.robot(2))
     driver.push("robot:fail")
-    assert driver.session.numbers == (1, 3)
+    assert driver.session.numbers == (1, 3) and driver.widget("button", "robot:fail").text == "Revive"
     driver.push("robot:fail")
+    assert driver.widget("button", "robot:fail").text == "Fail"
     driver.push("robot:next")
     driver.push("robot:remove")
     assert driver.session.numbers == (1, 2)
