@@ -122,6 +122,12 @@ class Hands:
             if pixels.any():
                 return pixels
 
+    def sees(self, there: Callable[[np.ndarray], object], what: str) -> np.ndarray:
+        """Return the first picture in which something is there; what was done is drawn a frame later."""
+        pictures = []
+        self.until(lambda: pictures.append(self.shot()) or there(pictures[-1]), what)
+        return pictures[-1]
+
 
 @contextmanager
 def run_window(display: str, folder: Path, command: Sequence[object], **environment: str) -> Iterator[Hands]:

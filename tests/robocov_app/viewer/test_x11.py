@@ -44,36 +44,35 @@ def test_keys_and_mouse_reach_the_window_and_it_ends_as_it_should(display: str, 
         assert first.shape == (SIZE[1], SIZE[0], 3) and first.mean() > 190
 
         hands.key("t", "w")
-        dark = hands.shot()
-        assert dark.mean() < 90
+        dark = hands.sees(lambda picture: picture.mean() < 90, "dark window")
 
         hands.key("c")
         hands.drag((300, 200), (330, 200), (340, 200))
         hands.move(20, 20)
-        drawn = hands.shot()
-        around = np.abs(drawn - dark)[170:230, 270:330].max(axis=2)
-        assert (around > 20).mean() > 0.6  # there is a pillar now
+
+        def pillar_there(picture: np.ndarray) -> bool:
+            around = np.abs(picture - dark)[170:230, 270:330].max(axis=2)
+            return (around > 20).mean() > 0.6
+
+        drawn = hands.sees(pillar_there, "pillar")
 
         hands.key("v", "space")
         time.sleep(0.4)
         hands.key("space")
-        played = hands.shot()
-        assert not np.array_equal(played, drawn)
+        played = hands.sees(lambda picture: not np.array_equal(picture, drawn), "motion")
 
         hands.key("slash")
         hands.tool("type", "--delay", "20", "robots 1")
         hands.key("Return")
         hands.move(20, 20)
-        alone = hands.shot()
+        track = np.s_[SIZE[1] - 26 :]
+        alone = hands.sees(lambda picture: not np.array_equal(picture[track], played[track]), "time 0")
         hands.move(SIZE[0] - 234, 74)  # the field of the number of robots
         hands.tool("click", 1)
         hands.tool("type", "--delay", "20", "3")
         hands.key("Return")
         hands.move(20, 20)
-        together = hands.shot()
-        track = np.s_[SIZE[1] - 26 :]
-        assert not np.array_equal(alone[track], played[track])  # its time is 0 again
-        assert np.abs(together - alone)[:400, :600].max() > 60
+        hands.sees(lambda picture: np.abs(picture - alone)[:400, :600].max() > 60, "three robots")
         hands.key("ctrl+shift+s")
         hands.until(lambda: (tmp_path / "square-1.json").exists(), "saved map")
         (pillar,) = json.loads((tmp_path / "square-1.json").read_text())["obstacles"]
