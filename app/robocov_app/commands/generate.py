@@ -162,10 +162,10 @@ def jobs_of(options: Arguments) -> list[Job]:
         digits = len(str(seeds[-1]))
         return [(f"{options.kind}-{seed:0{digits}}", partial(_generated, options, seed)) for seed in seeds]
     from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.studies import claim_maps, convex_maps, tuning_maps
+    from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 
     plan = FULL if options.study == "full" else QUICK
-    maps, bundled = (*claim_maps(plan), *tuning_maps(plan), *convex_maps(plan)), bundled_maps()
+    maps, bundled = (*claim_maps(plan), *generated_maps(plan.tuning), *convex_maps(plan)), bundled_maps()
     return [(each.name, partial(replace, each.environment)) for each in maps if each.name not in bundled]
 
 

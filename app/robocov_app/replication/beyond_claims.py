@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, IntArray
 from robocov.controllers import controller_kind, information_of
 from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by
 from robocov_app.replication.claims import (
@@ -27,6 +27,7 @@ from robocov_app.replication.claims import (
     lost_text,
     median_text,
     pair_claim,
+    share_of,
 )
 from robocov_app.replication.contenders import OURS, OWN, PAPER, TARGETS, TEAMS, Contender, strongest
 from robocov_app.replication.outcomes import Outcomes
@@ -35,38 +36,28 @@ from robocov_app.replication.results import BeyondResults, Degradation
 from robocov_app.replication.step_times import StepTimes
 from robocov_app.replication.verdicts import Claim, Criterion, amount
 
+# which questions the claims beyond the paper belong to; those of the paper are 1 to 6
 GOALS, RIVALS, EXTENSIONS = 7, 8, 9
-"""Which questions the claims beyond the paper belong to; those of the paper are 1 to 6."""
-
 QUESTIONS = {
     GOALS: "Does our own controller reach its goals?",
     RIVALS: "Is it better than its rivals?",
     EXTENSIONS: "What the paper leaves to others: what difference does it make?",
 }
 
-LEAST_GAP = 0.014
-"""Goal: the median of J/J_ref - 1, at most. RAPF at its best gains had about 5 % when this was set."""
+# the goals
+LEAST_GAP = (
+    0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % when this was set
+)
+MAP_GAP = 0.03  # the median on every single map, at most
+NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
+AT_REST = 0.97  # the share of its runs that come to rest
+REST_TIME = 40.0  # s, the median time after which they do
+STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
 
-MAP_GAP = 0.03
-"""Goal: the median on every single map, at most."""
+CLOSED = 0.5  # most of a gap is closed when more than half of it is
 
-NEVER_WORSE = 1.01
-"""Goal: its median on a map by that of RAPF or LA on the same map, at most."""
-
-AT_REST = 0.97
-"""Goal: the share of its runs that come to rest."""
-
-REST_TIME = 40.0
-"""Goal: the median time after which they do, s."""
-
-STEP_RATIO = 10.0
-"""Goal: the time of a step of a large team by that of RAPF, at most."""
-
-CLOSED = 0.5
-"""Most of a gap is closed when more than half of it is."""
-
+# what RAPF is to bear: axis, value, words
 BORNE = (("loss", 0.6, "60 % of all messages are lost"), ("delay", 1.0, "messages arrive after 1 s"))
-"""What RAPF is to bear: axis, value, words."""
 
 _RESAMPLES = 2000
 
@@ -88,7 +79,7 @@ class Goal(NamedTuple):
         """What became of it: "met", "missed: 1.8 % instead of at most 1.4 %"."""
         if self.met is None:
             return "not measured"
-        criterion = self.claim.criteria[0]
+        (criterion,) = self.claim.criteria
         unsure = criterion.met is None and math.isfinite(criterion.interval.low)
         words = "met" if self.met else f"missed: {self.missed}"
         return words + ("; the interval reaches over the bound" if unsure else "")
@@ -109,7 +100,7 @@ def beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
     unseen = beyond_unseen(results)
     return (
         *(goal.claim for goal in beyond_goals(results)),
-        *(() if unseen is None else (unseen,)),
+        *([] if unseen is None else [unseen]),
         *rival_claims(results.outcomes, OWN[0], results.contenders),
         targets_claim(results.targets),
         density_claim(results.density.outcomes),
@@ -131,109 +122,84 @@ def goals(
     found: list[Goal] = []
 
     def add(name: str, text: str, measure: str, interval: Interval, explanation: str, **wanted: Any) -> None:
+        criterion = Criterion(measure, interval, **wanted)
+        value = interval.estimate
         head = Claim(f"goal-{name}", GOALS, text)
-        found.append(_goal(head.judged((Criterion(measure, interval, **wanted),), explanation, fine, 1)))
+        claim = (
+            replace(head, criteria=(criterion,), explanation=explanation, maps=1, least_maps=1)
+            if name in ("step", "real-time")
+            else head.judged((criterion,), explanation, fine, 1)
+        )
+        found.append(Goal(claim, None if math.isnan(value) else criterion.low <= value <= criterion.high))
 
     if fine.scenarios:
         gap, maps = fine.of(key, "gap"), fine.maps
-        add(
-            "gap",
-            f"{label}'s cost is within {amount(LEAST_GAP, '%')} of the centralised reference in the median.",
-            *_measured_gap(gap, maps),
-            half_text(gap),
-            high=LEAST_GAP,
-            unit="%",
+        text = (
+            f"{label}'s cost is within {amount(LEAST_GAP, '%')} of the centralised reference in the median."
         )
-        medians = fine.median_by_map(key)
-        worst = max(medians, key=lambda name: medians[name])
-        above = sum(value > MAP_GAP for value in medians.values())
-        add(
-            "every-map",
-            f"On every map {label}'s median is within {amount(MAP_GAP, '%')} of the reference.",
-            "highest median of a map",
-            worst_median(gap, maps),
-            f"Highest on {worst}; above it on {above} of {len(medians)} maps.",
-            high=MAP_GAP,
-            unit="%",
-        )
+        median = bootstrap(gap, clusters=maps)
+        add("gap", text, "median of J/J_ref - 1", median, half_text(gap), high=LEAST_GAP, unit="%")
+
+        text = f"On every map {label}'s median is within {amount(MAP_GAP, '%')} of the reference."
+        words = _highest_text(fine.median_by_map(key), MAP_GAP)
+        worst = worst_median(gap, maps)
+        add("every-map", text, "highest median of a map", worst, words, high=MAP_GAP, unit="%")
+
         for other in strongest(contenders):
             pairs = outcomes.compared(key, other.key)
             if pairs is not None:
+                above = amount(NEVER_WORSE - 1.0, "%")
+                text = f"On no map {label}'s median is more than {above} above that of {other.label}."
                 mine, theirs = (pairs.fine.median_by_map(each, "final") for each in (key, other.key))
-                ratios = {name: mine[name] / theirs[name] for name in mine}
-                beyond = sum(value > NEVER_WORSE for value in ratios.values())
-                first, second = (pairs.fine.of(each, "final") for each in (key, other.key))
-                add(
-                    f"not-worse-{other.key}",
-                    f"On no map {label}'s median is more than {amount(NEVER_WORSE - 1.0, '%')} above that of "
-                    f"{other.label}.",
-                    f"highest ratio of a map's medians to {other.label}",
-                    worst_ratio(first, second, pairs.fine.maps),
-                    f"Highest on {max(ratios, key=lambda name: ratios[name])}; above it on {beyond} of "
-                    f"{len(ratios)} maps.",
-                    high=NEVER_WORSE,
-                )
-        touched = fine.of(key, "contacts") > 0
+                words = _highest_text({name: mine[name] / theirs[name] for name in mine}, NEVER_WORSE)
+                worst = worst_ratio(pairs.a, pairs.b, pairs.fine.maps)
+                measure = f"highest ratio of a map's medians to {other.label}"
+                add(f"not-worse-{other.key}", text, measure, worst, words, high=NEVER_WORSE)
+
+        touched, settled = fine.of(key, "contacts") > 0, fine.of(key, "settled")
+        words = f"{touched.sum()} of {len(touched)} runs."
+        text, measure = f"{label} touches nothing.", "runs with a contact"
+        add("contacts", text, measure, share_of(touched, fine), words, high=0.0, unit="%")
+
+        rest = np.isfinite(settled)
+        text = f"{label} comes to rest in at least {amount(AT_REST, '%')} of the runs."
+        words = f"{(~rest).sum()} of {len(rest)} runs do not."
+        add("rest", text, "runs that come to rest", share_of(rest, fine), words, low=AT_REST, unit="%")
+
+        text = f"{label} is at rest within {amount(REST_TIME, 's')} in the median."
+        times = bootstrap(np.where(rest, settled, plan.duration), clusters=maps)
+        words = "Runs that do not come to rest count as the longest."
+        add("time", text, "median time until rest", times, words, high=REST_TIME, unit="s")
+
+    large, huge = (steps.get(robots) for robots in (plan.beyond.large, plan.beyond.huge))
+    if large is not None and math.isfinite((ratio := large.ratio_interval(ours.controller)).estimate):
+        most = f"at most {STEP_RATIO:g} times as long as RAPF's with {large.robots} robots"
+        words = "Timed in turn, over whole seconds of simulated time: plans and scans count by their share."
         add(
-            "contacts",
-            f"{label} touches nothing.",
-            *_share("runs with a contact", touched, maps),
-            f"{int(touched.sum())} of {len(touched)} runs.",
-            high=0.0,
-            unit="%",
+            "step",
+            f"A step of {label} takes {most}.",
+            "time of a step by RAPF's",
+            ratio,
+            words,
+            high=STEP_RATIO,
         )
-        rest = np.isfinite(fine.of(key, "settled"))
-        add(
-            "rest",
-            f"{label} comes to rest in at least {amount(AT_REST, '%')} of the runs.",
-            *_share("runs that come to rest", rest, maps),
-            f"{int((~rest).sum())} of {len(rest)} runs do not.",
-            low=AT_REST,
-            unit="%",
+    if huge is not None and math.isfinite((taken := huge.interval(ours.controller)).estimate):
+        part = Interval(*(value / huge.dt for value in (taken.estimate, taken.low, taken.high)))
+        text, measure = (
+            f"{label} runs in real time with {huge.robots} robots.",
+            "computing time by simulated time",
         )
-        times = np.where(rest, fine.of(key, "settled"), plan.duration)
-        add(
-            "time",
-            f"{label} is at rest within {amount(REST_TIME, 's')} in the median.",
-            "median time until rest",
-            bootstrap(times, clusters=maps),
-            "Runs that do not come to rest count as the longest.",
-            high=REST_TIME,
-            unit="s",
-        )
-    return found + _step_goals(ours, steps, plan)
+        add("real-time", text, measure, part, "One process; the physics of the world included.", high=1.0)
+    return found
 
 
-def _step_goals(ours: Contender, steps: Mapping[int, StepTimes], plan: Plan) -> list[Goal]:
-    large, huge = plan.beyond.large, plan.beyond.huge
-    found = []
-    if large in steps:
-        most = f"at most {STEP_RATIO:g} times as long as RAPF's with {large} robots"
-        text = f"A step of {ours.label} takes {most}."
-        interval = steps[large].ratio_interval(ours.controller)
-        criterion = Criterion("time of a step by RAPF's", interval, high=STEP_RATIO)
-        explanation = (
-            "Timed in turn, over whole seconds of simulated time: plans and scans count by their share."
-        )
-        found.append(("step", text, criterion, explanation))
-    if huge in steps:
-        times = steps[huge]
-        share = times.interval(ours.controller)
-        parts = Interval(*(value / times.dt for value in (share.estimate, share.low, share.high)))
-        criterion = Criterion("computing time by simulated time", parts, high=1.0)
-        text = f"{ours.label} runs in real time with {huge} robots."
-        found.append(("real-time", text, criterion, "One process; the physics of the world included."))
-    return [
-        _goal(Claim(f"goal-{name}", GOALS, text, "", (criterion,), 0, 1, explanation, 1))
-        for name, text, criterion, explanation in found
-        if math.isfinite(criterion.interval.estimate)
-    ]
-
-
-def _goal(claim: Claim) -> Goal:
-    (criterion,) = claim.criteria
-    value = criterion.interval.estimate
-    return Goal(claim, None if math.isnan(value) else criterion.low <= value <= criterion.high)
+def _highest_text(values: Mapping[str, float], bound: float) -> str:
+    """Return in words on which map a value is the highest, and how many are above a bound."""
+    highest, above = (
+        max(values, key=lambda name: values[name]),
+        sum(value > bound for value in values.values()),
+    )
+    return f"Highest on {highest}; above it on {above} of {len(values)} maps."
 
 
 def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> Claim | None:
@@ -245,12 +211,11 @@ def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
     fine = outcomes.measured("gap", key)
     if not fine.scenarios:
         return None
-    maps = fine.maps
-    rest = np.isfinite(fine.of(key, "settled"))
+    gap, rest = bootstrap(fine.of(key, "gap"), clusters=fine.maps), np.isfinite(fine.of(key, "settled"))
     criteria = [
-        Criterion(*_measured_gap(fine.of(key, "gap"), maps), high=LEAST_GAP, unit="%"),
-        Criterion(*_share("runs with a contact", fine.of(key, "contacts") > 0, maps), high=0.0, unit="%"),
-        Criterion(*_share("runs that come to rest", rest, maps), AT_REST, unit="%"),
+        Criterion("median of J/J_ref - 1", gap, high=LEAST_GAP, unit="%"),
+        Criterion("runs with a contact", share_of(fine.of(key, "contacts") > 0, fine), high=0.0, unit="%"),
+        Criterion("runs that come to rest", share_of(rest, fine), AT_REST, unit="%"),
     ]
     for other in strongest(contenders):
         pairs = outcomes.compared(key, other.key)
@@ -276,15 +241,10 @@ def rival_claims(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
         knows = information_of(controller_kind(other.controller))
         text = f"{ours.label} ends at a lower cost than {other.label}"
         text += "." if knows == "own" else f", which goes by the {knows}."
-        found.append(
-            pair_claim(
-                Claim(f"beyond-{ours.key}-{other.key}", RIVALS, text),
-                outcomes.compared(ours.key, other.key),
-                f"median of J({ours.label}) / J({other.label}) at the end",
-                f"runs in which {ours.label}'s is the lower one",
-                lambda pairs: lost_text(pairs, "It"),
-            )
-        )
+        head = Claim(f"beyond-{ours.key}-{other.key}", RIVALS, text)
+        ratio = f"median of J({ours.label}) / J({other.label}) at the end"
+        wins, pairs = f"runs in which {ours.label}'s is the lower one", outcomes.compared(ours.key, other.key)
+        found.append(pair_claim(head, pairs, ratio, wins, lambda pairs: lost_text(pairs, "It")))
     return found
 
 
@@ -304,11 +264,10 @@ def gap_closed(outcomes: Outcomes, ours: Contender, other: Contender) -> Claim:
     if math.isnan(closed(np.arange(len(own)))):
         return replace(head, explanation=f"{other.label} leaves no gap that could be closed.")
     found = bootstrap_by(closed, fine.maps)
-    explanation = (
-        f"Medians of J/J_ref - 1 in the same runs: {median_text(own, '%')} and {median_text(theirs, '%')}."
-    )
-    criteria = (Criterion("part of the median gap that is closed", found, CLOSED, unit="%"),)
-    return head.judged(criteria, explanation, fine, 2)
+    medians = f"{median_text(own, '%')} and {median_text(theirs, '%')}"
+    explanation = f"Medians of J/J_ref - 1 in the same runs: {medians}."
+    criterion = Criterion("part of the median gap that is closed", found, CLOSED, unit="%")
+    return head.judged((criterion,), explanation, fine, 2)
 
 
 def targets_claim(outcomes: Outcomes) -> Claim:
@@ -317,25 +276,18 @@ def targets_claim(outcomes: Outcomes) -> Claim:
         "Whether RAPF heads for the centroid of its cell, its geometric median or the best place of a "
         "sensor makes no difference to the coverage cost."
     )
+    head = Claim("targets", EXTENSIONS, text)
     compared = [outcomes.compared(law.key, TARGETS[0].key) for law in TARGETS[1:]]
     pairs = [each for each in compared if each is not None]
     if not pairs:
-        return Claim("targets", EXTENSIONS, text)
-    criteria = [
-        Criterion(
-            f"median of J({each.first}) / J(centroid) at the end",
-            each.ratio,
-            1.0 - SAME_COST,
-            1.0 + SAME_COST,
-        )
-        for each in pairs
-    ]
+        return head
+    measure, bounds = "median of J({}) / J(centroid) at the end", (1.0 - SAME_COST, 1.0 + SAME_COST)
+    criteria = [Criterion(measure.format(each.first), each.ratio, *bounds) for each in pairs]
     words = "; ".join(
         f"{each.first} lower in {amount(each.wins.estimate, '%')} of the runs" for each in pairs
     )
     runs = sum(2 * len(each.fine.scenarios) for each in pairs)
-    judged = Claim("targets", EXTENSIONS, text).judged(criteria, f"{capitalised(words)}.", pairs[-1].fine, 1)
-    return replace(judged, runs=runs)
+    return replace(head.judged(criteria, f"{capitalised(words)}.", pairs[-1].fine, 1), runs=runs)
 
 
 def density_claim(outcomes: Outcomes) -> Claim:
@@ -361,13 +313,12 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
     text = f"In a mixed team {label} is at places sooner, in the mean, with cells by time than by distance."
     return pair_claim(
         Claim(f"teams-{controller}", EXTENSIONS, text),
-        outcomes.compared(by_time.key, by_distance.key),
+        outcomes.compared(by_time.key, by_distance.key, "time"),
         "median ratio of the mean time, by time to by distance",
         "runs in which it is the lower one",
         lambda pairs: (
-            f"Median of the mean time until the first robot is there: "
-            f"{median_text(pairs.fine.of(by_distance.key, 'final'), 's')} with cells by distance, "
-            f"{median_text(pairs.fine.of(by_time.key, 'final'), 's')} by time. "
+            f"Median of the mean time until the first robot is there: {median_text(pairs.b, 's')} with "
+            f"cells by distance, {median_text(pairs.a, 's')} by time. "
             f"Two robots each of at most 1, 0.5 and 0.25 m/s."
         ),
     )
@@ -376,6 +327,7 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
 def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
     """Test whether RAPF bears messages that are lost or late, from what came of it on so many maps."""
     text = f"RAPF ends within {amount(NEARLY_SAME, '%')} of its cost where messages get lost or are late."
+    head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
     borne = [
         (f"final cost where {words}, by that under ideal conditions", each)
@@ -384,18 +336,16 @@ def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
         if (each.axis, each.value) == (axis, value)
     ]
     if not borne:
-        return Claim("conditions", EXTENSIONS, text)
+        return head
     worst = max(rapf, key=lambda each: each.ratio.estimate)
     value = "none" if worst.value is None else f"{worst.value:g}"
-    return Claim(
-        "conditions",
-        EXTENSIONS,
-        text,
+    highest, axis = amount(worst.ratio.estimate), worst.axis.replace("_", " ")
+    return replace(
+        head,
         criteria=tuple(Criterion(words, each.ratio, high=1.0 + NEARLY_SAME) for words, each in borne),
         runs=sum(2 * each.runs for _, each in borne),
         maps=maps,
-        explanation=f"The highest of all medians is {amount(worst.ratio.estimate)}, with "
-        f"{worst.axis.replace('_', ' ')} {value}.",
+        explanation=f"The highest of all medians is {highest}, with {axis} {value}.",
     )
 
 
@@ -437,11 +387,3 @@ def _highest(statistic: Callable[[IntArray], Any], maps: Sequence[str]) -> Inter
         drawn.append(statistic(rng.choice(rows, size=(_RESAMPLES, len(rows)))))
     low, high = np.quantile(np.max(drawn, axis=0), [0.025, 0.975])
     return Interval(max(estimates), float(low), float(high))
-
-
-def _measured_gap(gap: Array, maps: Sequence[str]) -> tuple[str, Interval]:
-    return "median of J/J_ref - 1", bootstrap(gap, clusters=maps)
-
-
-def _share(measure: str, there: BoolArray, maps: Sequence[str]) -> tuple[str, Interval]:
-    return measure, bootstrap(there.astype(float), "mean", maps)

@@ -6,12 +6,13 @@ every run of it. Statistics are medians over scenarios with 95 % bootstrap inter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import bootstrap, spread
+from robocov_app.figures.statistics import Interval, bootstrap, spread
 from robocov_app.replication.contenders import LABELS, potential_text
 from robocov_app.replication.maps import CONVEX_KINDS
 from robocov_app.replication.outcomes import (
@@ -24,38 +25,27 @@ from robocov_app.replication.outcomes import (
 )
 from robocov_app.replication.verdicts import Claim, Criterion, amount, described
 
-SAME_COST = 0.02
-"""Two costs are the same when the median of their ratio is within 2 % of 1."""
-
-NEARLY_SAME = 0.05
-"""In single runs two costs are nearly the same when they differ by at most 5 %."""
-
-NEARLY_ALWAYS = 0.9
-"""The share of runs that "the result is" speaks of, where the paper makes no exceptions."""
-
-CLEARLY_BELOW = 0.95
-"""A law is better than another one when the median of the ratio of their costs is below this."""
-
-BARELY = 0.05
-"""A result barely depends on the gains when its standard deviation over them is below 5 % of its mean."""
-
-REGRET = 0.02
-"""The best gains depend on the environment when those of other maps cost more than 2 % on it."""
-
+SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
+NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
+NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
+CLEARLY_BELOW = (
+    0.95  # a law is better than another one when the median of the ratio of their costs is below this
+)
+BARELY = (
+    0.05  # a result barely depends on the gains: its standard deviation over them is below 5 % of its mean
+)
+REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
+# a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
+# matter more than gains do in any law that descends to a local optimum, so the bound is wider
 BARELY_BY_START = 0.1
-"""A result barely depends on the starts when its standard deviation over them is below 10 % of its mean.
-
-Starts matter more than gains do in any law that descends to a local optimum, so the bound is wider."""
-
+# two placements are nearly the same when robots are less than a quarter of the side of their share apart
 SAME_PLACEMENT = 0.25
-"""Two placements are nearly the same when robots are less than a quarter of the side of their share apart."""
-
+# a team is near the reference within 10 % of its cost, and far from it above 25 %
 NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
-"""A team is near the reference within 10 % of its cost, and far from it above 25 %."""
 
-CLUSTERED = CONVEX_KINDS[:-1]
-"""Starts in convex regions in which the robots are close together."""
+CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
 
+# the questions that the claims belong to
 QUESTIONS = {
     1: "In convex regions: does RAPF do as well as Lloyd's algorithm, and spread faster?",
     2: "In non-convex environments: is RAPF better than RPF?",
@@ -64,7 +54,6 @@ QUESTIONS = {
     5: "Lloyd's algorithm in non-convex environments: how often are robots stuck?",
     6: "How far are they from what a team could reach that knew the map?",
 }
-"""The questions that the claims belong to."""
 
 
 def paper_claims(
@@ -86,6 +75,11 @@ def paper_claims(
     )
 
 
+def share_of(there: ArrayLike, on: Outcomes) -> Interval:
+    """Return in which share of the runs something is so, (m,) bool."""
+    return bootstrap(there, "mean", on.maps)
+
+
 def pair_claim(
     head: Claim,
     pairs: Comparison | None,
@@ -102,10 +96,7 @@ def pair_claim(
     """
     if pairs is None:
         return head
-    criteria = (
-        Criterion(ratio, pairs.ratio, high=below),
-        Criterion(wins, pairs.wins, share, unit="%"),
-    )
+    criteria = Criterion(ratio, pairs.ratio, high=below), Criterion(wins, pairs.wins, share, unit="%")
     return head.judged(criteria, explain(pairs), pairs.fine, 2)
 
 
@@ -116,14 +107,13 @@ def convex_final(outcomes: Outcomes) -> Claim:
     pairs = outcomes.compared("rapf-shared", "lloyd")
     if pairs is None:
         return head
-    near = bootstrap((np.abs(pairs.ratios - 1.0) <= NEARLY_SAME).astype(float), "mean", pairs.fine.maps)
+    near = share_of(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.fine)
     criteria = (
         Criterion("median of J(RAPF) / J(LA) at the end", pairs.ratio, 1.0 - SAME_COST, 1.0 + SAME_COST),
         Criterion(f"runs that end within {amount(NEARLY_SAME, '%')} of LA", near, NEARLY_ALWAYS, unit="%"),
     )
-    least = amount(float(pairs.ratios.min()))
     explanation = (
-        f"The ratio lies between {least} and {amount(pairs.worst[0])}; LA ends in "
+        f"The ratio lies between {amount(pairs.ratios.min())} and {amount(pairs.ratios.max())}; LA ends in "
         f"a centroidal tessellation, of which a region has several. {_other_gains(outcomes)}"
     )
     return head.judged(criteria, explanation, pairs.fine, 2)
@@ -148,13 +138,10 @@ def convex_spreading(outcomes: Outcomes) -> Claim:
 def against_rpf(outcomes: Outcomes, gains: str, moment: str) -> Claim:
     """Test whether RAPF's cost is below RPF's, at {"shared", "best"} gains, in {"final", "motion"}."""
     at = "with the same potential parameters" if gains == "shared" else "each with its own best gains"
+    averaged = f"the cost averaged over {FIRST_MINUTE:g} s"
     end, what, measure = {
         "final": ("ends at a lower cost than RPF", "the final cost", "final"),
-        "motion": (
-            "has a lower cost than RPF while it moves",
-            f"the cost averaged over {FIRST_MINUTE:g} s",
-            "first_minute",
-        ),
+        "motion": ("has a lower cost than RPF while it moves", averaged, "first_minute"),
     }[moment]
     text = f"In a non-convex environment RAPF {end}, {at}."
     return pair_claim(
@@ -190,14 +177,11 @@ def gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
         return head
     ours, theirs, maps = variation(rapf), variation(rpf), rapf.maps
     measure = "median standard deviation of the final cost over the gains, by its mean"
+    ratio = bootstrap(ours / np.maximum(theirs, 1e-12), clusters=maps)
     criteria = (
         Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY, unit="%"),
         Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY, unit="%"),
-        Criterion(
-            "median ratio of that deviation, RAPF to RPF",
-            bootstrap(ours / np.maximum(theirs, 1e-12), clusters=maps),
-            high=1.0,
-        ),
+        Criterion("median ratio of that deviation, RAPF to RPF", ratio, high=1.0),
     )
     levels = sorted({float(gains["k_att"] or 0.0) for gains in rapf.gains if "k_att" in gains})
     at = "; ".join(
@@ -230,8 +214,8 @@ def gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     best = [potential_text(grid.gains[grid.best()]) for grid in (rapf, rpf)]
     explanation = (
         f"Both sets are judged from a start that neither was chosen on. Highest excess: RPF "
-        f"{amount(float(theirs.max()), '%')}, RAPF {amount(float(ours.max()), '%')}. Best over all maps: "
-        f"RAPF {best[0]}, RPF {best[1]}."
+        f"{amount(theirs.max(), '%')}, RAPF {amount(ours.max(), '%')}. Best over all maps: RAPF {best[0]}, "
+        f"RPF {best[1]}."
     )
     return head.judged(criteria, explanation, rapf, len(rapf.gains) + len(rpf.gains))
 
@@ -241,22 +225,21 @@ def starts_cost(outcomes: Outcomes) -> Claim:
     text = "RAPF's final cost barely depends on where the robots start, RPF's does."
     head = Claim("starts-cost", 4, text, "VI-B, figures 6 and 8")
     fine = outcomes.measured("final", "rapf-shared", "rpf-shared")
-    maps = [name for name, _ in _groups_of_starts(fine)]
+    (ours, maps), (theirs, _) = (_variation_by_start(fine, law) for law in ("rapf-shared", "rpf-shared"))
     if not maps:
         return head
-    ours, theirs = (_variation_by_start(fine, law) for law in ("rapf-shared", "rpf-shared"))
     measure = "median standard deviation of the final cost over the starts, by its mean"
     criteria = (
         Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY_BY_START, unit="%"),
         Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY_BY_START, unit="%"),
     )
     of = {
-        law: median_text(_variation_by_start(outcomes.measured("final", law), law), "%")
+        law: median_text(_variation_by_start(outcomes.measured("final", law), law)[0], "%")
         for law in ("rapf-best", "rpf-best", "lloyd")
     }
     explanation = (
         f"Over the same map and seed, from {len(set(fine.starts))} kinds of starts. RPF's varies "
-        f"{amount(float(np.median(theirs) / max(np.median(ours), 1e-12)))} times as much as RAPF's. At their "
+        f"{amount(np.median(theirs) / max(np.median(ours), 1e-12))} times as much as RAPF's. At their "
         f"best gains: RAPF {of['rapf-best']}, RPF {of['rpf-best']}; LA {of['lloyd']}."
     )
     return head.judged(criteria, explanation, fine, 2)
@@ -273,16 +256,11 @@ def starts_placement(outcomes: Outcomes) -> Claim:
         return head
     ours, theirs = (np.array([apart[name] for name in maps]) for apart in (rapf, rpf))
     metres = [median_text(apart * [fine.shares[name] for name in maps], "m") for apart in (ours, theirs)]
+    measure = "matched distance between the ends from different starts, by the side of a robot's share"
+    ratio = bootstrap(ours / theirs, clusters=maps)
     criteria = (
-        Criterion(
-            "RAPF: matched distance between the ends from different starts, by the side of a robot's share",
-            bootstrap(ours, clusters=maps),
-            high=SAME_PLACEMENT,
-            unit="%",
-        ),
-        Criterion(
-            "median ratio of that distance, RAPF to RPF", bootstrap(ours / theirs, clusters=maps), high=1.0
-        ),
+        Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=SAME_PLACEMENT, unit="%"),
+        Criterion("median ratio of that distance, RAPF to RPF", ratio, high=1.0),
     )
     explanation = (
         f"In metres: RAPF {metres[0]}, RPF {metres[1]} (medians over maps). "
@@ -300,8 +278,7 @@ def lloyd_stuck(outcomes: Outcomes) -> Claim:
     if not fine.scenarios:
         return head
     count = fine.of("lloyd", "stuck")
-    some = bootstrap((count > 0).astype(float), "mean", fine.maps)
-    criteria = [Criterion("runs of LA that end with a robot stuck", some, 0.5, unit="%")]
+    criteria = [Criterion("runs of LA that end with a robot stuck", share_of(count > 0, fine), 0.5, unit="%")]
     near = fine.measured("gap", "lloyd")
     if near.scenarios:
         gap = bootstrap(near.of("lloyd", "gap"), clusters=near.maps)
@@ -311,52 +288,61 @@ def lloyd_stuck(outcomes: Outcomes) -> Claim:
         for law in ("rapf-shared", "rapf-best", "rapf-default")
     )
     explanation = (
-        f"On average {amount(float(count.mean()))} robots are stuck in a run. "
+        f"On average {amount(count.mean())} robots are stuck in a run. "
         f"Runs with a stuck robot of other laws: {others}. Stuck: the goal is more than 0.5 m away and the "
         f"robot moved less than 0.05 m in the last 5 s."
     )
     return head.judged(criteria, explanation, fine, 1)
 
 
+# of each law: what is claimed of its gap to the reference, where the paper says it, and the range
+_GAPS = {
+    "rapf-shared": (
+        "RAPF's coverage is nearly optimal.",
+        "VII: “to achieve an optimal coverage”",
+        -np.inf,
+        NEAR_OPTIMUM,
+    ),
+    "rpf-shared": (
+        "RPF comes to rest far from the optimum.",
+        "IV and I: “usually far from the optimal”",
+        FAR_FROM_OPTIMUM,
+        np.inf,
+    ),
+    "lloyd": (
+        "Lloyd's algorithm, ignorant of obstacles, is nearly optimal all the same.",
+        "",
+        -np.inf,
+        NEAR_OPTIMUM,
+    ),
+}
+
+
 def gap_to_reference(outcomes: Outcomes, law: str) -> Claim:
     """Test how far {"rapf-shared", "rpf-shared", "lloyd"} stays above the centralised reference."""
-    text, source, low, high = {
-        "rapf-shared": (
-            "RAPF's coverage is nearly optimal.",
-            "VII: “to achieve an optimal coverage”",
-            -np.inf,
-            NEAR_OPTIMUM,
-        ),
-        "rpf-shared": (
-            "RPF comes to rest far from the optimum.",
-            "IV and I: “usually far from the optimal”",
-            FAR_FROM_OPTIMUM,
-            np.inf,
-        ),
-        "lloyd": (
-            "Lloyd's algorithm, ignorant of obstacles, is nearly optimal all the same.",
-            "",
-            -np.inf,
-            NEAR_OPTIMUM,
-        ),
-    }[law]
+    text, source, low, high = _GAPS[law]
     head = Claim(f"gap-{law.removesuffix('-shared')}", 6, text, source)
     fine = outcomes.measured("gap", law)
     if not fine.scenarios:
         return head
     gap = fine.of(law, "gap")
     found = bootstrap(gap, clusters=fine.maps)
-    criteria = (Criterion(f"{LABELS[law]}: median of J/J_ref - 1", found, low, high, "%"),)
-    beaten = (
-        f", and was beaten in {amount(float((gap < 0).mean()), '%')} of the runs" if (gap < 0).any() else ""
-    )
+    criterion = Criterion(f"{LABELS[law]}: median of J/J_ref - 1", found, low, high, "%")
+    beaten = f", and was beaten in {amount((gap < 0).mean(), '%')} of the runs" if (gap < 0).any() else ""
+    # bundled maps are larger, and harder
+    drawn = np.array([name.startswith("generated-") for name in fine.maps], dtype=bool)
+    medians = [
+        f"on {name} maps {median_text(gap[chosen], '%')}"
+        for name, chosen in (("generated", drawn), ("bundled", ~drawn))
+        if chosen.any()
+    ]
     explanation = (
-        f"{half_text(gap)[:-1]}; the worst is {amount(float(gap.max()), '%')} above it "
-        f"({fine.scenarios[int(np.argmax(gap))]}). {_by_family(fine, gap)} "
+        f"{half_text(gap)[:-1]}; the worst is {amount(gap.max(), '%')} above it "
+        f"({fine.scenarios[int(np.argmax(gap))]}). Medians: {', '.join(medians)}. "
         f"J_ref is the best of many descents with the whole map known; it is no bound, "
         f"only hard to beat{beaten}."
     )
-    return head.judged(criteria, explanation, fine, 1)
+    return head.judged((criterion,), explanation, fine, 1)
 
 
 def variation(grid: GainOutcomes) -> Array:
@@ -369,7 +355,7 @@ def worst_by_best(grid: GainOutcomes) -> Array:
     return np.asarray(grid.excess.max(axis=0) / grid.excess.min(axis=0))
 
 
-def regrets(grid: GainOutcomes) -> tuple[Array, tuple[str, ...]]:
+def regrets(grid: GainOutcomes) -> tuple[Array, list[str]]:
     """Return what it costs not to know the map when gains are chosen, (k,), and the map of each value.
 
     For every scenario two sets of gains are compared: the best one on the *other starts of the same map*,
@@ -384,7 +370,7 @@ def regrets(grid: GainOutcomes) -> tuple[Array, tuple[str, ...]]:
             known, unknown = grid.best(same), grid.best(others)
             found.append(float(grid.excess[unknown, column] / grid.excess[known, column]) - 1.0)
             where.append(name)
-    return np.array(found), tuple(where)
+    return np.array(found), where
 
 
 def share_above_zero(counts: Array) -> float:
@@ -400,9 +386,11 @@ def half_text(gap: Array) -> str:
 
 
 def lost_text(pairs: Comparison, who: str) -> str:
-    """Return in words how many pairs the first loses, and the highest ratio."""
-    ratio, where = pairs.worst
-    return f"{who} loses {pairs.lost} of {len(pairs.ratios)}; the highest ratio is {amount(ratio)} ({where})."
+    """Return in words how many pairs the first does not win, and the highest ratio."""
+    worst = int(np.argmax(pairs.ratios))
+    ratio, where = amount(pairs.ratios[worst]), pairs.fine.scenarios[worst]
+    lost = (pairs.ratios >= 1.0).sum()
+    return f"{who} loses {lost} of {len(pairs.ratios)}; the highest ratio is {ratio} ({where})."
 
 
 def median_text(values: Array, unit: str = "") -> str:
@@ -417,17 +405,6 @@ def _by_start(pairs: Comparison) -> str:
     )
 
 
-def _by_family(outcomes: Outcomes, gap: Array) -> str:
-    """Return the medians on generated and on bundled maps, which are larger, and harder."""
-    drawn = np.array([name.startswith("generated-") for name in outcomes.maps], dtype=bool)
-    parts = [
-        f"on {name} maps {median_text(gap[chosen], '%')}"
-        for name, chosen in (("generated", drawn), ("bundled", ~drawn))
-        if chosen.any()
-    ]
-    return f"Medians: {', '.join(parts)}."
-
-
 def _other_gains(outcomes: Outcomes) -> str:
     """Return how RAPF compares with LA at its best gains, and at robocov's default."""
     parts = []
@@ -439,27 +416,21 @@ def _other_gains(outcomes: Outcomes) -> str:
     return f"{'; '.join(parts)}." if parts else ""
 
 
-def _groups_of_starts(outcomes: Outcomes) -> Iterator[tuple[str, list[int]]]:
-    """Yield the scenarios of each map and seed, where there are several starts."""
-    groups: dict[tuple[str, int], list[int]] = {}
-    for k, (name, _, seed) in enumerate(outcomes.scenarios):
-        groups.setdefault((name, seed), []).append(k)
-    yield from ((name, rows) for (name, _), rows in groups.items() if len(rows) > 1)
-
-
-def _variation_by_start(outcomes: Outcomes, law: str) -> Array:
-    """Return the variation of the final cost over the starts, for each map and seed."""
-    final = outcomes.of(law, "final")
-    return np.array([spread(final[rows]) for _, rows in _groups_of_starts(outcomes)])
+def _variation_by_start(outcomes: Outcomes, law: str) -> tuple[Array, list[str]]:
+    """Return the variation of the final cost over several starts, (k,), and the map of each value."""
+    groups: dict[tuple[str, int], list[float]] = {}
+    for (name, _, seed), final in zip(outcomes.scenarios, outcomes.of(law, "final"), strict=True):
+        groups.setdefault((name, seed), []).append(final)
+    several = {key: finals for key, finals in groups.items() if len(finals) > 1}
+    return np.array([spread(finals) for finals in several.values()]), [name for name, _ in several]
 
 
 def _placement_spreads(outcomes: Outcomes, law: str) -> dict[str, float]:
     """Return for each map how far ends from different starts are apart, by the side of a robot's share."""
-    places = outcomes.placements.get(law)
-    found: dict[str, float] = {}
-    for name in dict.fromkeys(outcomes.maps) if places is not None else ():
-        rows = [k for k, each in enumerate(outcomes.maps) if each == name]
-        apart = spread_of_placements(np.asarray(places)[rows], [outcomes.starts[k] for k in rows])
+    maps, found = np.array(outcomes.maps), {}
+    for name in dict.fromkeys(outcomes.maps) if law in outcomes.placements else ():
+        rows = np.flatnonzero(maps == name)
+        apart = spread_of_placements(outcomes.placements[law][rows], [outcomes.starts[k] for k in rows])
         if np.isfinite(apart) and name in outcomes.shares:
             found[name] = apart / outcomes.shares[name]
     return found
@@ -468,8 +439,7 @@ def _placement_spreads(outcomes: Outcomes, law: str) -> dict[str, float]:
 def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
     """Return what both laws did in the scenarios where no run of either failed."""
     rapf, rpf = rapf.complete, rpf.complete
-    common = set(rapf.scenarios) & set(rpf.scenarios)
-    return (
-        rapf.where([each in common for each in rapf.scenarios]),
-        rpf.where([each in common for each in rpf.scenarios]),
+    ours, theirs = set(rapf.scenarios), set(rpf.scenarios)
+    return rapf.where([each in theirs for each in rapf.scenarios]), rpf.where(
+        [each in ours for each in rpf.scenarios]
     )

@@ -9,20 +9,16 @@ from itertools import product
 from robocov.controllers import CONTROLLERS, gain_values, make_controller
 from robocov.controllers.gains import Value, value_text
 
-PAPER = ("rapf", "rpf", "lloyd")
-"""Controllers of the paper's claims."""
+PAPER = ("rapf", "rpf", "lloyd")  # controllers of the paper's claims
+OURS = ("atlas", "atlas-shared")  # the project's own controllers; the goals are for the first
 
-OURS = ("atlas", "atlas-shared")
-"""The project's own controllers; the goals are for the first."""
-
+# Potential parameters of both RAPF and RPF, as in the paper, which does not print its own: the repulsion then
+# holds a robot that is pulled with 1 N about 0.83 m off a wall.
 SHARED: Mapping[str, Value] = {"k_rep": 1.0, "rho_0": 2.0}
-"""Potential parameters that RAPF and RPF share, as in the paper, which does not print its own.
-
-The repulsion then holds a robot that is pulled with 1 N about 0.83 m off a wall."""
-
+# RAPF's k_att beside them: a metre from its goal a robot is pulled with 3 N, enough for full speed
 SHARED_ATTRACTION = 3.0
-"""RAPF's k_att beside them: a metre from its goal a robot is pulled with 3 N, enough for full speed."""
 
+# labels of the contenders of the paper's claims, in the order of tables
 LABELS = {
     "rapf-shared": "RAPF, shared gains",
     "rapf-best": "RAPF, its best gains",
@@ -31,7 +27,6 @@ LABELS = {
     "rpf-shared": "RPF, shared gains",
     "rpf-best": "RPF, its best gains",
 }
-"""Labels of the contenders of the paper's claims, in the order of tables."""
 
 
 @dataclass(frozen=True)
@@ -68,26 +63,23 @@ RAPF_SHARED = of_paper("rapf-shared", {**SHARED, "k_att": SHARED_ATTRACTION, "at
 RPF_SHARED = of_paper("rpf-shared", SHARED)
 LLOYD = of_paper("lloyd", {})
 RAPF_DEFAULT = of_paper("rapf-default", {})
+UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)  # the paper's whose gains no grid chooses
 
-UNTUNED = (RAPF_SHARED, RAPF_DEFAULT, RPF_SHARED, LLOYD)
-"""The paper's contenders whose gains no grid chooses."""
-
+# RAPF with each target in its cell
 TARGETS = (
     Contender("centroid", "the centroid", "rapf", {}),
     Contender("median", "the geometric median", "rapf", {"target": "median"}),
     Contender("sensing", "a sensor's best place, h = 1 m", "rapf", {"target": "sensing"}),
 )
-"""RAPF with each target in its cell."""
 
+# controllers of teams with mixed speeds, with each kind of cells
 TEAMS = tuple(
     Contender(f"{name}-{cells}", f"{CONTROLLERS[name].label}, cells by {cells}", name, {"cells": cells})
     for name in ("rapf", "lloyd")
     for cells in ("distance", "time")
 )
-"""Controllers of teams with mixed speeds, with each kind of cells."""
 
 OWN = tuple(with_gains(name, {}) for name in OURS)
-"""Our own controllers with their default gains."""
 
 
 def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
@@ -95,6 +87,10 @@ def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
     return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
 
 
+# Sets of gains that are tried of each baseline; what they do not name has its default. One to three gains
+# vary that decide where a controller ends, not how hard a robot is driven or how finely something is sampled.
+# What a baseline is for stays: `poduri` keeps two neighbours, `range-limited` a range, `barrier` a safe gap.
+# Defaults of `robocov.controllers` are the best sets of the full study; those before them are among these.
 GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
     "howard": grid(k_robots=(3.0, 10.0, 30.0), k_obs=(0.3, 1.0, 3.0)),
     "poduri": grid(link_range=(4.0, 6.0, 12.0), k_cover=(3.0, 10.0, 30.0), k_obs=(0.1, 0.3)),
@@ -109,12 +105,6 @@ GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
     "barrier": (*grid(gamma=(5.0, 20.0), braking=(0.8,)), {"gamma": 20.0, "braking": 0.5}),
     "geodesic-lloyd": grid(exponent=(1.0, 1.5, 2.0)),
 }
-"""Sets of gains that are tried of each baseline; what they do not name has its default.
-
-One to three gains are varied that decide where a controller ends, not how hard a robot is driven or how
-finely something is sampled. What a baseline is for stays: `poduri` keeps two neighbours, `range-limited` a
-range, `barrier` its safe gap. The defaults of `robocov.controllers` are the best sets of the full study;
-those that they replaced are among the sets."""
 
 
 def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
@@ -161,4 +151,4 @@ def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
             parts.append(f"{name} {value_text(value)}")
         elif no_limit:
             parts.append(no_limit if name == "attraction_limit" else f"{name} none")
-    return "(" + ", ".join(parts) + ")"
+    return f"({', '.join(parts)})"

@@ -24,33 +24,27 @@ from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov_app.sweep.study import StudyMap
 
-KINDS = ("corner", "centre", "uniform")
-"""The starts on non-convex maps; all but the last are clustered."""
+KINDS = ("corner", "centre", "uniform")  # the starts on non-convex maps; all but the last are clustered
+CONVEX_KINDS = (
+    "corner",
+    "centre",
+    "tight",
+    "uniform",
+)  # those in convex regions; all but the last are clustered
 
-CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
-"""The starts in convex regions; all but the last are clustered."""
+RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
+TIGHT = 0.35  # m, of the disc of "tight": it has room for the centres of six robots, and hardly more
 
-RADII = (0.8, 0.6, 0.45)
-"""Radii of the discs of clustered starts, m; the first that fits is taken."""
-
-TIGHT = 0.35
-"""Radius of the disc of "tight", m: it has room for the centres of six robots, and hardly more."""
-
+# bundled maps of the study: all that are not convex, but for ``campus``, which is 120 m wide: at 1 m/s the
+# robots would not have arrived when the run ends
 NON_CONVEX = (
     *("blocks-a", "blocks-b", "l-shape", "rooms", "trap", "gaps", "cave", "courtyard", "corridor"),
     *("museum", "office", "warehouse", "city"),
 )
-"""Bundled maps of the study: all that are not convex, but for ``campus``, which is 120 m wide: at 1 m/s the
-robots would not have arrived when the run ends."""
+CONVEX = ("square", "pentagon")  # bundled maps of the convex case
 
-CONVEX = ("square", "pentagon")
-"""Bundled maps of the convex case."""
-
-SIDE = 10.0
-"""Metres of the square in which regions are drawn by chance."""
-
-HOT_SPOTS = 2
-"""Gaussians that are drawn by chance on each map: 20 times as much counts a place in the middle of one."""
+SIDE = 10.0  # m, of the square in which regions are drawn by chance
+HOT_SPOTS = 2  # Gaussians drawn by chance on a map: in the middle of one a place counts 20 times as much
 
 _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
@@ -67,14 +61,8 @@ def generated(seed: int) -> StudyMap:
     ten metres; every passage is at least 0.6 m wide, and the free space is in one piece.
     """
     rng = np.random.default_rng([seed, 2])
-    environment = generated_map(
-        seed,
-        kind="polygons",
-        obstacles=int(rng.integers(4, 9)),
-        area=round(float(rng.uniform(0.16, 0.25)), 3),
-        gap=0.6,
-        side=SIDE,
-    )
+    obstacles, area = int(rng.integers(4, 9)), round(float(rng.uniform(0.16, 0.25)), 3)
+    environment = generated_map(seed, kind="polygons", obstacles=obstacles, area=area, gap=0.6, side=SIDE)
     return StudyMap(f"generated-{seed}", with_kinds_of_starts(environment))
 
 
@@ -88,11 +76,13 @@ def convex_region(seed: int) -> StudyMap:
     while True:
         points = np.round(rng.uniform(0.0, SIDE, size=(_POINTS, 2)), 2)
         hull = shapely.convex_hull(shapely.MultiPoint(points))
-        if hull.area >= _LEAST_AREA and _width(hull) >= _LEAST_WIDTH:
+        corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
+        width = np.hypot(*np.diff(corners[:3], axis=0).T).min()
+        if hull.area >= _LEAST_AREA and width >= _LEAST_WIDTH:
             break
     ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
-    corners = tuple((float(x), float(y)) for x, y in ring)
-    region = Environment(f"convex-{seed}", corners, description="A convex region drawn by chance.")
+    boundary = tuple((float(x), float(y)) for x, y in ring)
+    region = Environment(f"convex-{seed}", boundary, description="A convex region drawn by chance.")
     return StudyMap(region.name, with_kinds_of_starts(region, CONVEX_KINDS))
 
 
@@ -111,11 +101,6 @@ def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS)
     return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
 
 
-def side_of_share(environment: Environment, robots: int) -> float:
-    """Return the side of a square as large as one robot's share of the free space, m."""
-    return float(np.sqrt(environment.free_area / robots))
-
-
 def _start(environment: Environment, kind: str) -> StartSpec:
     if kind == "uniform":
         return UniformStart()
@@ -128,9 +113,3 @@ def _start(environment: Environment, kind: str) -> StartSpec:
             # whole centimetres are the same on every processor
             return DiscStart((round(nearest[0], 2), round(nearest[1], 2)), radius)
     raise StartError(f"map {environment.name!r}: no free disc of {RADII[-1]:g} m radius")
-
-
-def _width(hull: shapely.Polygon) -> float:
-    """Return the length of the shorter side of the smallest rectangle round a polygon."""
-    corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
-    return float(np.hypot(*np.diff(corners[:3], axis=0).T).min())

@@ -21,25 +21,24 @@ from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov_app.figures.statistics import Interval, bootstrap
-from robocov_app.replication.maps import side_of_share
 from robocov_app.replication.plan import ROBOTS
 from robocov_app.replication.references import Reference
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study import Study
 
-EARLY = 20.0
-"""Seconds in which a team spreads over a convex region of ten metres; Lloyd's algorithm has settled then."""
+EARLY = (
+    20.0  # s in which a team spreads over a convex region of ten metres; Lloyd's algorithm has settled then
+)
+FIRST_MINUTE = 60.0  # s that count as "during the motion"
 
-FIRST_MINUTE = 60.0
-"""Seconds that count as "during the motion"."""
-
+# measures that stand in the table of a sweep, and their columns; robots of one speed have no time
 COLUMNS = {
     "final": "mean_distance_m",
     "contacts": "contacts",
     "stuck": "stuck_robots",
     "settled": "settled_at_s",
+    "time": "mean_time_s",
 }
-"""Measures that stand in the table of a sweep, and their columns."""
 
 
 class Scenario(NamedTuple):
@@ -55,24 +54,18 @@ class Scenario(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What every contender reached in every scenario.
+    """What every contender reached in each of m scenarios; nan where its run failed.
 
-    Attributes
-    ----------
-    scenarios : m scenarios
-    values : dict of (contender, measure) to (m,)
-        Measures: ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
-        ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not).
-    placements : dict of contender to (m, n, 2) m
-        Where the robots were at the end; nan where the run failed.
-    shares : dict of map to float, m
-        Side of a square as large as one robot's share of the free space.
+    Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
+    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), and ``time`` (s).
     """
 
     scenarios: tuple[Scenario, ...]
-    values: Mapping[tuple[str, str], Array]
-    placements: Mapping[str, Array] = field(default_factory=dict)
-    shares: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[tuple[str, str], Array]  # (m,) by contender and measure
+    placements: Mapping[str, Array] = field(default_factory=dict)  # (m, n, 2) m at the end, by contender
+    shares: Mapping[str, float] = field(
+        default_factory=dict
+    )  # side of a robot's share of each map, a square, m
 
     def of(self, contender: str, measure: str) -> Array:
         """Return what a contender reached, (m,); all nan where it did not take part."""
@@ -116,22 +109,25 @@ class Outcomes:
     def compared(self, first: str, second: str, measure: str = "final") -> Comparison | None:
         """Return how `first` compares with `second`; None where they never met."""
         fine = self.measured(measure, first, second)
-        return Comparison(fine, first, second, measure) if fine.scenarios else None
+        if not fine.scenarios:
+            return None
+        return Comparison(fine, first, second, fine.of(first, measure), fine.of(second, measure))
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two contenders pair by pair, in the scenarios in which both have a value."""
+    """Two contenders pair by pair, in the m scenarios in which both have a value."""
 
     fine: Outcomes
     first: str
     second: str
-    measure: str
+    a: Array  # the first's values, (m,)
+    b: Array
 
     @cached_property
     def ratios(self) -> Array:
         """The first's value by the second's, (m,)."""
-        return self.fine.of(self.first, self.measure) / self.fine.of(self.second, self.measure)
+        return self.a / self.b
 
     @cached_property
     def ratio(self) -> Interval:
@@ -141,20 +137,8 @@ class Comparison:
     @cached_property
     def wins(self) -> Interval:
         """Share of pairs in which the first's value is the lower one; ties count half."""
-        first, second = (self.fine.of(each, self.measure) for each in (self.first, self.second))
-        won = np.where(first < second, 1.0, np.where(first == second, 0.5, 0.0))
+        won = np.where(self.a < self.b, 1.0, np.where(self.a == self.b, 0.5, 0.0))
         return bootstrap(won, "mean", self.fine.maps)
-
-    @property
-    def lost(self) -> int:
-        """How many pairs the first does not win."""
-        return int((self.ratios >= 1.0).sum())
-
-    @property
-    def worst(self) -> tuple[float, Scenario]:
-        """The highest ratio, and where."""
-        k = int(np.argmax(self.ratios))
-        return float(self.ratios[k]), self.fine.scenarios[k]
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
@@ -181,14 +165,10 @@ def joined(parts: Sequence[Outcomes]) -> Outcomes:
 
 @dataclass(frozen=True, eq=False)
 class GainOutcomes:
-    """What one controller reached with every set of gains of a grid.
+    """What one controller reached in m scenarios with each of g sets of gains.
 
-    Attributes
-    ----------
-    scenarios : m scenarios
-    gains : g sets of gains
-    excess : (g, m)
-        J/J_ref: the final mean distance by that of the map's centralised reference; nan where a run failed.
+    `excess`, (g, m), is J/J_ref: the final mean distance by that of the map's centralised reference; nan
+    where a run failed.
     """
 
     scenarios: tuple[Scenario, ...]
@@ -229,45 +209,29 @@ def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Valu
     return {name: grid.gains[grid.best()] for name, grid in found.items() if grid.complete.scenarios}
 
 
-def read_outcomes(
-    folder: Path,
-    contest: Contest,
-    references: Mapping[str, Reference],
-    columns: Mapping[str, str] = COLUMNS,
-) -> Outcomes:
+def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Reference]) -> Outcomes:
     """Return what the contenders of a sweep reached; without a reference there is no gap on a map.
 
-    `columns` of its table by measure. Raises InputError when the results cannot be read.
+    Raises InputError when the results cannot be read.
     """
-    results = read_results(folder)
-    scenarios = scenarios_of(contest.study)
-    keys: dict[Any, list[str]] = {}
-    for each in contest.contenders:
-        keys.setdefault(_law(each.controller, each.all_gains), []).append(each.key)
-    values = {
-        (each.key, measure): np.full(len(scenarios), np.nan)
-        for each in contest.contenders
-        for measure in (*columns, "early", "first_minute", "gap")
-    }
-    placements = {each.key: np.full((len(scenarios), ROBOTS, 2), np.nan) for each in contest.contenders}
+    results, scenarios = read_results(folder), scenarios_of(contest.study)
+    laws = {each.key: _law(each.controller, each.all_gains) for each in contest.contenders}
+    measures = (*COLUMNS, "early", "first_minute", "gap")
+    values = {(key, measure): np.full(len(scenarios), np.nan) for key in laws for measure in measures}
+    placements = {key: np.full((len(scenarios), ROBOTS, 2), np.nan) for key in laws}
     for at, row in _rows(folder, scenarios):
-        own = keys.get(_law(row["controller"], row))
-        if own is None:
-            continue
-        history, reference = results.history(row["run"]), references.get(row["map"])
-        found = {
-            measure: np.nan if row[column] is None else float(row[column])
-            for measure, column in columns.items()
-        }
-        found["early"] = mean_until(history, EARLY)
-        found["first_minute"] = mean_until(history, FIRST_MINUTE)
-        if reference is not None:
-            found["gap"] = found["final"] / reference.mean_distance - 1.0
-        for key in own:
+        here = _law(row["controller"], row)
+        for key in (key for key, law in laws.items() if law == here):
             placements[key][at] = results.record(row["run"]).positions[-1]
-            for measure, value in found.items():
-                values[key, measure][at] = value
-    shares = {each.name: side_of_share(each.environment, ROBOTS) for each in contest.study.maps}
+            for measure, column in COLUMNS.items():
+                if row.get(column) is not None:
+                    values[key, measure][at] = row[column]
+            history, reference = results.history(row["run"]), references.get(row["map"])
+            values[key, "early"][at] = mean_until(history, EARLY)
+            values[key, "first_minute"][at] = mean_until(history, FIRST_MINUTE)
+            if reference is not None:
+                values[key, "gap"][at] = values[key, "final"][at] / reference.mean_distance - 1.0
+    shares = {each.name: float(np.sqrt(each.environment.free_area / ROBOTS)) for each in contest.study.maps}
     return Outcomes(scenarios, values, placements, shares)
 
 
@@ -323,8 +287,7 @@ def matched_distance(first: Array, second: Array) -> float:
     from scipy.optimize import linear_sum_assignment
 
     apart = np.hypot(*(first[:, None] - second[None]).transpose(2, 0, 1))
-    rows, columns = linear_sum_assignment(apart)
-    return float(apart[rows, columns].mean())
+    return float(apart[linear_sum_assignment(apart)].mean())
 
 
 def spread_of_placements(placements: Array, starts: Sequence[str]) -> float:

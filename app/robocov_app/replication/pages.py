@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,14 +18,21 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import beyond_claims, claims, contenders, maps, studies
-from robocov_app.replication.evidence import ASSETS, Evidence, evidence, evidence_rows, law_rows, map_rows
+from robocov_app.replication import beyond_claims, claims, contenders, maps, step_times, studies
+from robocov_app.replication.contenders import LABELS, OURS
+from robocov_app.replication.evidence import (
+    ASSETS,
+    Evidence,
+    account_of,
+    evidence,
+    law_rows,
+    ranked_rows,
+    worst_text,
+)
 from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
-from robocov_app.replication.outcomes import Scenario
 from robocov_app.replication.plan import FULL, ROBOTS, TEAM, Plan
 from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
-from robocov_app.replication.step_times import BLOCK, MAP
 from robocov_app.replication.svg import Strip, interval_bar, strips
 from robocov_app.replication.verdicts import LEAST_MAPS, Claim, amount, described, verdict_counts
 from robocov_app.report.embedding import ReplayRun
@@ -40,22 +48,14 @@ if TYPE_CHECKING:
 
 PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 
-_REPLAY_BUDGET = 400_000
-"""Bytes of the runs in the page's replay."""
+_REPLAY_BUDGET = 400_000  # bytes of the runs in the page's replay
 
-_CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}
-"""Which figure shows which runs."""
-
-_QUESTION_NAMES = ("Convex regions", "RAPF and RPF", "Gains", "Starts", "Lloyd's algorithm", "Optimum")
-"""What the questions are called in the page's contents."""
-
-_EXTENSIONS = (
-    ("targets", ("beyond-heights", "beyond-targets"), ("targets",)),
-    ("density", ("beyond-density",), ("density",)),
-    ("teams", ("beyond-teams",), ("teams-rapf", "teams-lloyd")),
-    ("conditions", ("beyond-conditions",), ("conditions",)),
-)
-"""The parts of the extensions: name, figures, claims."""
+_CASES = {
+    "convex": "Figure 2",
+    "a": "Figure 4",
+    "b": "Figure 6",
+    "other": "Figure 8",
+}  # which shows which runs
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
 
@@ -83,23 +83,20 @@ def save_paper_figures(
     The first moment of `first` is figure 1; without `results` there are no claims.
     """
 
-    def drawn(theme: str) -> dict[str, Callable[[], Figure]]:
-        def of(number: int) -> Callable[[], Figure]:
-            return lambda: draw_figure(number, runs, first, theme)
-
-        figures = {f"figure-{each.number}": of(each.number) for each in FIGURES}
+    def drawn(theme: str) -> Mapping[str, Callable[[], Figure]]:
+        figures = {f"figure-{number}": partial(draw_figure, number, runs, first, theme) for number in FIGURES}
         return figures if results is None else {**figures, **paper_plots(results, theme)}
 
     words = {
-        f"figure-{each.number}": f"{each.shows} {describe_figure(each.number, runs, first)}"
-        for each in FIGURES
+        f"figure-{number}": f"{shows} {describe_figure(number, runs, first)}"
+        for number, (_, shows) in FIGURES.items()
     }
     return _save_figures(folder, drawn, words, quiet=quiet)
 
 
 def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, Image]:
     """Write the figures beyond the paper to ``figures/``; may raise OutputError."""
-    return _save_figures(folder, lambda theme: beyond_plots(results, theme), {}, quiet=quiet)
+    return _save_figures(folder, partial(beyond_plots, results), {}, quiet=quiet)
 
 
 def _save_figures(
@@ -130,10 +127,7 @@ def _save_figures(
 
 
 def save_paper_page(folder: Path, *content: Any) -> None:
-    """Write ``index.html``, which needs nothing but ``figures/`` beside it; may raise OutputError.
-
-    The parameters are those of `paper_page`.
-    """
+    """Write ``index.html``, the `paper_page` of the rest, which needs nothing but ``figures/`` beside it."""
     _write(folder / PAGE, paper_page(*content))
 
 
@@ -156,30 +150,19 @@ def paper_page(
         ReplayRun(run.record, run.history, f"{_CASES[name.partition('/')[0]]}: {run.record.label}")
         for name, run in runs.items()
     ]
-    order = list(runs)
-    panes = [order.index("b/rapf"), order.index("b/rpf")]
+    panes = [list(runs).index(name) for name in ("b/rapf", "b/rpf")]
     context: dict[str, Any] = {
         "results": results,
         "runs": len(runs),
         "claims": paper,
         "beyond": beyond,
+        "images": images,
         "figures": [
-            (each, images[f"figure-{each.number}"], describe_figure(each.number, runs, first))
-            for each in FIGURES
+            (number, shows, images[f"figure-{number}"], describe_figure(number, runs, first))
+            for number, (_, shows) in FIGURES.items()
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
-        "replay_script": Markup(script(replay_js() + "startReplays();")),
-        "question_names": _QUESTION_NAMES,
-        "questions": [
-            (
-                number,
-                text,
-                own,
-                next((images[name] for name in images if name.startswith(f"claim-{number}-")), None),
-            )
-            for number, text in claims.QUESTIONS.items()
-            if (own := [claim for claim in paper if claim.part == number])
-        ],
+        "replay_script": Markup(script(f"{replay_js()}startReplays();")),
         "settled": (SETTLED_DISTANCE, SETTLED_WINDOW),
         "versions": versions(),
         "resamples": RESAMPLES,
@@ -187,16 +170,25 @@ def paper_page(
         "all_bundled": len(plan.bundled) == len(maps.NON_CONVEX),
     }
     if results is not None:
-        gap = results.claims.measured("gap", "rapf-shared").of("rapf-shared", "gap")
+        outcomes, best = results.claims, {each.key: each for each in results.contenders}
+        gap = outcomes.measured("gap", "rapf-shared").of("rapf-shared", "gap")
+        medians = {law: outcomes.median_by_map(law) for law in LABELS}
+        others = {"rapf-best": "at its best gains", "lloyd": "LA", "rpf-shared": "RPF"}
+        failures = []
+        for scenario, record in results.worst:
+            stuck = outcomes.of("rapf-shared", "stuck")[outcomes.scenarios.index(scenario)]
+            rest = f"{stuck:.0f} of {len(record.team)} robots rest away from their goals"
+            words = worst_text(outcomes, scenario, "rapf-shared", others)
+            failures.append((scenario, _picture(record), f"{words}; {rest}."))
         context |= {
-            "best": {each.key: each for each in results.contenders},
-            "maps_in_all": len({*results.claims.maps}) + len({*results.convex.maps}) + len(plan.tuning),
-            "laws": law_rows(results.claims),
-            "maps": map_rows(results.claims, results.references),
-            "failures": [
-                (scenario, _picture(record), _paper_failure(results, scenario, len(record.team)))
-                for scenario, record in results.worst
-            ],
+            "best": best,
+            "maps_in_all": len({*outcomes.maps}) + len({*results.convex.maps}) + len(plan.tuning),
+            "laws": law_rows(outcomes, [best[key] for key in LABELS if key in best]),
+            "maps": {
+                name: {law: gaps[name] for law, gaps in medians.items() if name in gaps}
+                for name in dict.fromkeys(outcomes.maps)
+            },
+            "failures": failures,
             "above": [float((gap > bound).mean()) for bound in (0.25, 0.5, 1.0)],
         }
     return _rendered("paper.html.jinja", plan, context)
@@ -204,46 +196,28 @@ def paper_page(
 
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
     """Return ``beyond.html``."""
-    plan = results.plan
-    found = beyond_claims.beyond_claims(results)
-    goals = beyond_claims.beyond_goals(results)
-    rows = evidence_rows(results.outcomes, results.contenders, results.steps)
-    each = evidence(results, rows)
-    tuned = bool(plan.beyond.tuning)
+    found, rows = beyond_claims.beyond_claims(results), ranked_rows(results)
+    each, tuned = evidence(results, rows), bool(results.plan.beyond.tuning)
+    beside = ("rapf-best", "rapf-default", "lloyd")
+    others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
         "results": results,
-        "ours": contenders.OWN[0].label,
-        "goals": goals,
-        "goal_words": beyond_claims.goal_counts(goals),
+        "found": found,
+        "goals": beyond_claims.beyond_goals(results),
         "unseen": beyond_claims.beyond_unseen(results),
-        "questions": beyond_claims.QUESTIONS,
         "goal_claims": [claim for claim in found if claim.part == beyond_claims.GOALS],
         "rival_claims": [claim for claim in found if claim.part == beyond_claims.RIVALS],
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": [
-            (scenario, _picture(record), _beyond_failure(results, scenario))
+            (scenario, _picture(record), f"{worst_text(results.outcomes, scenario, OURS[0], others)}.")
             for scenario, record in results.worst
         ],
         "images": images,
-        "parts": {
-            name: (
-                [images[figure] for figure in figures if figure in images],
-                [claim for claim in found if claim.key in keys],
-            )
-            for name, figures, keys in _EXTENSIONS
-        },
         "tuned": tuned,
-        "tuning": plan if tuned else FULL,
-        "grids": contenders.GRIDS,
-        "seeds": {"rivals": plan.beyond.seeds}
-        | {law.label: plan.beyond.seeds_of(law.controller) for law in contenders.OWN},
-        "always": studies.ALWAYS,
-        "units": UNITS,
-        "groups": studies.GROUPS,
-        "timed": {"map": MAP, "block": BLOCK},
+        "tuning": results.plan if tuned else FULL,
     }
-    return _rendered("beyond.html.jinja", plan, context)
+    return _rendered("beyond.html.jinja", results.plan, context)
 
 
 def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
@@ -261,23 +235,24 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         "amount": amount,
         "described": described,
         "counts": verdict_counts,
+        "account_of": account_of,
         "t": claims,
+        "rules": beyond_claims,
         "contender": contenders,
         "map_rules": maps,
+        "studies": studies,
+        "timing": step_times,
+        "units": UNITS,
+        "team": TEAM,
+        "robots": ROBOTS,
+        "page": PAGE,
+        "beyond_page": BEYOND_PAGE,
+        "version": __version__,
     }
-    style = (
-        theme_rules(":root") + replay_css() + asset("report.css") + (ASSETS / "paper.css").read_text("utf-8")
-    )
+    own = (ASSETS / "paper.css").read_text("utf-8")
+    style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)
     return environment.get_template(template).render(
-        version=__version__,
-        style=Markup(style),
-        plan=plan,
-        quick=plan.name == "quick",
-        team=TEAM,
-        robots=ROBOTS,
-        page=PAGE,
-        beyond_page=BEYOND_PAGE,
-        **context,
+        style=style, plan=plan, quick=plan.name == "quick", **context
     )
 
 
@@ -312,37 +287,10 @@ def _picture(record: Record) -> Markup:
     return Markup(run_picture(record, None, 300, 240, numbers=True))
 
 
-def _paper_failure(results: PaperResults, scenario: Scenario, robots: int) -> str:
-    """Return in words how RAPF and the others did in a scenario."""
-    outcomes = results.claims
-    k = outcomes.scenarios.index(scenario)
-    gaps = ", ".join(
-        f"{label} {amount(float(outcomes.of(law, 'gap')[k]), '%')}"
-        for law, label in (("rapf-best", "at its best gains"), ("lloyd", "LA"), ("rpf-shared", "RPF"))
-    )
-    return (
-        f"{amount(float(outcomes.of('rapf-shared', 'gap')[k]), '%')} above the reference ({gaps}); "
-        f"{outcomes.of('rapf-shared', 'stuck')[k]:.0f} of {robots} robots rest away from their goals."
-    )
-
-
-def _beyond_failure(results: BeyondResults, scenario: Scenario) -> str:
-    """Return in words how ours and the paper's contenders did in a scenario."""
-    outcomes = results.outcomes
-    k = outcomes.scenarios.index(scenario)
-    others = ", ".join(
-        f"{law.label} {amount(float(outcomes.of(law.key, 'gap')[k]), '%')}"
-        for law in results.contenders
-        if law.key in ("rapf-best", "rapf-default", "lloyd")
-    )
-    gap = amount(float(outcomes.of(contenders.OURS[0], "gap")[k]), "%")
-    return f"{gap} above the reference ({others})."
-
-
 def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
     """Return the medians map by map of a controller above those of ours, or of ours above RAPF's."""
     highest = max((max(other.maps.values()) for other in each if other.maps), default=0.0)
-    first = contenders.OURS[0]
-    beside = "rapf" if one.best.controller == first else first
-    rows = [one, *(other for other in each if other.best.controller == beside and other is not one)]
-    return strips([Strip(row.best.law.label, row.best.ours, row.maps) for row in rows], highest)
+    beside = "rapf" if one.account.controller == OURS[0] else OURS[0]
+    rows = [one, *(other for other in each if other.account.controller == beside and other is not one)]
+    parts = [Strip(row.rows[0].contender.label, row.account.controller in OURS, row.maps) for row in rows]
+    return strips(parts, highest)

@@ -9,69 +9,51 @@ from typing import Any
 from robocov_app.replication.contenders import OURS
 from robocov_app.replication.maps import KINDS, NON_CONVEX
 
-ROBOTS = 6
-"""As in the paper."""
+ROBOTS = 6  # as in the paper
+PARTITION_SEED = 56  # of the robots in figure 1: none hides the centre of mass of its cell
 
-PARTITION_SEED = 56
-"""Seed of the robots in figure 1: none hides the centre of mass of its cell."""
-
-TEAM: Mapping[str, Any] = {
-    "radius": 0.1,
-    "max_speed": 1.0,
-    "max_acceleration": 2.0,
-    "viscosity": 2.0,
+# Of every controller's team. The sensors reach as far as the longest repulsion of the grids, so that `rho_0`
+# alone says how far an obstacle acts; robots hear each other everywhere.
+TEAM: Mapping[str, Any] = {"radius": 0.1, "max_speed": 1.0, "max_acceleration": 2.0, "viscosity": 2.0} | {
     "sensing_range": 6.0,
     "communication_range": None,
 }
-"""Parameters of the team, the same for every controller.
-
-The sensors reach as far as the longest repulsion of the grids, so that `rho_0` alone says how far an obstacle
-acts; robots hear each other everywhere."""
 
 
 @dataclass(frozen=True)
 class BeyondPlan:
-    """How much is run beyond the paper.
+    """How much is run beyond the paper; by default that of the full study.
 
-    Attributes
-    ----------
-    bundled, generated : maps of the baselines, among those of the claims; None for all of them
-    starts : kinds of starts of the baselines
-    tuning : seeds of generated maps of the baselines' grids of gains, among those of the paper's grids
-        Without any, baselines keep their defaults.
-    seeds, own_seeds, shared_seeds : seeds of the starts, among those of the claims
-        For the baselines, for our own controller, and for that which shares its map.
-    unseen : seeds of generated maps
-        On which nothing was looked at while our own controller was developed: it is judged there once more,
-        beside RAPF and LA. May be empty.
-    maps, map_starts : seeds of generated maps for targets, density and mixed teams, and their kinds of starts
-    conditions_maps, conditions_seeds, conditions_duration : bundled maps, seeds and time (s) for disturbances
-    probe : float, s
-        Length of the runs by which the time of the others is estimated. Controllers that plan compute most at
-        first: short ones are taken for slower than they are.
-    worst : how many of our worst runs are shown, on different maps
-    warm_up, blocks : steps before those that are timed, and blocks of steps that are
-    large, huge : sizes of the teams whose steps are timed, beside `ROBOTS`
+    There, baselines begin on every map and from every kind of start of the claims, once; our own as often as
+    RAPF.
     """
 
-    bundled: tuple[str, ...] | None
-    generated: tuple[int, ...] | None
-    starts: tuple[str, ...]
-    tuning: tuple[int, ...]
-    seeds: tuple[int, ...]
-    own_seeds: tuple[int, ...]
-    shared_seeds: tuple[int, ...]
-    unseen: tuple[int, ...]
-    maps: tuple[int, ...]
-    map_starts: tuple[str, ...]
-    conditions_maps: tuple[str, ...]
-    conditions_seeds: int
-    conditions_duration: float
-    probe: float
-    worst: int
-    warm_up: int
-    blocks: int
-    large: int = 50
+    # of baselines and ours: bundled maps, seeds of generated ones, kinds and seeds of starts, of the claims'
+    bundled: tuple[str, ...] = NON_CONVEX
+    generated: tuple[int, ...] = tuple(range(1, 21))
+    starts: tuple[str, ...] = KINDS
+    seeds: tuple[int, ...] = (0,)
+    own_seeds: tuple[int, ...] = (0, 1, 2, 3)  # of our own controller
+    shared_seeds: tuple[int, ...] = (0,)  # of that which shares its map
+    # generated maps of the baselines' grids, among those of the paper's; without any they keep their defaults
+    tuning: tuple[int, ...] = (101, 102, 103, 104)
+    # generated maps on which nothing was looked at while our own controller was developed: it is judged there
+    # once more, beside RAPF and LA
+    unseen: tuple[int, ...] = tuple(range(201, 213))
+    # targets, density and mixed teams
+    maps: tuple[int, ...] = tuple(range(1, 11))
+    map_starts: tuple[str, ...] = KINDS
+    # disturbances
+    conditions_maps: tuple[str, ...] = ("rooms", "museum", "office", "blocks-a", "courtyard", "gaps")
+    conditions_seeds: int = 3  # how many
+    conditions_duration: float = 60.0  # s
+    # s of the runs by which the time of the others is estimated: controllers that plan compute most at first,
+    # and by short ones are taken for slower than they are
+    probe: float = 60.0
+    worst: int = 4  # how many of our worst runs are shown, on different maps
+    warm_up: int = 100  # steps before those that are timed
+    blocks: int = 5  # blocks of steps that are timed
+    large: int = 50  # sizes of teams whose steps are timed, beside `ROBOTS`
     huge: int = 200
 
     def seeds_of(self, controller: str) -> tuple[int, ...]:
@@ -81,80 +63,33 @@ class BeyondPlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is run.
+    """How much is run; by default the full study: 33 non-convex maps, 8 convex regions, 6 maps for gains."""
 
-    Attributes
-    ----------
-    name : {"full", "quick"}
-    duration, dt : float, s
-        Of every run, and its control period.
-    lattice : int
-        Of the coverage cost.
-    bundled, generated, seeds : bundled maps of the claims, seeds of generated ones, seeds of the starts
-    tuning : seeds of generated maps of the grids of gains; none of them is in `generated`
-    tuning_starts, tuning_seed : kinds of their starts, and the seed of these, which none of the claims has
-    k_rep, rho_0, k_att : values of the grids
-    convex_generated, convex_seeds : seeds of convex regions, beside the bundled ones, and of the starts there
-    restarts : int
-        Of the search for the centralised reference.
-    """
-
-    name: str
-    duration: float
-    bundled: tuple[str, ...]
-    generated: tuple[int, ...]
-    seeds: tuple[int, ...]
-    tuning: tuple[int, ...]
-    tuning_starts: tuple[str, ...]
-    k_rep: tuple[float, ...]
-    rho_0: tuple[float, ...]
-    k_att: tuple[float, ...]
-    convex_generated: tuple[int, ...]
-    convex_seeds: tuple[int, ...]
-    restarts: int
+    name: str  # "full" or "quick"
     beyond: BeyondPlan
+    duration: float = 120.0  # s, of every run
+    dt: float = 0.02  # s, its control period
+    lattice: int = 64  # of the coverage cost
+    # of the claims: bundled maps, seeds of generated ones, seeds of the starts
+    bundled: tuple[str, ...] = NON_CONVEX
+    generated: tuple[int, ...] = tuple(range(1, 21))
+    seeds: tuple[int, ...] = (0, 1, 2, 3)
+    # of the grids of gains: generated maps, none of them in `generated`, a seed of starts that no claim has
+    tuning: tuple[int, ...] = tuple(range(101, 107))
+    tuning_starts: tuple[str, ...] = KINDS
     tuning_seed: int = 1000
-    dt: float = 0.02
-    lattice: int = 64
+    k_rep: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)
+    rho_0: tuple[float, ...] = (1.0, 2.0, 3.0, 6.0)
+    k_att: tuple[float, ...] = (1.0, 3.0, 10.0, 30.0)
+    # convex regions beside the bundled ones, and seeds of the starts there
+    convex_generated: tuple[int, ...] = tuple(range(6))
+    convex_seeds: tuple[int, ...] = (0, 1, 2, 3)
+    restarts: int = 24  # of the search for the centralised reference
 
 
-FULL = Plan(
-    name="full",
-    duration=120.0,
-    bundled=NON_CONVEX,
-    generated=tuple(range(1, 21)),
-    seeds=(0, 1, 2, 3),
-    tuning=tuple(range(101, 107)),
-    tuning_starts=KINDS,
-    k_rep=(0.1, 0.3, 1.0, 3.0, 10.0),
-    rho_0=(1.0, 2.0, 3.0, 6.0),
-    k_att=(1.0, 3.0, 10.0, 30.0),
-    convex_generated=tuple(range(6)),
-    convex_seeds=(0, 1, 2, 3),
-    restarts=24,
-    # baselines from every map and kind of start of the claims, once; our own as often as RAPF
-    beyond=BeyondPlan(
-        bundled=None,
-        generated=None,
-        starts=("corner", "centre", "uniform"),
-        tuning=(101, 102, 103, 104),
-        seeds=(0,),
-        own_seeds=(0, 1, 2, 3),
-        shared_seeds=(0,),
-        unseen=tuple(range(201, 213)),
-        maps=tuple(range(1, 11)),
-        map_starts=("corner", "centre", "uniform"),
-        conditions_maps=("rooms", "museum", "office", "blocks-a", "courtyard", "gaps"),
-        conditions_seeds=3,
-        conditions_duration=60.0,
-        probe=60.0,
-        worst=4,
-        warm_up=100,
-        blocks=5,
-    ),
-)
-"""33 non-convex maps, 8 convex regions, 6 maps for gains."""
+FULL = Plan("full", BeyondPlan())
 
+# enough to see that everything works, too little to decide much; ends within four minutes
 QUICK = Plan(
     name="quick",
     duration=60.0,
@@ -173,10 +108,8 @@ QUICK = Plan(
         bundled=("rooms",),
         generated=(1,),
         starts=("corner",),
-        tuning=(),
-        seeds=(0,),
         own_seeds=(0,),
-        shared_seeds=(0,),
+        tuning=(),
         unseen=(),
         maps=(1,),
         map_starts=("corner",),
@@ -189,4 +122,3 @@ QUICK = Plan(
         blocks=1,
     ),
 )
-"""Enough to see that everything works, too little to decide much; ends within four minutes."""

@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError
+from robocov.errors import counted
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.gains import plot_gain_grid
 from robocov_app.figures.heights import plot_heights
-from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, tone
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Page, quiet_axes, tone
 from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_paired
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication.claims import CLUSTERED
 from robocov_app.replication.contenders import LABELS, OURS, OWN, TARGETS, TEAMS
-from robocov_app.replication.evidence import evidence_rows
+from robocov_app.replication.evidence import ranked_rows
 from robocov_app.replication.figures import DOTS, WIDE, side_by_side
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import BeyondResults, Degradation, DensityResults, PaperResults
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 Plots: TypeAlias = "Mapping[str, Callable[[], Figure]]"
 """How every plot is drawn, by its name; those without a run are left out."""
 
+# what is said of the plots
 WORDS = {
     "claim-1-convex": "RAPF against LA in convex regions: every pair of runs, the median and its interval.",
     "claim-2-nonconvex": "RAPF against RPF and LA on non-convex maps: every pair of runs, the median and its "
@@ -59,8 +60,8 @@ WORDS = {
     "beyond-conditions": "The final cost where messages get lost or are late, where robots hear less far, "
     "sense badly or fail, by that of the same run under ideal conditions: medians with 95 % intervals.",
 }
-"""What is said of the plots."""
 
+# what the axes of disturbances are called
 AXES = {
     "loss": "Messages lost",
     "delay": "Delay of messages",
@@ -69,40 +70,31 @@ AXES = {
     "sensing_noise": "Noise of range sensor",
     "failure_rate": "Failures of each robot",
 }
-"""What the axes of disturbances are called."""
 
-_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)
-"""Marks of the axis of gaps, in percent."""
-
-_BESIDE = 0.11
-"""How far controllers stand beside each other, in distances between two values."""
-
-_SIZE = (1180, 720)
-"""Of the plot of degradations, px."""
+_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
+_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
+_SIZE = (1180, 720)  # of the plot of degradations, px
 
 
 def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     """Return how the plot of each question is drawn."""
     convex, claims, theme = results.convex, results.claims, theme_named(theme)
     against_lloyd = [("at the end", convex.compared("rapf-shared", "lloyd"), "rapf")]
-    against_lloyd += [
+    for start in CLUSTERED:
+        pairs = convex.from_starts(start).compared("rapf-shared", "lloyd", "early")
+        against_lloyd.append((f"first 20 s, start {start}", pairs, "rapf"))
+    nonconvex = [
         (
-            f"first 20 s, start {start}",
-            convex.from_starts(start).compared("rapf-shared", "lloyd", "early"),
+            f"{label}, {when}, {gains} gains",
+            claims.compared(f"rapf-{gains}", other.format(gains), measure),
             "rapf",
         )
-        for start in CLUSTERED
-    ]
-    nonconvex = [
-        (words, claims.compared(first, second, measure), "rapf")
-        for first, second, measure, words in (
-            ("rapf-shared", "rpf-shared", "final", "RPF, at the end, shared gains"),
-            ("rapf-best", "rpf-best", "final", "RPF, at the end, best gains"),
-            ("rapf-shared", "rpf-shared", "first_minute", "RPF, first 60 s, shared gains"),
-            ("rapf-best", "rpf-best", "first_minute", "RPF, first 60 s, best gains"),
-            ("rapf-shared", "lloyd", "final", "LA, at the end, shared gains"),
-            ("rapf-best", "lloyd", "final", "LA, at the end, best gains"),
+        for label, other, measure, when in (
+            ("RPF", "rpf-{}", "final", "at the end"),
+            ("RPF", "rpf-{}", "first_minute", "first 60 s"),
+            ("LA", "lloyd", "final", "at the end"),
         )
+        for gains in ("shared", "best")
     ]
     kinds = list(dict.fromkeys(claims.starts))
     by_start = [
@@ -110,14 +102,13 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
         for law in ("rapf-shared", "rpf-shared")
     ]
     gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
-    grids = [grid.complete.scenarios for grid in results.gains.values()]
+    known = all(grid.complete.scenarios for grid in results.gains.values())
+    against = "RAPF by the other law, pair by pair (1: equal)"
     return _drawn(
         {
             "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
-            "claim-2-nonconvex": _pairs_plot(
-                nonconvex, "RAPF by the other law, pair by pair (1: equal)", theme
-            ),
-            "claim-3-gains": partial(gains_plot, results.gains, theme) if all(grids) else None,
+            "claim-2-nonconvex": _pairs_plot(nonconvex, against, theme),
+            "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
             "claim-4-starts": _boxes_plot(by_start, theme),
             "claim-6-gap": _boxes_plot(gaps, theme),
         }
@@ -126,15 +117,16 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
 
 def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     """Return how every figure beyond the paper is drawn."""
-    theme = theme_named(theme)
+    theme, outcomes, teams = theme_named(theme), results.outcomes, results.teams
+    laws = [row.contender for row in ranked_rows(results)]
     duels = [
-        (row.law.label, results.outcomes.compared(OWN[0].key, row.law.key), row.controller)
-        for row in evidence_rows(results.outcomes, results.contenders, {})
-        if row.law.key != OWN[0].key
+        (law.label, outcomes.compared(OWN[0].key, law.key), law.controller)
+        for law in laws
+        if law.key != OWN[0].key
     ]
     targets = [(law.label, results.targets.compared(law.key, TARGETS[0].key), "rapf") for law in TARGETS[1:]]
-    teams = [
-        (law.label, results.teams.compared(law.key, other.key), law.controller)
+    times = [
+        (law.label, teams.compared(law.key, other.key, "time"), law.controller)
         for other, law in zip(TEAMS[::2], TEAMS[1::2], strict=True)
     ]
     samples, size = gap_samples(results), (WIDE, round(0.41 * WIDE))
@@ -146,7 +138,7 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
             "beyond-heights": partial(plot_heights, theme=theme, size=size, title="", scale=0.68 * DOTS),
             "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
             "beyond-density": partial(density_plot, results.density, theme),
-            "beyond-teams": _pairs_plot(teams, "mean time, by time to by distance (1: equal)", theme),
+            "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
             "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
         }
     )
@@ -155,19 +147,17 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
 def gap_samples(results: BeyondResults) -> list[Sample]:
     """Return the gap of every run of every contender in percent, the least median first."""
     found = []
-    for row in evidence_rows(results.outcomes, results.contenders, {}):
-        gap = results.outcomes.of(row.law.key, "gap")
-        found.append(Sample(row.law.label, row.controller, 100.0 * gap[np.isfinite(gap)]))
+    for law in (row.contender for row in ranked_rows(results)):
+        gap = results.outcomes.of(law.key, "gap")
+        found.append(Sample(law.label, law.controller, 100.0 * gap[np.isfinite(gap)]))
     return found
 
 
 def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
     rpf, rapf = gains["rpf"].complete, gains["rapf"].complete
-    panels = [("RPF", rpf)]
-    panels += [
-        (f"RAPF, k_att = {level:g}", rapf.with_gain("k_att", level)) for level in _levels(rapf, "k_att")
-    ]
+    attractions = _levels(rapf, "k_att")
+    panels = [("RPF", rpf), *((f"RAPF, k_att = {k:g}", rapf.with_gain("k_att", k)) for k in attractions)]
     first, second = _levels(rpf, "k_rep"), _levels(rpf, "rho_0")
     columns = 3 if len(panels) > 4 else 2
     rows = -(-len(panels) // columns)
@@ -201,8 +191,15 @@ def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low, high = min(float(values.min()), 0.0), float(values.max())
+
+    def root(places: Array) -> Array:
+        return np.asarray(np.sign(places) * np.sqrt(np.abs(places)))
+
+    def square(places: Array) -> Array:
+        return np.asarray(np.sign(places) * np.square(places))
+
     with plain_style():
-        axes.set_xscale("function", functions=(_root, _square))
+        axes.set_xscale("function", functions=(root, square))
         # a little room to the left of what lies below the reference
         axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
         axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= high]))
@@ -223,27 +220,21 @@ def density_plot(density: DensityResults, theme: Theme) -> Figure:
 
 
 def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) -> Figure:
-    """Plot the final cost as a multiple of that of the run without the disturbance: one panel for each axis.
-
-    Raises ParameterError when there is nothing.
-    """
-    known = [each for each in found if np.isfinite(each.ratio.estimate)]
-    if not known:
-        raise ParameterError("degradations: none with a ratio, but at least one was wanted")
+    """Plot final costs, one at least, by those of the runs without the disturbance: a panel for each axis."""
     theme = theme_named(theme)
     names = list(dict.fromkeys(each.axis for each in found))
     styles = curve_styles(each.controller for each in found)
     quiet = mix(theme.background, theme.ink, 0.7)
     columns = min(3, len(names))
     width, height = (_SIZE[0] - 40) / columns, (_SIZE[1] - 110) / -(-len(names) // columns)
-    ends = [value for each in known for value in (each.ratio.estimate, each.ratio.low, each.ratio.high)]
+    ends = [value for each in found for value in (each.ratio.estimate, each.ratio.low, each.ratio.high)]
     bottom, top = min(1.0, float(np.nanmin(ends))), max(1.05, float(np.nanmax(ends)))
     room = 0.06 * (top - bottom)
     with plain_style():
         page = Page(_SIZE, theme, scale=1.0)
-        page.text("Coverage when things go wrong", page.margin, 26, points=TITLE, bold=True)
+        page.title("Coverage when things go wrong", 26)
         words = "final mean distance, as a multiple of the same run's in which that does not go wrong"
-        page.text(words, page.margin, 50, colour=quiet, room=_SIZE[0] - 2 * page.margin)
+        page.text(words, page.margin, 50, colour=quiet, room=page.room)
         for k, name in enumerate(names):
             row, column = divmod(k, columns)
             box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
@@ -251,18 +242,11 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
             axes.set_ylim(bottom - room, top + room)
             _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
         handles, labels = page.figure.axes[0].get_legend_handles_labels()
-        page.figure.legend(
-            handles,
-            labels,
-            loc="center right",
-            bbox_to_anchor=page.at(_SIZE[0] - page.margin, 26),
-            ncols=len(handles),
-            frameon=False,
-            fontsize=SMALL,
-            labelcolor=tone(theme.ink),
-        )
-        pairs = max(each.runs for each in found)
-        words = f"medians of {pairs} pairs of runs, and 95 % intervals; only robots that work count"
+        place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
+        look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
+        page.figure.legend(handles, labels, ncols=len(handles), **place, **look)
+        pairs = counted(max(each.runs for each in found), "pair")
+        words = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
         page.text(words, page.margin, _SIZE[1] - 18, points=SMALL, colour=quiet)
     return page.figure
 
@@ -277,22 +261,15 @@ def _panel(
         x = np.array([values.index(each.value) for each in rows]) + _BESIDE * (k - (len(styles) - 1) / 2)
         y = np.array([each.ratio.estimate for each in rows])
         ends = np.array([[each.ratio.low, each.ratio.high] for each in rows])
-        look: dict[str, Any] = {"color": tone(style.colour(theme)), "zorder": 3}
-        off = np.nan_to_num(np.abs(ends - y[:, None]).T)
-        axes.errorbar(x, y, off, fmt="none", ecolor=look["color"], elinewidth=1.4, capsize=2.5, zorder=3)
-        look |= {"linewidth": 1.6, "linestyle": style.dashes, "marker": style.mark, "markersize": 5.5}
-        axes.plot(x, y, label=rows[0].label, **look)
+        off, colour = np.nan_to_num(np.abs(ends - y[:, None]).T), tone(style.colour(theme))
+        axes.errorbar(x, y, off, fmt="none", ecolor=colour, elinewidth=1.4, capsize=2.5, zorder=3)
+        look: Any = {"linewidth": 1.6, "linestyle": style.dashes, "marker": style.mark, "markersize": 5.5}
+        axes.plot(x, y, label=rows[0].label, color=colour, zorder=3, **look)
     unit = f" ({UNITS[name]})" if UNITS[name] else ""
     axes.set_title(f"{AXES[name]}{unit}", fontsize=TEXT, color=tone(theme.ink), loc="left")
     axes.set_xticks(range(len(values)), ["no limit" if v is None else f"{v:g}" for v in values])
     axes.set_xlim(-0.4, len(values) - 0.6)
-    axes.tick_params(labelsize=SMALL, colors=tone(theme.ink), length=3)
-    axes.grid(axis="y", color=tone(theme.grid), linewidth=0.8, zorder=0)
-    axes.set_axisbelow(True)
-    axes.set_facecolor(tone(theme.background))
-    for side, spine in axes.spines.items():
-        spine.set_visible(side in ("left", "bottom"))
-        spine.set_color(tone(mix(theme.background, theme.ink, 0.5)))
+    quiet_axes(axes, theme, grid="y")
 
 
 def style_of(controller: str) -> CurveStyle:
@@ -351,11 +328,3 @@ def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> C
 
 def _levels(grid: GainOutcomes, name: str) -> list[float]:
     return sorted({float(each[name] or 0.0) for each in grid.gains})
-
-
-def _root(values: Array) -> Array:
-    return np.asarray(np.sign(values) * np.sqrt(np.abs(values)))
-
-
-def _square(values: Array) -> Array:
-    return np.asarray(np.sign(values) * np.square(values))

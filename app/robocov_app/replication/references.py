@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import queue
+import subprocess
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,8 @@ from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
 from robocov_app.toolkit import worker
 
-_FORMAT = "robocov-reference 1"
-"""Another one whenever the search gives other results."""
-
-_PATIENCE = 0.2
-"""Seconds between two looks whether somebody has pressed Ctrl-C."""
+_FORMAT = "robocov-reference 1"  # another one whenever the search gives other results
+_PATIENCE = 0.2  # s between two looks whether somebody has pressed Ctrl-C
 
 
 @dataclass(frozen=True)
@@ -43,20 +40,16 @@ class Question:
     def digest(self) -> str:
         """Questions of one digest have one answer; starts are no part of a map here."""
         shape = {**asdict(self), "document": {**self.document, "starts": None}}
-        text = _FORMAT + json.dumps(shape, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(f"{_FORMAT}{json.dumps(shape, sort_keys=True)}".encode()).hexdigest()
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The best placement that was found with the whole map known, m.
-
-    `agreement` is the share of the restarts that end within 0.5 % of it.
-    """
+    """The best placement that was found with the whole map known, m, and how surely."""
 
     mean_distance: float
     positions: tuple[tuple[float, float], ...]
-    agreement: float
+    agreement: float  # share of the restarts that end within 0.5 % of it
 
 
 class Searching:
@@ -68,16 +61,10 @@ class Searching:
         """Search for one; takes some seconds."""
         from robocov.optimum import optimum
 
-        asked = questions[-1]
-        best = optimum(
-            from_json(dict(asked.document)),
-            asked.robots,
-            radius=asked.radius,
-            lattice=asked.lattice,
-            restarts=asked.restarts,
-            seed=asked.seed,
-        )
-        positions = tuple((float(x), float(y)) for x, y in best.positions.tolist())
+        asked, environment = questions[-1], from_json(dict(questions[-1].document))
+        how: Any = {name: getattr(asked, name) for name in ("radius", "lattice", "restarts", "seed")}
+        best = optimum(environment, asked.robots, **how)
+        positions = tuple((float(x), float(y)) for x, y in best.positions)
         return Reference(float(best.mean_distance), positions, float(best.agreement()))
 
 
@@ -153,62 +140,32 @@ def _searched(
     questions: Mapping[str, Question], workers: int, stop: Interruption
 ) -> Iterator[tuple[str, Reference]]:
     """Yield answers as they come; ends early when somebody wants to stop."""
-    waiting: queue.SimpleQueue[tuple[str, Question]] = queue.SimpleQueue()
-    for item in questions.items():
-        waiting.put(item)
-    answers: queue.SimpleQueue[tuple[str, Reference | OutputError]] = queue.SimpleQueue()
-    ended = threading.Event()
-    threads = [
-        threading.Thread(target=_work, args=(waiting, answers, ended), daemon=True)
-        for _ in range(min(workers, len(questions)))
-    ]
-    for thread in threads:
-        thread.start()
+    processes: list[subprocess.Popen[bytes]] = []
+    own = threading.local()
+
+    def begin() -> None:
+        own.process = worker.started("robocov_app.replication.references:Searching")
+        processes.append(own.process)
+
+    def answer(name: str) -> tuple[str, Reference]:
+        reply = worker.asked(own.process, questions[name])
+        if reply is None:
+            raise OutputError(f"references: the process that searched for that of {name} has ended")
+        if not isinstance(reply.answer, Reference):
+            raise OutputError(f"reference of map {questions[name].document.get('name')!r}: {reply.trouble}")
+        return name, reply.answer
+
+    pool = ThreadPoolExecutor(min(workers, len(questions)), initializer=begin)
     try:
-        left = len(questions)
-        while left and not stop.requested:
-            with suppress(queue.Empty):
-                name, answer = answers.get(timeout=_PATIENCE)
-                if isinstance(answer, OutputError):
-                    raise answer
-                left -= 1
-                yield name, answer
+        waiting = {pool.submit(answer, name) for name in questions}
+        while waiting and not stop.requested:
+            done, waiting = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
+            yield from (future.result() for future in done)
     finally:
-        ended.set()
-        for thread in threads:
-            thread.join()
-
-
-def _work(
-    waiting: queue.SimpleQueue[tuple[str, Question]],
-    answers: queue.SimpleQueue[tuple[str, Reference | OutputError]],
-    ended: threading.Event,
-) -> None:
-    """Have a process answer one question after the other, until none is left or nobody wants to know."""
-    process = worker.started("robocov_app.replication.references:Searching")
-
-    def watch() -> None:
-        ended.wait()
-        process.kill()
-
-    # a search takes seconds: whoever has stopped must not wait for it
-    threading.Thread(target=watch, daemon=True).start()
-    try:
-        while not ended.is_set():
-            name, question = waiting.get_nowait()
-            reply = worker.asked(process, question)
-            if reply is not None and isinstance(reply.answer, Reference):
-                answers.put((name, reply.answer))
-                continue
-            words = (
-                f"references: the process that searched for that of {name} has ended"
-                if reply is None
-                else f"reference of map {question.document.get('name')!r}: {reply.trouble}"
-            )
-            answers.put((name, OutputError(words)))
-            break
-    except queue.Empty:
-        pass
-    finally:
-        process.kill()
-        worker.ended(process)
+        # a search takes seconds: whoever has stopped must not wait for it
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+        pool.shutdown()
+        for process in processes:
+            worker.ended(process)

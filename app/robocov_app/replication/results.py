@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,7 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication import studies
-from robocov_app.replication.contenders import (
-    OURS,
-    OWN,
-    RAPF_SHARED,
-    Contender,
-    paper_contenders,
-)
+from robocov_app.replication.contenders import OURS, OWN, RAPF_SHARED, Contender, paper_contenders
 from robocov_app.replication.outcomes import (
     GainOutcomes,
     Outcomes,
@@ -36,7 +31,6 @@ from robocov_app.replication.outcomes import (
 from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
 from robocov_app.replication.references import Reference
 from robocov_app.replication.running import (
-    BASELINE_GAINS,
     Interrupted,
     RunnerOptions,
     grid_is_done,
@@ -45,14 +39,14 @@ from robocov_app.replication.running import (
     run_together,
 )
 from robocov_app.replication.step_times import UNKNOWN, StepTimes, step_times
+from robocov_app.replication.studies import BASELINE_GAINS
 from robocov_app.sweep.performing import simulated
 from robocov_app.sweep.study import Study, parameter_column, tasks_of
 
-WORST = 4
-"""So many of RAPF's worst runs are shown."""
+WORST = 4  # so many of RAPF's worst runs are shown
 
+# maps from which intervals draw whole maps; of fewer, runs one by one: they are then of these maps alone
 ENOUGH_MAPS = 5
-"""Maps from which intervals draw whole maps; of fewer, runs one by one: they are then of these maps alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,97 +59,64 @@ class FigureRun:
 
 @dataclass(frozen=True, eq=False)
 class PaperResults:
-    """What the runs of the paper's claims gave.
-
-    Attributes
-    ----------
-    figures : dict of "case/controller" to FigureRun
-    gains : dict of controller to GainOutcomes
-    convex, claims : Outcomes
-        In convex regions and on non-convex maps.
-    contenders : tuple of Contender
-    references : dict of map to Reference
-    worst : sequence of (Scenario, Record)
-        RAPF's worst runs with the shared gains, done again to be shown, on different maps.
-    runs, failed : int
-        All that there are, and those among them that failed.
-    """
+    """What the runs of the paper's claims gave."""
 
     plan: Plan
-    figures: Mapping[str, FigureRun]
-    gains: Mapping[str, GainOutcomes]
-    convex: Outcomes
-    claims: Outcomes
+    figures: Mapping[str, FigureRun]  # by "case/controller"
+    gains: Mapping[str, GainOutcomes]  # by controller
+    convex: Outcomes  # in convex regions
+    claims: Outcomes  # on non-convex maps
     contenders: tuple[Contender, ...]
-    references: Mapping[str, Reference]
-    worst: Sequence[tuple[Scenario, Record]]
+    references: Mapping[str, Reference]  # by map
+    worst: Sequence[
+        tuple[Scenario, Record]
+    ]  # RAPF's worst runs with the shared gains, done again to be shown
     runs: int
-    failed: int
+    failed: int  # among these
 
 
 @dataclass(frozen=True, eq=False)
 class DensityResults:
-    """What became of knowing the density.
+    """What became of knowing the density."""
 
-    `outcomes` has contenders ``known`` and ``ignored``; ``final`` is the mean distance by φ, m, for both.
-    `pictures` are one run that knew it and one that did not, from the same places, `costs` their final ones.
-    """
-
-    outcomes: Outcomes
-    pictures: tuple[FigureRun, FigureRun]
-    costs: tuple[float, float]
+    outcomes: (
+        Outcomes  # contenders ``known`` and ``ignored``; ``final`` is the mean distance by φ, m, for both
+    )
+    pictures: tuple[FigureRun, FigureRun]  # one run that knew it, one that did not, from the same places
+    costs: tuple[float, float]  # their final ones
 
 
 @dataclass(frozen=True)
 class Degradation:
-    """The final cost of a controller at one value of a disturbance, by that of the same run without any.
-
-    `runs` are the pairs of runs that the median `ratio` rests on; those without a ratio are left out.
-    """
+    """The final cost of a controller at one value of a disturbance, by that of the same run without any."""
 
     axis: str
     value: float | None
     controller: str
     label: str
     ratio: Interval
-    runs: int
+    runs: int  # pairs of runs that the median ratio rests on; those without a ratio are left out
 
 
 @dataclass(frozen=True, eq=False)
 class BeyondResults:
-    """What the runs beyond the paper gave.
-
-    Attributes
-    ----------
-    outcomes : Outcomes
-        Of all contenders: those of the claims, the baselines, and ours.
-    unseen : Outcomes or None
-        Of the first of ours and the strongest of the paper's, on maps that played no part in its development.
-    contenders : tuple of Contender
-    gains : dict of controller to GainOutcomes
-        Of the baselines whose gains were tuned here.
-    steps : dict of number of robots to StepTimes
-    worst : sequence of (Scenario, Record)
-        The worst runs of the first of ours, done again to be shown.
-    targets, teams : Outcomes
-        Of `TARGETS`, and of `TEAMS`, where ``final`` is the mean time, s.
-    runs, failed : int
-        All that were done for this part alone, and those among them that failed.
-    """
+    """What the runs beyond the paper gave."""
 
     plan: Plan
-    outcomes: Outcomes
-    unseen: Outcomes | None
+    outcomes: Outcomes  # of all contenders: those of the claims, the baselines, and ours
+    unseen: (
+        Outcomes | None
+    )  # of the first of ours and the strongest of the paper's, on maps that nobody looked at
     contenders: tuple[Contender, ...]
-    gains: Mapping[str, GainOutcomes]
-    steps: Mapping[int, StepTimes]
-    worst: Sequence[tuple[Scenario, Record]]
-    targets: Outcomes
+    gains: Mapping[str, GainOutcomes]  # of the baselines whose gains were tuned here
+    steps: Mapping[int, StepTimes]  # by number of robots
+    worst: Sequence[tuple[Scenario, Record]]  # runs of the first of ours, done again to be shown
+    targets: Outcomes  # of `TARGETS`
     density: DensityResults
-    teams: Outcomes
+    teams: Outcomes  # of `TEAMS`
     degradations: Sequence[Degradation]
-    runs: int
-    failed: int
+    runs: int  # all that were done for this part alone
+    failed: int  # among these
 
 
 def partition_record() -> Record:
@@ -170,14 +131,19 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, F
     found: dict[str, FigureRun] = {}
     for name, study in studies.figure_studies(plan).items():
         target = run_study(study, folder, name, options)
-        results = read_results(target)
-        for row in results.to_table().to_pylist():
-            if row["error"] is not None:
-                raise InputError(f"{target}: a run that a figure shows failed: {row['error']}")
+        for row, run in _figure_runs(target):
             case = "other" if row["start"] == "other" else name.removeprefix("figures-")
-            run = FigureRun(results.record(row["run"]), results.history(row["run"]))
             found[f"{case}/{row['controller']}"] = run
     return found
+
+
+def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
+    """Yield the rows of a sweep, each with its run; raise InputError when one failed."""
+    results = read_results(folder)
+    for row in results.to_table().to_pylist():
+        if row["error"] is not None:
+            raise InputError(f"{folder}: a run that a figure shows failed: {row['error']}")
+        yield row, FigureRun(results.record(row["run"]), results.history(row["run"]))
 
 
 def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
@@ -188,23 +154,21 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     figures = run_figures(folder, plan, options)
     gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
     papers = paper_contenders(best_gains(gains))
-    convex, claims = studies.convex_contest(plan, papers), studies.claims_contest(plan, papers)
-    known |= references_of((*convex.study.maps, *claims.study.maps), folder, plan, options)
-    in_convex = read_outcomes(run_study(convex.study, folder, "convex", options), convex, known)
-    outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
-    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
-    return PaperResults(
-        plan=plan,
-        figures=figures,
-        gains=gains,
-        convex=in_convex,
-        claims=outcomes,
-        contenders=papers,
-        references=known,
-        worst=worst_runs(claims.study, outcomes, RAPF_SHARED, WORST),
-        runs=runs,
-        failed=failed,
+    contests = {
+        "convex": studies.convex_contest(plan, papers),
+        "claims": studies.claims_contest(plan, papers),
+    }
+    known |= references_of(
+        [each for of in contests.values() for each in of.study.maps], folder, plan, options
     )
+    outcomes = {
+        name: read_outcomes(run_study(each.study, folder, name, options), each, known)
+        for name, each in contests.items()
+    }
+    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", *contests))
+    worst = worst_runs(contests["claims"].study, outcomes["claims"], RAPF_SHARED, WORST)
+    both = outcomes["convex"], outcomes["claims"]
+    return PaperResults(plan, figures, gains, *both, papers, known, worst, runs, failed)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -229,31 +193,28 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     gains: dict[str, GainOutcomes] = {}
     if (tuning := studies.baseline_gains_study(plan)) is not None:
         gains, _ = _run_grid(tuning, BASELINE_GAINS, folder, plan, options)
-    best = best_gains(gains)
-    contests, small = studies.baseline_contests(plan, best), studies.small_contests(plan)
-    unseen = studies.unseen_contest(plan, papers)
-    known |= references_of((*studies.small_maps(plan), *studies.unseen_maps(plan)), folder, plan, options)
-    sweeps = studies.beyond_studies(plan, best, papers)
+    contests = studies.beyond_contests(plan, best_gains(gains), papers)
+    on = *studies.generated_maps(plan.beyond.maps), *studies.generated_maps(plan.beyond.unseen)
+    known |= references_of(on, folder, plan, options)
+    sweeps = {name: each.study for name, each in contests.items()} | studies.conditions_studies(plan)
     run_together(sweeps, folder, options, "paper: beyond")
     at = folder / "studies"
-    parts = [among_baselines(claims, plan)]
-    parts += [read_outcomes(at / name, each, known) for name, each in contests.items()]
-    outcomes = joined(parts)
+    reached = {name: read_outcomes(at / name, each, known) for name, each in contests.items()}
+    sides = [name for name in contests if name == "rivals" or name.startswith("ours-")]
+    outcomes = joined([among_baselines(claims, plan), *(reached[name] for name in sides)])
     steps = time_steps(folder, plan, options)
     runs, failed = _counts(folder, (*[BASELINE_GAINS] * bool(gains), *sweeps))
     return BeyondResults(
         plan=plan,
         outcomes=outcomes,
-        unseen=None if unseen is None else read_outcomes(at / "unseen", unseen, known),
-        contenders=(*papers, *(law for each in contests.values() for law in each.contenders)),
+        unseen=reached.get("unseen"),
+        contenders=(*papers, *(law for name in sides for law in contests[name].contenders)),
         gains=gains,
         steps=steps,
         worst=worst_runs(contests[f"ours-{OURS[0]}"].study, outcomes, OWN[0], plan.beyond.worst),
-        targets=read_outcomes(at / "targets", small["targets"], known),
-        density=_density(at, plan, small),
-        teams=read_outcomes(
-            at / "teams", small["teams"], {}, {"final": "mean_time_s", "distance": "mean_distance_m"}
-        ),
+        targets=reached["targets"],
+        density=_density(at, plan, reached["density"], reached["density-ignored"]),
+        teams=reached["teams"],
         degradations=read_degradations(at, plan),
         runs=runs,
         failed=failed,
@@ -313,13 +274,12 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
                     runs = counted(plan.beyond.conditions_seeds, "run")
                     raise RobocovError(f"{controller}: all {runs} on each map failed")
                 got = usual if value == best else disturbed.get((controller, value), {})
-                pairs = [key for key in usual if key in got]
-                names = [name for name, _ in pairs]
+                ratios = {key: got[key] / usual[key] for key in usual if key in got}
+                names = [name for name, _ in ratios]
                 clusters = names if len(set(names)) >= ENOUGH_MAPS else None
-                ratios = [got[key] / usual[key] for key in pairs]
-                ratio = bootstrap(ratios, clusters=clusters) if pairs else UNKNOWN
+                ratio = bootstrap([*ratios.values()], clusters=clusters) if ratios else UNKNOWN
                 label = str(controller_kind(controller).label)
-                found.append(Degradation(axis, value, controller, label, ratio, len(pairs)))
+                found.append(Degradation(axis, value, controller, label, ratio, len(ratios)))
     return found
 
 
@@ -338,28 +298,22 @@ def _finals(
     return found
 
 
-def _density(at: Path, plan: Plan, contests: Mapping[str, studies.Contest]) -> DensityResults:
-    """Read the runs that knew the density and those that did not; by φ all of them are judged."""
+def _density(at: Path, plan: Plan, *reached: Outcomes) -> DensityResults:
+    """Judge by φ the runs that knew the density, and those that did not."""
     costs = {each.name: CoverageCost(each.environment, plan.lattice) for each in studies.density_maps(plan)}
     values = {}
-    for key, name in (("known", "density"), ("ignored", "density-ignored")):
-        outcomes = read_outcomes(at / name, contests[name], {})
+    for key, outcomes in zip(("known", "ignored"), reached, strict=True):
         (places,) = outcomes.placements.values()
-        values[key, "final"] = np.array(
-            [
-                costs[map_](place).mean_distance if np.isfinite(place).all() else np.nan
-                for map_, place in zip(outcomes.maps, places, strict=True)
-            ]
-        )
-    shown = []
-    for name in ("density-picture", "density-picture-ignored"):
-        results = read_results(at / name)
-        (row,) = results.to_table().to_pylist()
-        shown.append(FigureRun(results.record(row["run"]), results.history(row["run"])))
-    known, ignored = shown
+        finals = [
+            costs[name](place).mean_distance if np.isfinite(place).all() else np.nan
+            for name, place in zip(outcomes.maps, places, strict=True)
+        ]
+        values[key, "final"] = np.array(finals)
+    ((_, known),) = _figure_runs(at / "density-picture")
+    ((_, ignored),) = _figure_runs(at / "density-picture-ignored")
     judge = CoverageCost(known.record.environment, plan.lattice)
-    first, second = (float(judge(each.record.positions[-1]).mean_distance) for each in shown)
-    return DensityResults(Outcomes(outcomes.scenarios, values), (known, ignored), (first, second))
+    first, second = (float(judge(each.record.positions[-1]).mean_distance) for each in (known, ignored))
+    return DensityResults(Outcomes(reached[0].scenarios, values), (known, ignored), (first, second))
 
 
 def _run_grid(

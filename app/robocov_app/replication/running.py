@@ -25,11 +25,7 @@ from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
 from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
 from robocov_app.terminal.interruption import Interruption
 
-MARK = "paper.json"
-"""Says that a folder is that of a study of the paper, and which."""
-
-BASELINE_GAINS = "rival-gains"
-"""Name of the sweep of the baselines' gains."""
+MARK = "paper.json"  # says that a folder is that of a study of the paper, and which
 
 _HEAD = {"format": "robocov-paper", "version": 1}
 
@@ -83,16 +79,12 @@ def open_folder(folder: Path, plan: Plan) -> None:
         named = content["plan"] if content["format"] == _HEAD["format"] else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         named = None
-    if named is None:
-        raise InputError(
-            f"{folder}: the folder is not empty, and what is in it is no study of the paper; "
-            f"another --out was wanted"
-        )
-    if named != plan.name:
-        raise InputError(
-            f"{folder}: holds the {named} study, but the {plan.name} one was asked for; "
-            f"another --out was wanted"
-        )
+    if named == plan.name:
+        return
+    words = "the folder is not empty, and what is in it is no study of the paper"
+    if named is not None:
+        words = f"holds the {named} study, but the {plan.name} one was asked for"
+    raise InputError(f"{folder}: {words}; another --out was wanted")
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
@@ -183,14 +175,8 @@ def references_of(
 
     Raises Interrupted after Ctrl-C, and OutputError as `find_references`.
     """
-    found = find_references(
-        maps,
-        folder / "references",
-        plan,
-        workers=options.workers,
-        quiet=options.quiet,
-        stop=options.stop,
-    )
+    at, workers, quiet = folder / "references", options.workers, options.quiet
+    found = find_references(maps, at, plan, workers=workers, quiet=quiet, stop=options.stop)
     if options.stop.requested:
         raise Interrupted
     return found
@@ -199,36 +185,29 @@ def references_of(
 def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
     """Return how many runs there are, and how long those that are left will take, by probes.
 
-    The time for references, for timing steps and for the pages is not in it.
-
-    Parameters
-    ----------
-    claims, beyond : bool
-        Whether the paper's claims are tested, and what goes beyond it is done.
+    `claims` and `beyond`: whether the paper's claims are tested, and what goes beyond it is done. The time
+    for references, for timing steps and for the pages is not in it.
     """
     sweeps = studies.figure_studies(plan)
-    papers = expected_contenders(plan) if claims else UNTUNED
+    papers = expected_contenders(plan) if claims or (beyond and grid_is_done(folder, plan)) else UNTUNED
     if claims:
         sweeps["gains"] = studies.gains_study(plan)
         sweeps["convex"] = studies.convex_contest(plan, papers).study
-    if beyond and not claims and grid_is_done(folder, plan):
-        papers = expected_contenders(plan)
     if claims or beyond:
         sweeps["claims"] = studies.claims_contest(plan, papers).study
     if beyond:
         if (tuning := studies.baseline_gains_study(plan)) is not None:
-            sweeps[BASELINE_GAINS] = tuning
-        sweeps |= studies.beyond_studies(plan, {}, papers)
+            sweeps[studies.BASELINE_GAINS] = tuning
+        sweeps |= {name: each.study for name, each in studies.beyond_contests(plan, {}, papers).items()}
+        sweeps |= studies.conditions_studies(plan)
     runs = sum(map(len, sweeps.values()))
     # which gains will be the best is not known yet, and how many runs these are does not depend on it
     left = {name: len(study) - min(runs_there(folder, name), len(study)) for name, study in sweeps.items()}
     if not any(left.values()):
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
-    for probe in (studies.paper_probe(plan), *(studies.beyond_probes(plan) if beyond else ())):
+    for probe in studies.probes(plan, beyond=beyond):
         for task in tasks_of(probe):
-            if task.controller in each:
-                continue
             if not each:
                 performing.perform(task)  # what is loaded and built at first does not count
             begin = time.perf_counter()

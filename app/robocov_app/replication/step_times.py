@@ -22,20 +22,12 @@ from robocov_app.replication.plan import TEAM, Plan
 from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import team_of
 
-YARDSTICK = "rapf"
-"""The controller whose steps the others' are measured by."""
-
-MAP = "campus"
-"""Where steps are timed: the largest of the bundled maps has room for large teams."""
-
-BLOCK = 50
-"""Steps that are timed together: what is done now and then, a scan or a plan, counts by its share."""
-
+YARDSTICK = "rapf"  # the controller whose steps the others' are measured by
+MAP = "campus"  # where steps are timed: the largest of the bundled maps has room for large teams
+BLOCK = 50  # steps that are timed together: what is done now and then, a scan or a plan, counts by its share
 FILE = "steps.json"
 
-_FINE = 1e-5
-"""Seconds: what a clock has to tell apart, a block of the quickest steps being some milliseconds."""
-
+_FINE = 1e-5  # s: what a clock has to tell apart, a block of the quickest steps being some milliseconds
 _HEAD = {"format": "robocov-steps", "version": 1}
 
 UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
@@ -43,13 +35,10 @@ UNKNOWN = Interval(float("nan"), float("nan"), float("nan"))
 
 @dataclass(frozen=True)
 class StepTimes:
-    """Time of a step, s, in each of some blocks of `BLOCK` steps, by controller; all were timed in turn.
-
-    `dt`, s, is the simulated time of a step.
-    """
+    """Time of a step, s, in each of some blocks of `BLOCK` steps, by controller; all were timed in turn."""
 
     robots: int
-    dt: float
+    dt: float  # s, simulated time of a step
     seconds: Mapping[str, tuple[float, ...]]
 
     def ratios(self, controller: str) -> Array:
@@ -57,13 +46,8 @@ class StepTimes:
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return np.array(own) / np.array(yardstick) if own and yardstick else np.empty(0)
 
-    def ratio(self, controller: str) -> float:
-        """Return the median of these ratios; nan where unmeasured."""
-        ratios = self.ratios(controller)
-        return float(np.median(ratios)) if len(ratios) else float("nan")
-
     def ratio_interval(self, controller: str) -> Interval:
-        """Return that ratio with its bootstrap interval over the blocks."""
+        """Return the median of that ratio with its bootstrap interval over the blocks."""
         ratios = self.ratios(controller)
         return bootstrap(ratios) if len(ratios) else UNKNOWN
 
@@ -91,15 +75,18 @@ def step_times(
     found = {}
     path = folder / FILE
     kept = _kept(path)
-    beyond = plan.beyond
+    if clock is None:
+        fine = time.get_clock_info("process_time").resolution <= _FINE
+        clock = time.process_time if fine else time.perf_counter
     for robots, controllers in wanted.items():
         names = list(dict.fromkeys((YARDSTICK, *controllers)))
         gains = {name: dict(gain_values(make_controller(name))) for name in names}
-        content = [robots, plan.dt, dict(TEAM), beyond.warm_up, beyond.blocks, gains, versions()["robocov"]]
+        blocks = plan.beyond.warm_up, plan.beyond.blocks
+        content = [robots, plan.dt, dict(TEAM), *blocks, gains, versions()["robocov"]]
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
         entry = kept.get(str(robots))
         if entry is None or entry["digest"] != digest:
-            seconds = _timed(robots, names, plan, stopped, clock or _finest_clock())
+            seconds = _timed(robots, names, plan, stopped, clock)
             if seconds is None:
                 break
             kept[str(robots)] = entry = {"digest": digest, "seconds_per_step": seconds}
@@ -133,11 +120,6 @@ def _timed(
                 run.step()
             taken[name].append((clock() - begin) / BLOCK)
     return taken
-
-
-def _finest_clock() -> Callable[[], float]:
-    fine = time.get_clock_info("process_time").resolution <= _FINE
-    return time.process_time if fine else time.perf_counter
 
 
 def _kept(path: Path) -> dict[str, Any]:

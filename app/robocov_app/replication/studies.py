@@ -25,6 +25,7 @@ from typing import Any
 
 from robocov.controllers.gains import Value
 from robocov.mapfile import load_map
+from robocov_app.replication import contenders as laws
 from robocov_app.replication import maps
 from robocov_app.replication.contenders import (
     GRIDS,
@@ -33,34 +34,25 @@ from robocov_app.replication.contenders import (
     RAPF_DEFAULT,
     RAPF_SHARED,
     RPF_SHARED,
-    TARGETS,
-    TEAMS,
-    UNTUNED,
     Contender,
-    baselines,
-    distinct_gains,
-    grid,
-    strongest,
-    with_gains,
 )
 from robocov_app.replication.plan import ROBOTS, TEAM, Plan
 from robocov_app.sweep import study as sweep_study
 from robocov_app.sweep.study import Study, StudyMap
 
+# which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
 FIGURES = {
-    # name of the study: (map, starts, contenders)
     "figures-convex": ("pentagon", ("corner",), (RAPF_SHARED, LLOYD)),
     "figures-a": ("blocks-a", ("paper",), (RAPF_SHARED, RPF_SHARED)),
     "figures-b": ("blocks-b", ("paper", "other"), (RAPF_SHARED, RPF_SHARED)),
 }
-"""Which runs the figures show. Both maps have the same start "paper"; "other" is figure 8's."""
 
-DENSITY_MAP, DENSITY_START = "hospital", "reception"
-"""Of the picture of a density."""
+DENSITY_MAP, DENSITY_START = "hospital", "reception"  # of the picture of a density
 
+# a team of robots of different speeds
 GROUPS = ({"count": 2, "max_speed": 1.0}, {"count": 2, "max_speed": 0.5}, {"count": 2, "max_speed": 0.25})
-"""A team of robots of different speeds."""
 
+# disturbances, from none to bad; the first value of each is the ideal
 AXES: Mapping[str, tuple[float | None, ...]] = {
     "loss": (0.0, 0.3, 0.6, 0.9),
     "delay": (0.0, 0.5, 1.0, 2.0),
@@ -69,13 +61,11 @@ AXES: Mapping[str, tuple[float | None, ...]] = {
     "sensing_noise": (0.0, 0.05, 0.1, 0.2),
     "failure_rate": (0.0, 0.005, 0.01, 0.02),
 }
-"""Disturbances, from none to bad; the first value of each is the ideal."""
-
+# conditions of all these runs, the ideal ones as well: of sixty messages a second nobody would miss one
 ALWAYS = {"message_rate": 2.0}
-"""Conditions of all these runs, the ideal ones as well: of sixty messages a second nobody would miss one."""
+DISTURBED = ("rapf", "lloyd")  # controllers that are disturbed
 
-DISTURBED = ("rapf", "lloyd")
-"""Controllers that are disturbed."""
+BASELINE_GAINS = "rival-gains"
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,15 +77,15 @@ class Contest:
 
 
 @cache
-def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the non-convex maps on which the claims are tested."""
-    return (*map(maps.bundled, plan.bundled), *map(maps.generated, plan.generated))
+def generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
+    """Return non-convex maps drawn by chance, with the study's starts."""
+    return tuple(map(maps.generated, seeds))
 
 
 @cache
-def tuning_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the non-convex maps of the grids of gains."""
-    return tuple(map(maps.generated, plan.tuning))
+def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
+    """Return the non-convex maps on which the claims are tested."""
+    return (*map(maps.bundled, plan.bundled), *generated_maps(plan.generated))
 
 
 @cache
@@ -107,29 +97,13 @@ def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the maps of baselines and ours: those of the claims, or some of them."""
-    bundled, generated = plan.beyond.bundled, plan.beyond.generated
-    wanted = {
-        *(plan.bundled if bundled is None else bundled),
-        *(f"generated-{seed}" for seed in (plan.generated if generated is None else generated)),
-    }
+    wanted = {*plan.beyond.bundled, *(f"generated-{seed}" for seed in plan.beyond.generated)}
     return tuple(each for each in claim_maps(plan) if each.name in wanted)
-
-
-@cache
-def unseen_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return generated maps that played no part in the development of our own controller."""
-    return tuple(map(maps.generated, plan.beyond.unseen))
-
-
-@cache
-def small_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the generated maps of targets, density and mixed teams."""
-    return tuple(map(maps.generated, plan.beyond.maps))
 
 
 def density_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the small maps with a density."""
-    return tuple(map(maps.with_hot_spots, small_maps(plan), plan.beyond.maps))
+    return tuple(map(maps.with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
 
 
 def contest(
@@ -141,16 +115,9 @@ def contest(
     **other: Any,
 ) -> Contest:
     """Return a sweep of contenders, in which all else is as the plan has it but for `other`."""
-    gains = distinct_gains(contenders)
-    study = Study(
-        maps=tuple(on),
-        controllers=tuple(gains),
-        gains=gains,
-        starts=starts,
-        seeds=seeds,
-        **{**_common(plan), **other},
-    )
-    return Contest(study, tuple(contenders))
+    gains = laws.distinct_gains(contenders)
+    given = {"controllers": tuple(gains), "gains": gains, "starts": starts, "seeds": seeds, **other}
+    return Contest(Study(maps=tuple(on), **{**_common(plan), **given}), tuple(contenders))
 
 
 def figure_studies(plan: Plan) -> dict[str, Study]:
@@ -164,7 +131,7 @@ def figure_studies(plan: Plan) -> dict[str, Study]:
 
 def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
     """Return the grids of gains: the same potential for both, RAPF with every attraction beside it."""
-    potential = grid(k_rep=plan.k_rep, rho_0=plan.rho_0)
+    potential = laws.grid(k_rep=plan.k_rep, rho_0=plan.rho_0)
     attracted: list[dict[str, Value]] = [
         {**both, "k_att": k_att, "attraction_limit": None} for k_att in plan.k_att for both in potential
     ]
@@ -173,14 +140,8 @@ def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
 
 def gains_study(plan: Plan) -> Study:
     """Return the grids of gains on the maps of the tuning."""
-    return Study(
-        maps=tuning_maps(plan),
-        controllers=("rapf", "rpf"),
-        gains=gain_sets(plan),
-        starts=plan.tuning_starts,
-        seeds=(plan.tuning_seed,),
-        **_common(plan),
-    )
+    on, starts, seeds = generated_maps(plan.tuning), plan.tuning_starts, (plan.tuning_seed,)
+    return Study(on, ("rapf", "rpf"), gain_sets(plan), starts=starts, seeds=seeds, **_common(plan))
 
 
 def convex_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
@@ -198,51 +159,39 @@ def baseline_gains_study(plan: Plan) -> Study | None:
     """Return the grids of the baselines' gains on some maps of the tuning; None where there are none."""
     if not plan.beyond.tuning:
         return None
-    on = [maps.generated(seed) for seed in plan.beyond.tuning]
-    sets = [with_gains(name, gains) for name, each in GRIDS.items() for gains in each]
+    sets = [laws.with_gains(name, gains) for name, each in GRIDS.items() for gains in each]
+    on = generated_maps(plan.beyond.tuning)
     return contest(plan, on, sets, plan.tuning_starts, (plan.tuning_seed,)).study
 
 
-def baseline_contests(plan: Plan, best: Mapping[str, Mapping[str, Value]]) -> dict[str, Contest]:
-    """Return the baselines, with their `best` gains or their defaults, and each of ours."""
-    beyond, on = plan.beyond, baseline_maps(plan)
-    parts = {"rivals": baselines(best)} | {f"ours-{each.key}": (each,) for each in OWN}
-    return {
-        name: contest(plan, on, part, beyond.starts, beyond.seeds_of(part[0].controller))
-        for name, part in parts.items()
-        if part
+def beyond_contests(
+    plan: Plan, best: Mapping[str, Mapping[str, Value]], papers: Sequence[Contender]
+) -> dict[str, Contest]:
+    """Return the sweeps of contenders beyond the paper, but for that of the baselines' gains.
+
+    Baselines have their `best` gains or their defaults. Beside ours on unseen maps are the strongest of the
+    paper's.
+    """
+    beyond, starts, on = plan.beyond, plan.beyond.map_starts, generated_maps(plan.beyond.maps)
+    found = {
+        name: contest(plan, baseline_maps(plan), part, beyond.starts, beyond.seeds_of(part[0].controller))
+        for name, part in (
+            {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in OWN}
+        ).items()
     }
-
-
-def unseen_contest(plan: Plan, papers: Sequence[Contender]) -> Contest | None:
-    """Return ours and the strongest of the paper's on maps that nobody looked at; None without any."""
-    beyond = plan.beyond
-    if not beyond.unseen:
-        return None
-    return contest(plan, unseen_maps(plan), (OWN[0], *strongest(papers)), beyond.starts, beyond.seeds)
-
-
-def small_contests(plan: Plan) -> dict[str, Contest]:
-    """Return targets, density and mixed teams."""
-    starts, on = plan.beyond.map_starts, small_maps(plan)
+    if beyond.unseen:
+        sides = OWN[0], *laws.strongest(papers)
+        found["unseen"] = contest(plan, generated_maps(beyond.unseen), sides, beyond.starts, beyond.seeds)
+    found["targets"] = contest(plan, on, laws.TARGETS, starts, (0,))
     known = load_map(DENSITY_MAP)
-    start = DENSITY_START if DENSITY_START in known.starts else known.start().name
-    picture = {
-        name: contest(
-            plan, (StudyMap(DENSITY_MAP, environment),), (RAPF_DEFAULT,), (start,), (0,), record_hz=5.0
-        )
-        for name, environment in (
-            ("density-picture", known),
-            ("density-picture-ignored", replace(known, density=None)),
-        )
-    }
-    return {
-        "targets": contest(plan, on, TARGETS, starts, (0,)),
-        "density": contest(plan, density_maps(plan), (RAPF_DEFAULT,), starts, (0,)),
-        "density-ignored": contest(plan, on, (RAPF_DEFAULT,), starts, (0,)),
-        **picture,
-        "teams": contest(plan, on, TEAMS, starts, (0,), group=GROUPS),
-    }
+    for suffix, weighed, shown in (
+        ("", density_maps(plan), known),
+        ("-ignored", on, replace(known, density=None)),
+    ):
+        found[f"density{suffix}"] = contest(plan, weighed, (RAPF_DEFAULT,), starts, (0,))
+        picture = (StudyMap(DENSITY_MAP, shown),), (RAPF_DEFAULT,), (DENSITY_START,), (0,)
+        found[f"density-picture{suffix}"] = contest(plan, *picture, record_hz=5.0)
+    return found | {"teams": contest(plan, on, laws.TEAMS, starts, (0,), group=GROUPS)}
 
 
 def axes_of_disturbances(plan: Plan) -> dict[str, tuple[float | None, ...]]:
@@ -263,48 +212,24 @@ def conditions_studies(plan: Plan) -> dict[str, Study]:
         "lattice": plan.lattice,
         "cost_hz": 0.0,
         "record_hz": 0.0,
+        "conditions": ALWAYS,
     }
-    found = {"conditions-ideal": Study(**common, conditions=dict(ALWAYS))}
+    found = {"conditions-ideal": Study(**common)}
     for name, (_, *bad) in axes_of_disturbances(plan).items():
-        changed: dict[str, Any] = {"conditions": {**ALWAYS, name: bad}}
-        if name in sweep_study.TEAM:
-            changed = {name: bad, "conditions": dict(ALWAYS)}
-        found[f"conditions-{name.replace('_', '-')}"] = Study(**common, **changed)
+        changed = {name: bad} if name in sweep_study.TEAM else {"conditions": {**ALWAYS, name: bad}}
+        found[f"conditions-{name.replace('_', '-')}"] = Study(**{**common, **changed})
     return found
 
 
-def beyond_studies(
-    plan: Plan, best: Mapping[str, Mapping[str, Value]], papers: Sequence[Contender]
-) -> dict[str, Study]:
-    """Return all sweeps beyond the paper but that of the baselines' gains."""
-    contests = baseline_contests(plan, best)
-    if (unseen := unseen_contest(plan, papers)) is not None:
-        contests["unseen"] = unseen
-    contests |= small_contests(plan)
-    return {name: each.study for name, each in contests.items()} | conditions_studies(plan)
-
-
-def paper_probe(plan: Plan) -> Study:
-    """Return one run of each of the paper's controllers, by which the time of the others is estimated."""
-    on = (StudyMap("blocks-a", load_map("blocks-a")),)
-    return contest(plan, on, (RAPF_SHARED, RPF_SHARED, LLOYD), ("paper",), (0,)).study
-
-
-def beyond_probes(plan: Plan) -> list[Study]:
-    """Return one short run of each contender, by which the time of the others is estimated."""
-    short = replace(plan, duration=min(plan.beyond.probe, plan.duration))
-    on = (maps.bundled("blocks-a"),)
-    contenders = (*UNTUNED, *baselines({}), *OWN)
-    return [contest(short, on, (each,), ("corner",), (0,)).study for each in contenders]
+def probes(plan: Plan, *, beyond: bool) -> list[Study]:
+    """Return runs by which the time of others is estimated, one of each controller; short ones `beyond`."""
+    on, short = "blocks-a", replace(plan, duration=min(plan.beyond.probe, plan.duration))
+    papers = (RAPF_SHARED, RPF_SHARED, LLOYD)
+    others = (*laws.baselines({}), *OWN) if beyond else ()
+    shorts = [contest(short, (maps.bundled(on),), (each,), ("corner",), (0,)).study for each in others]
+    return [contest(plan, (StudyMap(on, load_map(on)),), papers, ("paper",), (0,)).study, *shorts]
 
 
 def _common(plan: Plan) -> dict[str, Any]:
-    return {
-        "robots": (ROBOTS,),
-        "duration": plan.duration,
-        "dt": plan.dt,
-        "lattice": plan.lattice,
-        "cost_hz": 2.0,
-        "record_hz": 0.0,
-        **TEAM,
-    }
+    same = {"duration": plan.duration, "dt": plan.dt, "lattice": plan.lattice, **TEAM}
+    return {"robots": (ROBOTS,), "cost_hz": 2.0, "record_hz": 0.0, **same}

@@ -14,8 +14,7 @@ from markupsafe import Markup
 
 from robocov_app.replication.verdicts import Criterion, amount
 
-_TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)
-"""Of the axis of gaps."""
+_TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
 
 
 def interval_bar(criterion: Criterion) -> Markup:
@@ -26,10 +25,9 @@ def interval_bar(criterion: Criterion) -> Markup:
     if not known or not ends:
         return Markup("")
     low, high = min(known + ends), max(known + ends)
+    least = 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf
     room = 0.18 * (high - low) if high > low else max(0.1 * abs(high), 0.01)
-    low, high = low - room, high + room
-    if criterion.unit == "%" and min(known + ends) >= 0.0:
-        low = max(low, 0.0)
+    low, high = max(low - room, least), high + room
 
     def at(value: float) -> float:
         part = (min(max(value, low), high) - low) / (high - low)
@@ -69,28 +67,25 @@ def strips(rows: Sequence[Strip], highest: float) -> Markup:
     if not rows:
         return Markup("")
     wide, left, right, tall, name_height = 440.0, 12.0, 16.0, 40.0, 13.0
-    lowest = min(0.0, *(min(row.maps.values()) for row in rows))
-    ends = _root(lowest), _root(max(highest, 0.01))
+    highest, lowest = max(highest, 0.01), min(0.0, *(min(row.maps.values()) for row in rows))
+    begin, end = _root(lowest), _root(highest)
 
     def at(value: float) -> float:
-        part = (_root(value) - ends[0]) / (ends[1] - ends[0])
+        part = (_root(value) - begin) / (end - begin)
         return round(left + min(max(part, 0.0), 1.0) * (wide - left - right), 1)
 
     bottom = tall * len(rows) + 22.0
-    parts = []
+    parts, words = [], []
     last = -math.inf
     for tick in _TICKS:
         x = at(tick)
-        if tick <= max(highest, 0.01) and x - last >= 36.0:
+        if tick <= highest and x - last >= 36.0:
             last = x
             parts.append(f'<path class="grid" d="M{x} 0V{tall * len(rows)}"/>')
             parts.append(f'<text class="tick" x="{x}" y="{bottom - 6}">{amount(tick, "%")}</text>')
     for number, row in enumerate(rows):
-        top = tall * number
-        kind = "ours" if row.ours else "other"
-        parts.append(
-            f'<text class="name" x="{left - 4}" y="{top + name_height - 2}">{escape(row.label)}</text>'
-        )
+        top, kind, label = tall * number, "ours" if row.ours else "other", escape(row.label)
+        parts.append(f'<text class="name" x="{left - 4}" y="{top + name_height - 2}">{label}</text>')
         middle = top + name_height + (tall - name_height) / 2
         ranked = sorted(row.maps.items(), key=lambda item: item[1])
         for k, (name, value) in enumerate(ranked):
@@ -99,17 +94,14 @@ def strips(rows: Sequence[Strip], highest: float) -> Markup:
             parts.append(f'<circle class="{kind}" cx="{at(value)}" cy="{y}" r="3">{title}</circle>')
         half = ranked[(len(ranked) - 1) // 2][1] / 2 + ranked[len(ranked) // 2][1] / 2
         parts.append(f'<path class="middle" d="M{at(half)} {middle - 11}V{middle + 11}"/>')
-    words = "; ".join(
-        f"{row.label}: {amount(min(row.maps.values()), '%')} to {amount(max(row.maps.values()), '%')}"
-        for row in rows
-    )
+        words.append(f"{label}: {amount(ranked[0][1], '%')} to {amount(ranked[-1][1], '%')}")
     most = max(len(row.maps) for row in rows)
-    return _svg("strips", wide, bottom, f"Median gap on each of {most} maps. {escape(words)}", parts)
+    return _svg("strips", wide, bottom, f"Median gap on each of {most} maps. {'; '.join(words)}", parts)
 
 
 def _svg(kind: str, wide: float, tall: float, words: str, parts: Sequence[str]) -> Markup:
     head = f'<svg class="{kind}" viewBox="0 0 {wide:g} {tall:g}" role="img" aria-label="{words}">'
-    return Markup(head + "".join(parts) + "</svg>")
+    return Markup(f"{head}{''.join(parts)}</svg>")
 
 
 def _root(value: float) -> float:

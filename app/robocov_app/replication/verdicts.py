@@ -22,51 +22,43 @@ from robocov_app.replication.outcomes import GainOutcomes, Outcomes
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
 
+# a bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)
 LEAST_MAPS = 5
-"""A bootstrap over fewer maps has too few different samples for a 95 % interval (126 of five)."""
 
-VERDICTS: dict[Verdict, str] = {
-    "holds": "hold",
-    "holds partly": "hold partly",
-    "does not hold": "do not hold",
-    "undecided": "are undecided",
+# how verdicts are said of one claim, and of several
+VERDICTS: dict[Verdict, tuple[str, str]] = {
+    "holds": ("holds", "hold"),
+    "holds partly": ("holds partly", "hold partly"),
+    "does not hold": ("does not hold", "do not hold"),
+    "undecided": ("is undecided", "are undecided"),
 }
-"""Verdicts, and how they are said of several claims."""
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """A measure whose interval has to lie between `low` and `high`, both included, for a claim to hold.
-
-    `unit` is "", "%", "m" or "s"; with "%", 0.5 is written as 50 %.
-    """
+    """A measure whose interval has to lie between `low` and `high`, both included, for a claim to hold."""
 
     text: str
     interval: Interval
     low: float = -math.inf
     high: float = math.inf
-    unit: str = ""
+    unit: str = ""  # "", "%", "m" or "s"; with "%", 0.5 is written as 50 %
 
     @property
     def met(self) -> bool | None:
         """Whether it is met; None where that is open."""
         low, high = self.interval.low, self.interval.high
-        if math.isnan(low) or math.isnan(high):
-            return None
         if self.low <= low and high <= self.high:
             return True
-        if high < self.low or low > self.high:
-            return False
-        return None
+        return False if high < self.low or low > self.high else None  # with nan, all of that is wrong
 
     @property
     def wanted(self) -> str:
         """The range in words: "at most 5 %"."""
+        low, high = amount(self.low, self.unit), amount(self.high, self.unit)
         if math.isinf(self.high):
-            return f"at least {amount(self.low, self.unit)}"
-        if math.isinf(self.low):
-            return f"at most {amount(self.high, self.unit)}"
-        return f"between {amount(self.low, self.unit)} and {amount(self.high, self.unit)}"
+            return f"at least {low}"
+        return f"at most {high}" if math.isinf(self.low) else f"between {low} and {high}"
 
     @property
     def found(self) -> str:
@@ -88,49 +80,24 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim, what the runs say of it, and why.
+    """A claim, what the runs say of it, and why."""
 
-    Attributes
-    ----------
-    key : str
-        Stays the same over versions: "nonconvex-final-shared".
-    part : int
-        Which question it belongs to.
-    claim : str
-        The paper's sentence in our words.
-    source : str
-        Where the paper says it; empty where the question is ours.
-    criteria : tuple of Criterion
-        The first one is the main one: its estimate stands for the claim.
-    runs, maps : int
-        Simulated runs that went into it, and different maps among them.
-    explanation : str
-        What else there is to say, with numbers.
-    least_maps : int
-        On fewer maps it is undecided.
-    """
-
-    key: str
-    part: int
-    claim: str
-    source: str = ""
-    criteria: tuple[Criterion, ...] = ()
-    runs: int = 0
-    maps: int = 0
+    key: str  # stays the same over versions: "nonconvex-final-shared"
+    part: int  # which question it belongs to
+    claim: str  # the paper's sentence in our words
+    source: str = ""  # where the paper says it; empty where the question is ours
+    criteria: tuple[Criterion, ...] = ()  # the first is the main one: its estimate stands for the claim
+    runs: int = 0  # simulated runs that went into it
+    maps: int = 0  # different maps among them
     explanation: str = "There is no run that could tell."
-    least_maps: int = LEAST_MAPS
+    least_maps: int = LEAST_MAPS  # on fewer maps it is undecided
 
     def judged(
         self, criteria: Sequence[Criterion], explanation: str, on: Outcomes | GainOutcomes, runs: int
     ) -> Claim:
         """Return the claim with what `runs` runs in each of some scenarios say of it."""
-        return replace(
-            self,
-            criteria=tuple(criteria),
-            explanation=explanation,
-            runs=runs * len(on.scenarios),
-            maps=len(set(on.maps)),
-        )
+        runs, maps = runs * len(on.scenarios), len(set(on.maps))
+        return replace(self, criteria=tuple(criteria), explanation=explanation, runs=runs, maps=maps)
 
     @property
     def verdict(self) -> Verdict:
@@ -138,10 +105,8 @@ class Claim:
         if self.maps < self.least_maps or not self.criteria:
             return "undecided"
         met = [criterion.met for criterion in self.criteria]
-        if all(met):
-            return "holds"
         if any(met):
-            return "holds partly"
+            return "holds" if all(met) else "holds partly"
         return "does not hold" if False in met else "undecided"
 
     def to_json(self) -> dict[str, Any]:
@@ -175,7 +140,7 @@ def amount(value: float, unit: str = "") -> str:
         return "−" + amount(-value, unit)
     if unit == "%":
         percent = 100.0 * value
-        return f"{percent:.1f} %" if abs(percent) < 99.95 and round(percent, 1) % 1 else f"{percent:.0f} %"
+        return f"{percent:.1f} %" if percent < 99.95 and round(percent, 1) % 1 else f"{percent:.0f} %"
     # ratios near 1 are told apart by their third digit after the point
     text = f"{value:.3f}" if not unit and 1.0 < value < 1.1 else f"{value:.3g}"
     return f"{text} {unit}".rstrip()
@@ -188,20 +153,13 @@ def described(interval: Interval, unit: str = "") -> str:
     >>> described(Interval(0.052, 0.031, 0.08), "%")
     '5.2 % (3.1 % to 8 %)'
     """
-    if math.isnan(interval.low):
-        return amount(interval.estimate, unit)
-    return (
-        f"{amount(interval.estimate, unit)} ({amount(interval.low, unit)} to {amount(interval.high, unit)})"
-    )
+    estimate, low, high = (amount(each, unit) for each in (interval.estimate, interval.low, interval.high))
+    return estimate if math.isnan(interval.low) else f"{estimate} ({low} to {high})"
 
 
 def verdict_counts(claims: Sequence[Claim]) -> str:
     """Return in words how many claims hold, hold partly, do not hold, or are undecided."""
     found = [claim.verdict for claim in claims]
-    one = {"undecided": "is undecided"}
-    parts = [
-        f"{found.count(verdict)} {one.get(verdict, verdict) if found.count(verdict) == 1 else several}"
-        for verdict, several in VERDICTS.items()
-        if verdict in found
-    ]
+    counts = {verdict: found.count(verdict) for verdict in VERDICTS if verdict in found}
+    parts = [f"{count} {VERDICTS[verdict][count > 1]}" for verdict, count in counts.items()]
     return f"Of {len(claims)} claims {', '.join(parts)}."

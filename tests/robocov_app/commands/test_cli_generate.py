@@ -15,7 +15,7 @@ from robocov.mapfile import bundled_maps, dump_map, load_map
 from robocov_app.cli import main
 from robocov_app.commands.generate import KindName
 from robocov_app.replication.plan import QUICK
-from robocov_app.replication.studies import claim_maps, convex_maps, tuning_maps
+from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 
 
 def test_every_kind_can_be_asked_for() -> None:
@@ -83,9 +83,8 @@ def test_overwriting_replaces_maps_and_nothing_else(
 @pytest.mark.slow
 def test_the_maps_of_the_paper(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = answer(capsys, "generate", "--study", "quick", "--out", str(tmp_path))["maps"]
-    maps = {
-        each.name: each.environment for plan in (claim_maps, tuning_maps, convex_maps) for each in plan(QUICK)
-    }
+    every = *claim_maps(QUICK), *generated_maps(QUICK.tuning), *convex_maps(QUICK)
+    maps = {each.name: each.environment for each in every}
     drawn = {name: environment for name, environment in maps.items() if name not in bundled_maps()}
     assert len(drawn) == 3 + 5 + 3
     assert [Path(row["file"]).stem for row in rows] == list(drawn)

@@ -175,9 +175,9 @@ def test_ours_is_compared_pair_by_pair_with_everybody():
     assert [each.verdict for each in unmet] == ["undecided"]
 
 
-def level(what: dict[str, float]) -> Outcomes:
+def level(what: dict[str, float], measure: str = "final") -> Outcomes:
     scenarios = tuple(Scenario(map_, "corner", 0) for map_ in MAPS)
-    return Outcomes(scenarios, {(key, "final"): np.full(6, value) for key, value in what.items()})
+    return Outcomes(scenarios, {(key, measure): np.full(6, value) for key, value in what.items()})
 
 
 def test_targets_make_a_difference_or_none():
@@ -196,9 +196,12 @@ def test_knowing_the_density_helps_or_does_not():
 def test_cells_by_time_help_or_do_not(controller):
     keys = [law.key for law in TEAMS if law.controller == controller]
     assert keys == [f"{controller}-distance", f"{controller}-time"]
-    better = teams_claim(level(dict(zip(keys, (2.0, 1.5), strict=True))), controller)
+    better, worse = (
+        teams_claim(level(dict(zip(keys, times, strict=True)), "time"), controller)
+        for times in ((2.0, 1.5), (1.5, 2.0))
+    )
     assert better.verdict == "holds" and "2 s with cells by distance, 1.5 s by time" in better.explanation
-    assert teams_claim(level(dict(zip(keys, (1.5, 2.0), strict=True))), controller).verdict == "does not hold"
+    assert worse.verdict == "does not hold"
 
 
 def test_messages_are_borne_or_not():

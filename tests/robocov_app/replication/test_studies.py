@@ -102,16 +102,13 @@ class TestMaps:
         assert density is not None and not density.uniform
         assert (density.lowest, density.highest) == (1.0, 41.0)
 
-    def test_a_share_is_a_square(self):
-        assert maps.side_of_share(load_map("square"), 4) == pytest.approx(5.0)
-
     @both
     def test_gains_are_tuned_on_other_maps_and_starts_than_they_are_tested_on(self, plan):
         assert not set(plan.tuning) & set(plan.generated)
         assert plan.tuning_seed not in plan.seeds
         tuned, tested = (
-            {each.environment.obstacles for each in of(plan)}
-            for of in (studies.tuning_maps, studies.claim_maps)
+            {each.environment.obstacles for each in among}
+            for among in (studies.generated_maps(plan.tuning), studies.claim_maps(plan))
         )
         assert not tuned & tested
         # the best gains have something to be chosen from
@@ -119,17 +116,20 @@ class TestMaps:
 
     @pytest.mark.slow
     def test_maps_that_nobody_looked_at_are_none_of_the_others(self):
-        unseen = {each.name: each.environment for each in studies.unseen_maps(FULL)}
-        known = [*studies.claim_maps(FULL), *studies.tuning_maps(FULL), *studies.small_maps(FULL)]
+        unseen, tuning, small = map(
+            studies.generated_maps, (FULL.beyond.unseen, FULL.tuning, FULL.beyond.maps)
+        )
+        unseen = {each.name: each.environment for each in unseen}
+        known = [*studies.claim_maps(FULL), *tuning, *small]
         assert len(unseen) >= LEAST_MAPS
         assert not set(unseen) & {each.name for each in known}
         assert not set(unseen.values()) & {each.environment for each in known}
-        contest = studies.unseen_contest(FULL, UNTUNED)
+        contest = studies.beyond_contests(FULL, {}, UNTUNED)["unseen"]
         assert [law.key for law in contest.contenders] == [OURS[0], "rapf-default", "lloyd"]
         assert len(contest.study) == len(unseen) * 3 * 3
-        tuned = studies.unseen_contest(FULL, PAPERS)
+        tuned = studies.beyond_contests(FULL, {}, PAPERS)["unseen"]
         assert [law.key for law in tuned.contenders] == [OURS[0], "rapf-best", "lloyd"]
-        assert studies.unseen_contest(QUICK, PAPERS) is None
+        assert "unseen" not in studies.beyond_contests(QUICK, {}, PAPERS)
 
 
 class TestPaper:
@@ -181,14 +181,21 @@ class TestPaper:
     def test_the_quick_study_is_a_small_part(self):
         size = len(studies.claims_contest(QUICK, PAPERS).study) + len(studies.gains_study(QUICK))
         assert size < 300
-        beyond = studies.beyond_studies(QUICK, {}, UNTUNED).values()
+        beyond = [each.study for each in studies.beyond_contests(QUICK, {}, UNTUNED).values()]
+        beyond += studies.conditions_studies(QUICK).values()
         assert sum(study.duration * len(study) for study in beyond) < 4000.0
+
+
+def baseline_contests(plan):
+    """Return the sweeps of baselines and ours."""
+    contests = studies.beyond_contests(plan, {}, UNTUNED)
+    return {name: each for name, each in contests.items() if name == "rivals" or name.startswith("ours-")}
 
 
 class TestBeyond:
     @both
     def test_every_registered_controller_takes_part_once(self, plan):
-        contests = studies.baseline_contests(plan, {}).values()
+        contests = baseline_contests(plan).values()
         others = [law.key for each in contests for law in each.contenders]
         assert len(others) == len(set(others))
         assert {*others, *PAPER} == set(CONTROLLERS)
@@ -198,7 +205,7 @@ class TestBeyond:
         papers = list(tasks_of(studies.claims_contest(plan, PAPERS).study))
         places = {(task.document, task.start, task.seed) for task in papers}
         limits = {(task.duration, task.dt, task.lattice, str(task.team)) for task in papers}
-        for each in studies.baseline_contests(plan, {}).values():
+        for each in baseline_contests(plan).values():
             for task in tasks_of(each.study):
                 assert (task.document, task.start, task.seed) in places
                 assert {(task.duration, task.dt, task.lattice, str(task.team))} == limits
@@ -207,19 +214,19 @@ class TestBeyond:
     def test_in_full_ours_is_run_as_often_as_rapf_and_baselines_on_every_map(self):
         assert FULL.beyond.own_seeds == FULL.seeds
         assert len(studies.baseline_maps(FULL)) == len(studies.claim_maps(FULL)) == 33
-        for name, each in studies.baseline_contests(FULL, {}).items():
+        for name, each in baseline_contests(FULL).items():
             seeds = len(FULL.seeds) if name == f"ours-{OURS[0]}" else 1
             assert len(each.study) == 33 * 3 * seeds * len(each.contenders)
 
     def test_who_knows_the_density_begins_where_the_other_does(self):
-        contests = studies.small_contests(QUICK)
+        contests = studies.beyond_contests(QUICK, {}, UNTUNED)
         known, ignored = (tasks_of(contests[name].study) for name in ("density", "density-ignored"))
         for with_, without in zip(known, ignored, strict=True):
             assert (with_.map, with_.start, with_.seed) == (without.map, without.start, without.seed)
             assert with_.document != without.document
 
     def test_in_a_mixed_team_the_laws_differ_in_their_cells_alone(self):
-        tasks = list(tasks_of(studies.small_contests(QUICK)["teams"].study))
+        tasks = list(tasks_of(studies.beyond_contests(QUICK, {}, UNTUNED)["teams"].study))
         by_distance, by_time = (
             [task for task in tasks if task.gains["cells"] == cells] for cells in ("distance", "time")
         )

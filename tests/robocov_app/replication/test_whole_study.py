@@ -25,12 +25,13 @@ from robocov.metrics.results import read_results
 from robocov_app.cli import main
 from robocov_app.replication import beyond_claims, claims, pages, results, running, step_times, studies
 from robocov_app.replication import plan as planned
-from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS, UNTUNED
-from robocov_app.replication.evidence import evidence_rows, gains_text, law_rows, map_rows
+from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
+from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
 from robocov_app.replication.figures import arrival, describe_figure
 from robocov_app.replication.pages import Image
 from robocov_app.replication.plots import WORDS, beyond_plots, gap_samples
 from robocov_app.replication.running import Interrupted, forecast, open_folder
+from robocov_app.replication.verdicts import amount
 from robocov_app.sweep.study import Study, tasks_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
@@ -186,7 +187,12 @@ class TestRuns:
         assert same.positions[0] == pytest.approx(paper.figures["a/rapf"].record.positions[0])
 
     def test_a_task_of_two_studies_is_done_once(self, tmp_path):
-        common = {"maps": studies.small_maps(TINY), "duration": 0.2, "lattice": 8, "starts": ("corner",)}
+        common = {
+            "maps": studies.generated_maps(TINY.beyond.maps),
+            "duration": 0.2,
+            "lattice": 8,
+            "starts": ("corner",),
+        }
         both = {"one": Study(controllers=("rpf",), **common)}
         both["two"] = Study(controllers=("rpf", "lloyd"), **common)
         running.run_together(both, tmp_path, options(), "x")
@@ -200,15 +206,17 @@ class TestRuns:
 
 class TestBeyond:
     def test_every_registered_controller_has_a_row(self, beyond):
-        rows = evidence_rows(beyond.outcomes, beyond.contenders, beyond.steps)
-        assert {row.controller for row in rows} == set(CONTROLLERS)
-        medians = [row.law.gap.estimate for row in rows]
+        rows = ranked_rows(beyond)
+        assert {row.contender.controller for row in rows} == set(CONTROLLERS)
+        medians = [row.gap.estimate for row in rows]
         assert medians == sorted(medians)
         for row in rows:
-            assert row.steps[6] > 0.0 and row.steps[8] > 0.0
-            assert row.law.runs == 2
+            assert all(
+                beyond.steps[size].ratio_interval(row.contender.controller).estimate for size in (6, 8)
+            )
+            assert row.runs == 2
         samples = gap_samples(beyond)
-        assert [sample.label for sample in samples] == [row.law.label for row in rows]
+        assert [sample.label for sample in samples] == [row.contender.label for row in rows]
 
     def test_the_papers_runs_count_where_baselines_ran(self, paper):
         fewer = replace(TINY, beyond=replace(TINY.beyond, generated=()))
@@ -229,7 +237,7 @@ class TestBeyond:
 
     def test_mixed_teams_are_judged_by_time(self, beyond):
         for law in TEAMS:
-            seconds, metres = (beyond.teams.of(law.key, measure) for measure in ("final", "distance"))
+            seconds, metres = (beyond.teams.of(law.key, measure) for measure in ("time", "final"))
             assert (seconds > metres).all() and (seconds < 4.0 * metres + 1e-9).all()
 
     def test_degradations_have_every_value_of_every_axis(self, beyond):
@@ -327,7 +335,7 @@ class TestStopping:
         with pytest.raises(Interrupted):
             results.run_paper(tmp_path / "out", TINY, stopped)
         with pytest.raises(Interrupted):
-            running.run_together(studies.beyond_studies(TINY, {}, UNTUNED), tmp_path, stopped, "x")
+            running.run_together(studies.conditions_studies(TINY), tmp_path, stopped, "x")
         assert not list(tmp_path.glob("studies/*/runs/*"))
         with pytest.raises(Interrupted):
             results.time_steps(tmp_path, TINY, stopped)
@@ -335,21 +343,24 @@ class TestStopping:
 
 class TestTables:
     def test_a_row_for_each_law(self, paper):
-        rows = law_rows(paper.claims)
-        assert [row.key for row in rows] == list(LABELS)
+        rows = law_rows(paper.claims, paper.contenders)
+        assert [row.contender for row in rows] == list(paper.contenders)
         for row in rows:
-            gap = paper.claims.of(row.key, "gap")
+            gap = paper.claims.of(row.contender.key, "gap")
             assert row.gap.estimate == pytest.approx(np.median(gap))
             assert row.quartiles[0] <= row.gap.estimate <= row.quartiles[1]
             assert 0.0 <= row.touched <= 1.0
-            assert np.isnan(row.stuck) == row.key.startswith("rpf")
+            assert np.isnan(row.stuck) == (row.contender.controller == "rpf")
 
-    def test_a_row_for_each_map(self, paper):
-        rows = map_rows(paper.claims, paper.references)
-        assert [row.map for row in rows] == ["blocks-a", "generated-1"]
+    def test_a_row_for_each_map_in_the_order_of_the_laws(self, paper, content):
+        (table,) = re.findall(r"<caption><span>Map by map.*?</table>", content, re.DOTALL)
+        assert re.findall(r'<th scope="row">(.*?)</th>', table) == ["blocks-a", "generated-1"]
         here = [scenario.map == "blocks-a" for scenario in paper.claims.scenarios]
-        assert rows[0].gaps["lloyd"] == pytest.approx(np.median(paper.claims.of("lloyd", "gap")[here]))
-        assert rows[0].reference == paper.references["blocks-a"]
+        gaps = [amount(np.median(paper.claims.of(law, "gap")[here]), "%") for law in LABELS]
+        reference = paper.references["blocks-a"]
+        cells = [f"{reference.mean_distance:.3f} m", amount(reference.agreement, "%"), *gaps]
+        row = table.partition("blocks-a</th>")[2].partition("</tr>")[0]
+        assert re.findall(r"<td.*?>(.*?)</td>", plain(row)) == cells
 
 
 class TestWords:
