@@ -7,9 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
-from robocov_app.formats.geometry.outline import drawn, outline_of, ring_areas, with_necks
 from robocov_app.formats.geometry.passages import closed_gaps, rooms
-from robocov_app.formats.geometry.simplify import KEPT_OUTLINE, simplified
+from robocov_app.formats.geometry.simplify import (
+    KEPT_OUTLINE,
+    drawn,
+    outline_of,
+    polygons_from,
+    simplified,
+    with_necks,
+)
 from robocov_app.formats.geometry.tracing import traced
 
 CELL = 0.05
@@ -163,17 +169,12 @@ def test_in_any_cave_walls_stay_near_and_robots_pass(cave: tuple[int, float, int
 def test_the_parts_of_it_are_what_they_say(cave: tuple[int, float, int, float]) -> None:
     seed, share, smooth, _ = cave
     cells = traced(blobs(seed, share, smooth), "grid")
-    outline = outline_of(cells, 1.0)
-    areas = ring_areas(outline.points, outline.begin)
-    assert areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.neck.sum() + 1e-9)
+    outline = outline_of(list(cells.geoms), 1.0)
+    assert outline.areas.sum() == pytest.approx(cells.area, abs=0.01 * outline.neck.sum() + 1e-9)
     everything = np.zeros(len(outline.points))
     nothing = np.zeros(len(outline.points), dtype=bool)
     # without any tolerance the very same outline comes back, necks and all
-    points, begin, _ = with_necks(outline, drawn(outline, everything, nothing))
-    rings = shapely.linearrings(
-        points, indices=np.repeat(np.arange(len(begin)), np.diff(begin, append=len(points)))
-    )
-    back = MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
+    back = polygons_from(outline, with_necks(outline, drawn(outline, everything, nothing)))
     assert shapely.equals_exact(back.normalize(), cells.normalize(), 1e-9)
 
 
@@ -240,7 +241,7 @@ def test_cells_need_not_be_square(sides: tuple[float, float]) -> None:
     cells = affinity.scale(traced(free, "grid"), *sides, origin=(0, 0))
     turned = affinity.rotate(cells, 20, origin=(0, 0))
     for shape, turn in ((cells, 0), (turned, 20)):
-        outline = outline_of(shape, max(sides))
+        outline = outline_of(list(shape.geoms), max(sides))
         wanted = affinity.rotate(shapely.Point(5 * sides[0], 5 * sides[1]), turn, origin=(0, 0))
         assert outline.neck.sum() == 2
         assert outline.points[outline.neck] == pytest.approx(np.repeat([wanted.coords[0]], 2, axis=0))

@@ -3,86 +3,135 @@
 Walls move by at most the tolerance. Afterwards it is checked that no outline meets another one or
 itself, that every obstacle keeps its size, and that a robot passes wherever it passed; where something is
 not so, the tolerance is smaller around that place, and it is said.
+
+Along a wall at an angle the outline of cells is a flight of stairs: every short side between two
+opposite turns becomes its middle, and these lie along the wall to within a third of a cell. Then the
+algorithm of Douglas and Peucker leaves out what is within the tolerance, from one vertex that must
+stay to the next.
+
+D. H. Douglas, T. K. Peucker, Algorithms for the reduction of the number of points required to represent
+a digitized line or its caricature, Cartographica 10 (1973), 112-122.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, STRtree
+from shapely import MultiPolygon, Polygon, STRtree
 
-from robocov.arrays import Array, BoolArray, IntArray, beginnings
+from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
-from robocov_app.formats.geometry.outline import (
-    Drawing,
-    Outline,
-    balanced,
-    drawn,
-    neighbours,
-    outline_of,
-    ring_areas,
-    with_necks,
-)
 from robocov_app.formats.geometry.passages import closed_gaps, paths_of
+from robocov_app.formats.geometry.tracing import NECK
 
-KEPT_OUTLINE = 0.1
-"""By so much of it the area of an outline may change: of an obstacle, or a part of the free space."""
+KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
+"""By so much of it the area of an outline may change, of an obstacle or a part of the free space; and the
+free area as a whole."""
 
-KEPT_AREA = 0.02
-"""By so much of it the free area may change as a whole."""
-
-BLOCKS = 16
+_BLOCKS = 16
 """A thing of fewer cells stays as it is: what it is like, its cells say best."""
 
-_HALVINGS = 3
-"""How often the tolerance is halved around a place before everything stays there."""
+_HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
+"""How often the tolerance is halved around a place before everything stays there; the rounds after which
+all of a wall stays where something is wrong, and after which everything stays everywhere, as it does after so
+many times the vertices."""
 
-_PATIENCE = 24
-"""After so many rounds all of a wall stays where something is wrong."""
+_MIDDLES, _FEW = 0.75, 3
+"""From this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little."""
 
-_ROUNDS, _WORK = 60, 1_000_000
-"""After so many everything stays everywhere, and after so many times the vertices."""
+_UNBALANCED = 0.02
+"""From this part of it on, the area that a ring lost is given back to it."""
+
+_SIZES, _FINEST = 16, 0.4
+"""Of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
+smaller ones less is, but always so much, in cells."""
+
+_RIGHT, _SQUARE = 1e-5, 0.2
+"""Lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
+nowhere in particular."""
+
+_LONGEST = 1024
+"""Most vertices between two that must stay: the algorithm's depth may grow with their number."""
 
 
-@dataclass(frozen=True, eq=False)
-class Simplified:
-    """A free space with fewer vertices.
-
-    `free` in m. `tolerance`, m: walls may have moved by so much. `changed`: where less was done than wanted,
-    and why; one line each.
-    """
+class Simplified(NamedTuple):
+    """A free space, m, whose walls may have moved by `tolerance`; `changed`: where less was done, and why."""
 
     free: MultiPolygon
     tolerance: float
     changed: tuple[str, ...] = ()
 
 
-@dataclass
-class _Found:
-    """How often each thing that is checked was wrong at first, for robots of a diameter `width` (m)."""
+@dataclass(frozen=True, eq=False)
+class Rings:
+    """The k vertices of the rings of polygons, ring after ring, no first one repeated.
 
-    width: float
-    narrow: int = 0
-    sizes: int = 0
-    meetings: int = 0
-    whole: int = 0
+    `points`: (k, 2) m. `begin`, (r,): where each ring begins. `source`, (k,): the vertex of the outline that
+    each one is; with a half added, the middle of the side after it. Along a ring they grow, but for one step
+    back to the ring's lowest.
+    """
 
-    def lines(self) -> tuple[str, ...]:
-        said = (
-            (
-                self.narrow,
-                "narrow place",
-                f"so that a robot of radius {self.width / 2:g} m passes where it passed",
-            ),
-            (self.sizes, "outline", f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %"),
-            (self.meetings, "place", "where walls would have met"),
-        )
-        lines = [f"simplified less at {counted(n, what)}, {why}" for n, what, why in said if n]
-        if self.whole:
-            lines.append(f"simplified less, so that the free area changes by less than {100 * KEPT_AREA:g} %")
-        return tuple(lines)
+    points: Array
+    begin: IntArray
+    source: Array
+
+    @cached_property
+    def size(self) -> IntArray:
+        """Vertices of each ring, (r,); none is empty."""
+        return np.diff(self.begin, append=len(self.points))
+
+    @cached_property
+    def ring(self) -> IntArray:
+        """The ring of each vertex, (k,)."""
+        return np.arange(len(self.begin)).repeat(self.size)
+
+    @cached_property
+    def after(self) -> IntArray:
+        """The next vertex along its ring of each, (k,)."""
+        after = np.arange(1, len(self.points) + 1)
+        after[self.begin + self.size - 1] = self.begin
+        return after
+
+    @cached_property
+    def before(self) -> IntArray:
+        """The previous vertex along its ring of each, (k,)."""
+        before = np.empty_like(self.after)
+        before[self.after] = np.arange(len(self.points))
+        return before
+
+    @cached_property
+    def vertex(self) -> IntArray:
+        """The vertex of the outline that each one is, or begins the side of, (k,)."""
+        return self.source.astype(np.intp)
+
+    @cached_property
+    def areas(self) -> Array:
+        """The signed area of each ring, (r,) m²: positive counter-clockwise."""
+        if not len(self.points):
+            return np.zeros(len(self.begin))
+        local = self.points - self.points[self.begin].repeat(self.size, axis=0)
+        double = np.append(np.cumsum(_cross(local, local[self.after])), 0.0)
+        total = np.append(0.0, double[:-1])
+        return np.asarray((total[self.begin + self.size] - total[self.begin]) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Outline(Rings):
+    """All vertices of polygons.
+
+    `owner`, (r,): the polygon that each ring belongs to; its outer ring comes first. `neck`, (k,): whether
+    two obstacles touch there: the vertex stands for a neck as `tracing` makes them. `cell`, m: side of the
+    cells that it is the outline of, the longer one.
+    """
+
+    owner: IntArray
+    neck: BoolArray
+    cell: float | None
 
 
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
@@ -94,149 +143,375 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)
-    outline = outline_of(free, cell)
+    outline = outline_of(list(free.geoms), cell)
     allowed = np.full(len(outline.points), tolerance)
     if cell is not None:
-        blocks = np.abs(ring_areas(outline.points, outline.begin)) < BLOCKS * cell * cell
-        allowed[blocks[outline.ring]] = 0.0
+        allowed[(np.abs(outline.areas) < _BLOCKS * cell * cell)[outline.ring]] = 0.0
     fixed = np.zeros(len(outline.points), dtype=bool)
-    found = _Found(2 * radius)
+    found: Counter[str] = Counter()
     for attempt in range(min(_ROUNDS, 1 + _WORK // len(allowed))):
         drawing = balanced(outline, drawn(outline, allowed, fixed), allowed)
-        wrong, far = _misdrawn(outline, drawing, allowed, tolerance, found)
+        check = _Check(outline, drawing, allowed, tolerance, 2 * radius, found)
+        wrong, far = check.misdrawn()
         parts = None
         if not (wrong.any() or far.any()):
-            parts, wrong = _met(outline, drawing, allowed, tolerance, found)
+            parts, wrong = check.met()
         if parts is None or wrong.any():
             wrong |= far & fixed
             fixed |= far
-            if attempt >= _PATIENCE:
-                allowed[_beside(outline, drawing, wrong | far)] = 0.0
+            if attempt >= _PATIENCE:  # all that a side stands for together with one of these
+                allowed[np.isin(check.side, check.side[wrong | far])] = 0.0
             allowed[wrong] /= 2
             allowed[allowed < 0.75 * tolerance * 0.5**_HALVINGS] = 0.0
             continue
-        narrow = _narrowed(outline, drawing, parts, allowed, tolerance, found)
+        narrow = check.narrowed(parts)
         if narrow is None:
             return Simplified(free, 0.0, ("not simplified: too many gaps that a robot may pass or not",))
         if not narrow.any():
-            return Simplified(parts, tolerance, found.lines())
+            return Simplified(parts, tolerance, _told(found, radius))
         allowed[narrow] = 0.0
     return Simplified(free, 0.0, ("not simplified: walls would have met, or closed passages",))
 
 
-def _misdrawn(
-    outline: Outline, drawing: Drawing, allowed: Array, tolerance: float, found: _Found
-) -> tuple[BoolArray, BoolArray]:
-    """Return which vertices of the outline belong to a ring of another size, and which are drawn too far off.
+def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
+    """Return how often each thing that is checked was wrong at first, in words."""
+    less = {
+        "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
+        "outline": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
+        "place": "where walls would have met",
+    }
+    told = [f"simplified less at {counted(found[k], k)}, {why}" for k, why in less.items() if found[k]]
+    if found["area"]:
+        told.append(f"simplified less, so that the free area changes by less than {100 * KEPT_AREA:g} %")
+    return tuple(told)
 
-    Of those that one side stands for it is the one that is furthest.
+
+@dataclass(frozen=True, eq=False)
+class _Check:
+    """What is wrong with a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
+
+    `allowed`, (k,) m: the tolerance at each vertex, `tolerance` at first. `width`, m: of a robot. `found`:
+    counts what is wrong where the tolerance is still whole.
     """
-    distance = _distance(outline, drawing)
-    side = _sides(outline, drawing)
-    furthest = np.lexsort((-distance, side))
-    furthest = furthest[beginnings(side[furthest])]
-    far = np.zeros(len(distance), dtype=bool)
-    far[furthest] = distance[furthest] > allowed[furthest] * (1 + 1e-9)
-    far &= allowed > 0.0
-    was = ring_areas(outline.points, outline.begin)
-    now = ring_areas(drawing.points, drawing.begin)
-    off = np.abs(now - was) > KEPT_OUTLINE * np.abs(was)
-    ring = outline.ring
-    fresh = np.zeros(len(off), dtype=bool)
-    fresh[ring[allowed == tolerance]] = True
-    found.sizes += int(np.count_nonzero(off & fresh))
-    wrong = off[ring] & (allowed > 0.0)
-    if not (wrong.any() or far.any()) and abs(now.sum() - was.sum()) > KEPT_AREA * was.sum():
-        found.whole += 1
-        wrong = allowed > 0.0
-    return wrong, far
 
+    outline: Outline
+    drawing: Rings
+    allowed: Array
+    tolerance: float
+    width: float
+    found: Counter[str]
 
-def _beside(outline: Outline, drawing: Drawing, some: BoolArray) -> BoolArray:
-    """Return which vertices of the outline one side stands for together with one of `some`."""
-    side = _sides(outline, drawing)
-    all_of = np.zeros(len(drawing.points), dtype=bool)
-    all_of[side[some]] = True
-    return np.asarray(all_of[side])
+    @cached_property
+    def side(self) -> IntArray:
+        """Which side of the drawing, by its first vertex, stands for each vertex of the outline, (k,)."""
+        drawing, ring = self.drawing, self.outline.ring
+        order = np.argsort(drawing.source, kind="stable")
+        place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
+        # before the first of a ring comes its last
+        end = drawing.begin + drawing.size - 1
+        return np.asarray(order[np.where(place < drawing.begin[ring], end[ring], place)])
 
+    def misdrawn(self) -> tuple[BoolArray, BoolArray]:
+        """Return what belongs to a ring of another size, and what is drawn too far off.
 
-def _distance(outline: Outline, drawing: Drawing) -> Array:
-    """Return how far each vertex of the outline is from what is drawn for it, (k,) m."""
-    after, before = neighbours(drawing.begin, len(drawing.points))
-    side = _sides(outline, drawing)
-    nearest = np.full(len(outline.points), np.inf)
-    # where a corner was made whole, the side before or after may be the nearer one
-    for near in (side, before[side], after[side]):
-        start, along = drawing.points[near], drawing.points[after[near]] - drawing.points[near]
-        length = np.einsum("kd,kd->k", along, along)
-        part = np.einsum("kd,kd->k", outline.points - start, along) / np.maximum(length, 1e-300)
-        foot = start + np.clip(part, 0.0, 1.0)[:, None] * along
-        nearest = np.minimum(nearest, np.hypot(*(outline.points - foot).T))
-    return nearest
+        Of those that one side stands for it is the one that is furthest.
+        """
+        allowed, distance = self.allowed, self._distance()
+        furthest = np.lexsort((-distance, self.side))
+        furthest = furthest[beginnings(self.side[furthest])]
+        far = np.zeros(len(distance), dtype=bool)
+        far[furthest] = distance[furthest] > allowed[furthest] * (1 + 1e-9)
+        far &= allowed > 0.0
+        was, now, ring = self.outline.areas, self.drawing.areas, self.outline.ring
+        off = np.abs(now - was) > KEPT_OUTLINE * np.abs(was)
+        fresh = np.unique(ring[allowed == self.tolerance])
+        self.found["outline"] += int(np.count_nonzero(off[fresh]))
+        wrong = off[ring] & (allowed > 0.0)
+        if not (wrong.any() or far.any()) and abs(now.sum() - was.sum()) > KEPT_AREA * was.sum():
+            self.found["area"] += 1
+            wrong = allowed > 0.0
+        return wrong, far
 
+    def _distance(self) -> Array:
+        """Return how far each vertex of the outline is from what is drawn for it, (k,) m."""
+        drawing, points = self.drawing, self.outline.points
+        nearest = np.full(len(points), np.inf)
+        # where a corner was made whole, the side before or after may be the nearer one
+        for near in (self.side, drawing.before[self.side], drawing.after[self.side]):
+            start, along = drawing.points[near], drawing.points[drawing.after[near]] - drawing.points[near]
+            part = _dot(points - start, along) / np.maximum(_dot(along, along), 1e-300)
+            foot = start + np.clip(part, 0.0, 1.0)[:, None] * along
+            nearest = np.minimum(nearest, np.hypot(*(points - foot).T))
+        return nearest
 
-def _sides(outline: Outline, drawing: Drawing) -> IntArray:
-    """Return which side of the drawing, by its first vertex, stands for each vertex of the outline, (k,)."""
-    order = np.argsort(drawing.source, kind="stable")
-    place = np.searchsorted(drawing.source[order], np.arange(len(outline.points)), side="right") - 1
-    # before the first of a ring comes its last
-    ring = outline.ring
-    end = np.append(drawing.begin[1:], len(drawing.points)) - 1
-    return np.asarray(order[np.where(place < drawing.begin[ring], end[ring], place)])
+    def met(self) -> tuple[MultiPolygon, BoolArray]:
+        """Return the drawing as polygons, and what is drawn across something else."""
+        outline, drawing, allowed = self.outline, with_necks(self.outline, self.drawing), self.allowed
+        parts = polygons_from(outline, drawing)
+        if parts.is_valid:
+            return parts, np.zeros(len(outline.points), dtype=bool)
+        after = drawing.after
+        sides = shapely.linestrings(np.stack([drawing.points, drawing.points[after]], axis=1))
+        one, other = STRtree(sides).query(sides, predicate="intersects")
+        apart = (one < other) & (after[one] != other) & (after[other] != one)
+        across = drawing.vertex[np.append(one[apart], other[apart])]
+        wrong = np.isin(self.side, across)
+        wrong |= wrong[outline.after]
+        wrong &= allowed > 0.0
+        if (allowed[wrong] == self.tolerance).any():
+            self.found["place"] += int(np.count_nonzero(apart))
+        # a ring that lies where it may not, and crosses nothing
+        return parts, wrong if wrong.any() else allowed > 0.0
 
-
-def _met(
-    outline: Outline, drawing: Drawing, allowed: Array, tolerance: float, found: _Found
-) -> tuple[MultiPolygon, BoolArray]:
-    """Return the drawing as polygons, and which vertices of the outline are drawn across something else."""
-    points, begin, vertex = with_necks(outline, drawing)
-    size = np.diff(begin, append=len(points))
-    rings = shapely.linearrings(points, indices=np.arange(len(begin)).repeat(size))
-    parts = MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
-    if parts.is_valid:
-        return parts, np.zeros(len(outline.points), dtype=bool)
-    after, _ = neighbours(begin, len(points))
-    sides = shapely.linestrings(np.stack([points, points[after]], axis=1))
-    one, other = STRtree(sides).query(sides, predicate="intersects")
-    apart = (one < other) & (after[one] != other) & (after[other] != one)
-    across = np.zeros(len(drawing.points), dtype=bool)
-    across[vertex[one[apart]]] = across[vertex[other[apart]]] = True
-    wrong = across[_sides(outline, drawing)]
-    wrong |= wrong[neighbours(outline.begin, len(outline.points))[0]]
-    wrong &= allowed > 0.0
-    found.meetings += int(np.count_nonzero(apart)) if (allowed[wrong] == tolerance).any() else 0
-    # a ring that lies where it may not, and crosses nothing
-    return parts, wrong if wrong.any() else allowed > 0.0
-
-
-def _narrowed(
-    outline: Outline, drawing: Drawing, parts: MultiPolygon, allowed: Array, tolerance: float, found: _Found
-) -> BoolArray | None:
-    """Return which vertices of the outline are about gaps that a robot does not pass any more.
-
-    None where there are too many gaps to look at.
-    """
-    after, _ = neighbours(drawing.begin, len(drawing.points))
-    sides = np.stack([drawing.points, drawing.points[after]], axis=1)
-    # a side from or to the middle of a short one stands for all of that
-    first, last = drawing.source.astype(np.intp), np.ceil(drawing.source[after]).astype(np.intp)
-    ring = np.searchsorted(outline.begin, first, side="right") - 1
-    paths = paths_of(outline.points, outline.begin[ring], outline.size[ring], first, last)
-    closed = closed_gaps(sides, paths, parts, found.width, 3 * tolerance)
-    if closed is None:
-        return None
-    pairs, places = closed
-    wrong = np.zeros(len(outline.points), dtype=bool)
-    if len(pairs):
-        side = _sides(outline, drawing)
-        order = np.argsort(side, kind="stable")
-        begin = np.searchsorted(side[order], np.arange(len(sides) + 1))
-        for pair, place in zip(pairs.tolist(), places, strict=True):
-            about = np.concatenate([order[begin[k] : begin[k + 1]] for k in pair])
-            about = np.unique(np.concatenate([about, first[after[pair]]]))
-            loose = about[allowed[about] > 0.0]
+    def narrowed(self, parts: MultiPolygon) -> BoolArray | None:
+        """Return what is about gaps that a robot does not pass any more; None where these are too many."""
+        outline, drawing = self.outline, self.drawing
+        sides = np.stack([drawing.points, drawing.points[drawing.after]], axis=1)
+        # a side from or to the middle of a short one stands for all of that
+        first, last = drawing.vertex, np.ceil(drawing.source[drawing.after]).astype(np.intp)
+        ring = drawing.ring
+        paths = paths_of(outline.points, outline.begin[ring], outline.size[ring], first, last)
+        closed = closed_gaps(sides, paths, parts, self.width, 3 * self.tolerance)
+        if closed is None:
+            return None
+        wrong = np.zeros(len(outline.points), dtype=bool)
+        order = np.argsort(self.side, kind="stable")
+        of_sides = np.split(order, np.searchsorted(self.side[order], np.arange(1, len(sides))))
+        for pair, place in zip(*closed, strict=True):
+            about = np.concatenate([*(of_sides[k] for k in pair), first[drawing.after[pair]]])
+            loose = about[self.allowed[about] > 0.0]
             away = np.hypot(*(outline.points[loose] - place).T)
-            near = loose[away <= found.width + 3 * tolerance]
+            near = loose[away <= self.width + 3 * self.tolerance]
             wrong[near if len(near) else loose] = True
-        found.narrow += len(pairs)
-    return wrong
+        self.found["narrow place"] += len(closed[0])
+        return wrong
+
+
+def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
+    """Return the rings of polygons; if they are the outline of cells, without its necks."""
+    lines, owner = shapely.get_rings(polygons, return_index=True)
+    points, ring = shapely.get_coordinates(lines, return_index=True)
+    closing = np.append(ring[1:] != ring[:-1], True)
+    points, ring = points[~closing], ring[~closing]
+    begin, source = np.searchsorted(ring, np.arange(len(lines))), np.arange(len(points), dtype=float)
+    neck = np.zeros(len(points), dtype=bool)
+    if cell is not None:
+        # the two ends of a neck, a short side between two at right angles, become the corner between them
+        rings = Rings(points, begin, source)
+        after, before = rings.after, rings.before
+        side = points[after] - points
+        length = np.hypot(*side.T)
+        along = side[before] / np.maximum(length[before], 1e-300)[:, None]
+        square = np.abs(_dot(along, along[after[after]])) < _RIGHT
+        neck = square & (length < np.minimum(length[before], length[after]))
+        neck &= length < 1.001 * np.sqrt(2) * NECK * cell
+        points = np.where(neck[:, None], points + _dot(side, along)[:, None] * along, points)
+        keep = ~neck[before]
+        points, neck, ring, source = points[keep], neck[keep], ring[keep], source[: keep.sum()]
+        begin = np.searchsorted(ring, np.arange(len(lines)))
+    return Outline(points, begin, source, np.asarray(owner), neck, cell)
+
+
+def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:
+    """Return the polygons of a drawing of `outline`."""
+    rings = shapely.linearrings(drawing.points, indices=drawing.ring)
+    return MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
+
+
+def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Rings:
+    """Return `outline` with what is within the tolerance left out.
+
+    `tolerance`, (k,) m: of each of its vertices; where it is 0 they all stay. `fixed`, (k,): which of them
+    stay besides, or the middles that stand for them. Rings may have fewer than three vertices then.
+    """
+    path = _without_stairs(outline, tolerance)
+    if not len(path.points):
+        return path
+    allowed = tolerance[path.vertex]
+    stays = fixed[path.vertex] | ((path.source != path.vertex) & fixed[outline.after[path.vertex]])
+    stays |= _extremes(path) | (allowed == 0.0) | (np.arange(len(allowed)) % _LONGEST == 0)
+    # small things have few corners to lose
+    finest = 0.0 if outline.cell is None else _FINEST * outline.cell
+    most = np.maximum(np.sqrt(np.abs(outline.areas)) / _SIZES, finest)
+    kept, begin = _kept(path, allowed, stays, most)
+    drawing = Rings(path.points[kept], begin, path.source[kept])
+    return drawing if outline.cell is None else _fitted(path, kept, drawing, allowed[kept])
+
+
+def _kept(path: Rings, allowed: Array, stays: BoolArray, most: Array) -> tuple[IntArray, IntArray]:
+    """Return the vertices of `path` that are kept, ring after ring, and where each ring begins among them.
+
+    Those that stay are, and in each ring no more than `most` (r,) m is left out.
+    """
+    begin, count = path.begin, path.size
+    changes = allowed != allowed[path.after]
+    stays |= changes
+    stays[path.after[changes]] = True
+    # each ring from its first vertex that stays, round to that one again
+    first = np.minimum.reduceat(np.where(stays, np.arange(len(stays)), len(stays)), begin)
+    ring = np.arange(len(begin)).repeat(count + 1)
+    step = ranges(np.zeros_like(count), count + 1)
+    vertex = begin[ring] + (first[ring] - begin[ring] + step) % count[ring]
+    inner = stays[vertex] & (step > 0) & (step < count[ring])
+    # a vertex that stays ends one line and begins the next
+    twice = np.arange(len(vertex)).repeat(1 + inner)
+    line = (np.cumsum(inner | (step == 0)) - 1)[twice]
+    line[:-1] -= twice[:-1] == twice[1:]
+    vertex = vertex[twice]
+    # all of a line between its ends has one tolerance
+    second = vertex[beginnings(line) + 1]
+    within = np.minimum(allowed[second], most[path.ring[second]])
+    lines = shapely.linestrings(np.column_stack([path.points[vertex], vertex]), indices=line)
+    simple = shapely.simplify(lines, within, preserve_topology=False)
+    kept, line = shapely.get_coordinates(simple, include_z=True, return_index=True)
+    kept = kept[np.append(line[1:] == line[:-1], False), 2].astype(np.intp)
+    return kept, np.searchsorted(path.ring[kept], np.arange(len(begin)))
+
+
+def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Rings:
+    """Return `drawing` with the sides that stand for stairs in the middle of these, and corners whole.
+
+    Such a side becomes the line of least squares of the middles that it stands for, and its ends go
+    where it meets its neighbours. A short side between two long ones that meet nearby is a corner.
+    """
+    points, after, before = drawing.points, drawing.after, drawing.before
+    chord = points[after] - points
+    length = np.hypot(*chord.T)
+    chord /= np.maximum(length, 1e-300)[:, None]
+    stairs, foot, along = _stairs(path, kept, drawing)
+    # a line for each side: a point of it, and its direction
+    foot = np.where(stairs[:, None], foot, points)
+    along = np.where(stairs[:, None], along, chord)
+
+    meeting, square = _meeting(foot[before], along[before], foot, along)
+    # lines that hardly turn have no good meeting: half-way between them
+    flat = (_foot(points, foot[before], along[before]) + _foot(points, foot, along)) / 2
+    move = np.where(square[:, None], meeting, flat) - points
+    move[~(stairs | stairs[before])] = 0.0
+    move[np.hypot(*move.T) > 2 * allowed] = 0.0
+
+    # neither end of the side may be one that stays
+    both = np.minimum(allowed, allowed[after])
+    long = length > 4 * both
+    corner, square = _meeting(foot[before], along[before], foot[after], along[after])
+    cut = square & ~stairs & (both > 0.0) & (length <= 2 * both) & long[before] & long[after]
+    for end in (points, points[after]):
+        cut &= np.hypot(*(corner - end).T) <= 2 * both
+    move[cut] = corner[cut] - points[cut]
+    stays = ~cut[before]
+    begin = np.searchsorted(drawing.ring[stays], np.arange(len(drawing.begin)))
+    return Rings((points + move)[stays], begin, drawing.source[stays])
+
+
+def _stairs(path: Rings, kept: IntArray, drawing: Rings) -> tuple[BoolArray, Array, Array]:
+    """Return which sides stand for stairs, and the lines of these: a point and a direction, (m, 2) each."""
+    count, first = path.size[drawing.ring], path.begin[drawing.ring]
+    # what lies between each vertex that stays and the next one, round the ring
+    length = np.maximum((kept[drawing.after] - kept) % count - 1, 0)
+    side = np.arange(len(kept)).repeat(length)
+    inside = first[side] + (ranges(kept + 1, length) - first[side]) % count[side]
+    middle = path.source[inside] % 1.0 != 0.0
+    side, inside = side[middle], inside[middle]
+    number = np.bincount(side, minlength=len(kept))
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.bincount(side, values, len(kept)) / np.maximum(number, 1))
+
+    # from the side's first vertex: squares of large coordinates would cancel
+    x, y = (path.points[inside] - drawing.points[side]).T
+    centre = np.column_stack([mean(x), mean(y)])
+    x, y = x - centre[side, 0], y - centre[side, 1]
+    angle = np.arctan2(2 * mean(x * y), mean(x * x) - mean(y * y)) / 2
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    return (number >= _FEW) & (2 * number >= length), drawing.points + centre, along
+
+
+def with_necks(outline: Outline, drawing: Rings) -> Rings:
+    """Return `drawing` with the outline's necks again; the source of each vertex is its vertex."""
+    points = drawing.points
+    neck = outline.neck[drawing.vertex] & (drawing.source == drawing.vertex)
+    if outline.cell is None or not neck.any():
+        return Rings(points, drawing.begin, np.arange(len(points), dtype=float))
+    twice = np.arange(len(points)).repeat(1 + neck)
+    second = np.append(False, twice[1:] == twice[:-1])
+    towards = np.where(second, drawing.after[twice], drawing.before[twice])
+    way = points[towards] - points[twice]
+    length = np.maximum(np.hypot(*way.T), 1e-300)
+    part = np.where(neck[twice], np.minimum(NECK * outline.cell / length, 0.4), 0.0)
+    begin = np.searchsorted(twice, drawing.begin)
+    return Rings(points[twice] + part[:, None] * way, begin, twice.astype(float))
+
+
+def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
+    """Return `drawing` with rings of the area that they had, where they lost or won much of it.
+
+    All sides of such a ring move by the same distance, of at most half the `tolerance` (k,) at its
+    vertices. Small round things need it: with few corners, each on their rim, they get smaller.
+    """
+    points, was, now = drawing.points, outline.areas, drawing.areas
+    some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))
+    if not some.any():
+        return drawing
+    side = points[drawing.after] - points
+    length = np.hypot(*side.T)
+    # to the right of a side is the outside of a ring that runs counter-clockwise
+    normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
+    around = np.maximum(np.add.reduceat(length, drawing.begin), 1e-300)
+    allowed = tolerance[drawing.vertex] / 2
+    distance = np.clip(np.where(some, (was - now) / around, 0.0)[drawing.ring], -allowed, allowed)
+    both = normal + normal[drawing.before]
+    # a corner moves further than its sides, a sharp one up to twice as far
+    part = distance / np.maximum(_dot(both, both) / 2, 0.5)
+    return Rings(points + part[:, None] * both, drawing.begin, drawing.source)
+
+
+def _without_stairs(outline: Outline, tolerance: Array) -> Rings:
+    """Return the vertices of `outline`, stairs drawn by the middles of their short sides."""
+    points, after, cell = outline.points, outline.after, outline.cell
+    if cell is None or not len(points):
+        return outline
+    side = points[after] - points
+    turn = np.sign(np.round(_cross(side[outline.before], side) / cell**2, 6))
+    wide = tolerance >= _MIDDLES * cell
+    short = np.hypot(*side.T) <= cell * (1 + 1e-6)
+    step = short & (turn * turn[after] < 0) & wide & wide[after]
+    keep = np.column_stack([~(step | step[outline.before]), step]).ravel()
+    return Rings(
+        np.stack([points, (points + points[after]) / 2], axis=1).reshape(-1, 2)[keep],
+        np.append(0, np.cumsum(keep))[2 * outline.begin],
+        np.column_stack([outline.source, outline.source + 0.5]).ravel()[keep],
+    )
+
+
+def _extremes(rings: Rings) -> BoolArray:
+    """Return which vertices stay whatever the tolerance: in each ring two that are far from each other."""
+    middle = np.add.reduceat(rings.points, rings.begin, axis=0) / rings.size[:, None]
+    stays = np.zeros(len(rings.points), dtype=bool)
+    for _ in range(2):
+        away = np.hypot(*(rings.points - middle[rings.ring]).T)
+        # to a millionth, so that rounding does not choose among equals
+        far = np.lexsort((-np.round(away / away.max(), 6), rings.ring))[rings.begin]
+        stays[far] = True
+        middle = rings.points[far]
+    return stays
+
+
+def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, BoolArray]:
+    """Return where the lines through a along u and through b along v meet, and whether they clearly do."""
+    cross = _cross(u, v)
+    square = np.abs(cross) > _SQUARE
+    part = _cross(b - a, v) / np.where(square, cross, 1.0)
+    return a + part[:, None] * u, square
+
+
+def _foot(p: Array, a: Array, u: Array) -> Array:
+    """Return the points nearest to p on the lines through a along u."""
+    return np.asarray(a + _dot(p - a, u)[:, None] * u)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(np.einsum("kd,kd->k", a, b))
