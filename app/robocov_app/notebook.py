@@ -25,9 +25,8 @@ from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
 from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.render.theme import LIGHT, Theme
-from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import Frame, map_picture
-from robocov_app.report.replay import asset, replay_html
+from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
 

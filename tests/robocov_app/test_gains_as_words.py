@@ -16,7 +16,7 @@ from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.report.groups import dependences, gain_text, styles
+from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
 from robocov_app.report.tables import controllers_table
@@ -144,8 +144,8 @@ def test_values_of_words_are_told_where_they_are_many() -> None:
         for word in ("centroid", "median")
     ]
     result = result_of(runs)
-    (row,) = controllers_table(result, styles(result)).rows
-    assert row[2].text == "target centroid or median, k 0.1 to 0.7"
+    (row,) = controllers_table(result).rows
+    assert row[2] == "target centroid or median, k 0.1 to 0.7"
 
 
 def test_words_have_even_places_and_no_line_between_them() -> None:

@@ -15,7 +15,8 @@ from robocov.environment import Environment
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.render.density import density_kind, density_lines
-from robocov_app.report.embedding import density_picture, embedded_map
+from robocov_app.report.pictures import density_picture
+from robocov_app.report.replay import embedded_map
 
 PLAIN = Environment("plain", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)))
 HEAVY = PLAIN.with_density(Gaussians((Gaussian((5.0, 5.0), 4.0, sigma=1.0),), 0.5))

@@ -35,9 +35,8 @@ from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
 from robocov_app.replication.svg import Strip, interval_bar, strips
 from robocov_app.replication.verdicts import LEAST_MAPS, Claim, amount, described, verdict_counts
-from robocov_app.report.embedding import ReplayRun
 from robocov_app.report.pictures import run_picture
-from robocov_app.report.replay import asset, replay_css, replay_js, replay_part, script
+from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.sweep.study import UNITS
 from robocov_app.terminal.output import finite

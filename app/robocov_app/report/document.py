@@ -6,9 +6,8 @@ import base64
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
@@ -19,9 +18,17 @@ from robocov_app.figures.styles import MARKS
 from robocov_app.render.theme import theme_named
 from robocov_app.report import facts, plots, tables
 from robocov_app.report import groups as grouped
-from robocov_app.report.embedding import BUDGET, ReplayRun, has_path, lives
-from robocov_app.report.pictures import map_picture, run_picture
-from robocov_app.report.replay import MOST_PANES, asset, replay_css, replay_js, replay_part, script
+from robocov_app.report.pictures import has_path, lives, map_picture, run_picture
+from robocov_app.report.replay import (
+    BUDGET,
+    MOST_PANES,
+    ReplayRun,
+    asset,
+    replay_css,
+    replay_js,
+    replay_part,
+    script,
+)
 from robocov_app.report.results import Result
 from robocov_app.report.theme_css import theme_rules
 
@@ -30,8 +37,7 @@ MOST_MAPS = 12  # maps that are drawn
 MOST_LETTERS = 40  # a longer word is cut, and stands whole in a tooltip
 
 
-@dataclass(frozen=True)
-class Report:
+class Report(NamedTuple):
     """A page, and for each result how many of its runs can be watched."""
 
     html: str
@@ -65,10 +71,10 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     """Return all that the page says of a result."""
     looks = grouped.styles(result)
     choice = grouped.chosen(result, grouped.MOST_RUNS, MOST_PANES)
-    compared = grouped.compared_groups(result)
-    pairs = grouped.comparisons(compared.groups)
+    compared, chosen_gains = grouped.compared_groups(result)
+    pairs = grouped.comparisons(compared)
     every = grouped.settings(result)
-    labels = {entry: group.label for group in grouped.variants(result) for entry in group.entries}
+    labels = grouped.labels(result)
     replayed = [
         ReplayRun(
             result.record(entry),
@@ -83,6 +89,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     changing = [run.record for run in replayed if run.record.conditions is not None]
     return {
         "key": key,
+        "looks": looks,
         "title": facts.title_of(result),
         "lede": facts.lede(result, pairs),
         "in_pairs": result.kind == "sweep" and any(each.pairs > 1 for each in pairs),
@@ -91,23 +98,23 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "facts": facts.facts(result),
         "maps": [(name, map_picture(result.maps[name])) for name in list(result.maps)[:MOST_MAPS]],
         "more_maps": len(result.maps) - MOST_MAPS,
-        "controllers": tables.controllers_table(result, looks),
+        "controllers": tables.controllers_table(result),
         "meanings": facts.meanings(result),
-        "gains": tables.gains_table(result, looks),
-        "summaries": tables.summary_tables(result, looks),
-        "runs": tables.runs_table(result, looks),
+        "gains": tables.gains_table(result),
+        "summaries": tables.summary_tables(result),
+        "runs": tables.runs_table(result),
         "costs": list(plots.cost_plots(result, plots.Curves(result), looks, f"{key}c")),
         "weighed": facts.weighed_text(result),
         "medians": any(len(group.entries) > 1 for group in grouped.variants(result)),
         "measures": plots.measure_plots(result, replayed, choice.entries, looks, f"{key}m"),
         "finals": list(plots.final_plots(result, looks, f"{key}f")),
-        "pairs": tables.pairs_table(pairs, looks) if pairs else None,
+        "pairs": tables.pairs_table(pairs) if pairs else None,
         "pairs_plots": list(plots.paired_plots(pairs, looks, f"{key}p")),
         "map_pairs": tables.map_pairs_tables(pairs),
         "compared": pairs,
-        "chosen_gains": compared.words,
+        "chosen_gains": chosen_gains,
         "dependences": list(plots.dependence_plots(result, f"{key}d")),
-        "failures": tables.failures_table(result, looks),
+        "failures": tables.failures_table(result),
         "settings": len(every),
         "too_many": len(every) > plots.MOST_PANELS,
         "choice": choice.words if len(replayed) > 1 else "",

@@ -10,7 +10,7 @@ import numpy as np
 
 from robocov.errors import counted
 from robocov_app.render.density import density_label
-from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, setting_label, variants
+from robocov_app.report.groups import MOST_SAID, Comparison, gain_text, labels, setting_label
 from robocov_app.report.results import Entry, Result, printable
 from robocov_app.sweep.study import UNITS, parameter_text
 
@@ -19,8 +19,8 @@ def title_of(result: Result) -> str:
     """Return what a result is called."""
     if result.kind == "sweep":
         return f"Sweep {printable(result.folder.resolve().name)}"
-    labels = list(dict.fromkeys(entry.label for entry in result.entries))
-    title = f"{_listed(labels)} on {_listed(list(result.maps))}"
+    controllers = list(dict.fromkeys(entry.label for entry in result.entries))
+    title = f"{_listed(controllers)} on {_listed(list(result.maps))}"
     return f"{title} · {result.part}" if result.part else title
 
 
@@ -42,22 +42,26 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
         rest = "not settled by the end" if at is None else f"settled after {at:.1f} s"
         above = f", {100 * gap:.1f} % above the best placement known" if np.isfinite(gap) else ""
         return [f"At the end the nearest robot is {entry.final:.3f} m away on average{above}; {rest}."]
-    lowest = min(entry.final for entry in fine)
-    labels = {entry: group.label for group in variants(result) for entry in group.entries}
+    lowest, names = min(entry.final for entry in fine), labels(result)
     parts = []
     for entry in sorted(fine, key=lambda each: each.final):
         above = f" (+{100 * (entry.final / lowest - 1):.0f} %)" if entry.final > lowest > 0 else ""
-        parts.append(f"{labels[entry]} {entry.final:.3f} m{above}")
+        parts.append(f"{names[entry]} {entry.final:.3f} m{above}")
     weighed = ", weighed by φ" if weighed_text(result) else ""
     return [f"Final mean distance to the nearest robot{weighed}: {', '.join(parts)}."]
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
     """Return what was run, as terms and descriptions."""
-    known = result.facts
-    starts = list(dict.fromkeys(entry.start for entry in result.entries))
+    starts = dict.fromkeys(entry.start for entry in result.entries)
     sizes = sorted({entry.robots for entry in result.entries})
-    versions = known.get("versions")
+    versions = result.facts.get("versions")
+    versions = versions if isinstance(versions, dict) else {}
+
+    def known(form: str, name: str, factor: int = 1) -> str:
+        value = result.facts.get(name)
+        return "" if value is None else form.format(factor * value)
+
     rows = [
         ("Runs", _runs_text(result)),
         ("Maps", ", ".join(result.maps)),
@@ -66,21 +70,12 @@ def facts(result: Result) -> list[tuple[str, str]]:
         ("Team", _team_text(result)),
         ("Starts", ", ".join("given positions" if start is None else start for start in starts)),
         ("Seeds", _seeds_text(result)),
-        ("Duration", _known_text("{:.6g} s", known.get("duration_s"))),
-        ("Control period", _known_text("{:.4g} ms", known.get("dt_s"), 1000)),
-        ("Cost evaluated on", _known_text("a lattice of {0} × {0} sites", known.get("lattice"))),
-        (
-            "Versions",
-            ", ".join(f"{name} {number}" for name, number in versions.items())
-            if isinstance(versions, dict)
-            else "",
-        ),
+        ("Duration", known("{:.6g} s", "duration_s")),
+        ("Control period", known("{:.4g} ms", "dt_s", 1000)),
+        ("Cost evaluated on", known("a lattice of {0} × {0} sites", "lattice")),
+        ("Versions", ", ".join(f"{name} {number}" for name, number in versions.items())),
     ]
     return [(term, text) for term, text in rows if text]
-
-
-def _known_text(form: str, value: Any, factor: int = 1) -> str:
-    return "" if value is None else form.format(factor * value)
 
 
 def meanings(result: Result) -> list[tuple[str, str]]:
@@ -92,10 +87,9 @@ def meanings(result: Result) -> list[tuple[str, str]]:
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
     words = {name: density_label(environment) for name, environment in result.maps.items()}
-    some = {name: each for name, each in words.items() if each}
-    if len(result.maps) == 1:
-        return "".join(some.values())
-    return "; ".join(f"{name}: {each}" for name, each in some.items())
+    if len(words) == 1:
+        return "".join(words.values())
+    return "; ".join(f"{name}: {each}" for name, each in words.items() if each)
 
 
 def gaps(result: Result) -> list[str]:
@@ -129,12 +123,11 @@ def _firsts(texts: Sequence[str], most: int = 3) -> str:
 def troubles(result: Result) -> list[str]:
     """Return sentences on what did not go well in runs: contacts, robots that got stuck, no rest."""
     fine = result.fine
+    moving = [e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine]
     found = {
         "a robot touched a wall or another one": [(e.figures.get("contacts") or 0) > 0 for e in fine],
         "a robot was stuck at the end": [(e.figures.get("stuck_robots") or 0) > 0 for e in fine],
-        "the team had not settled by the end": [
-            e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine
-        ],
+        "the team had not settled by the end": moving,
     }
     if len(fine) == 1:
         return [f"{what[0].upper()}{what[1:]}." for what, (here,) in found.items() if here]
@@ -162,11 +155,9 @@ def run_facts(result: Result, entry: Entry) -> str:
         words.append(f"mean time {figures['mean_time_s']:.3f} s")
     at = figures.get("settled_at_s")
     words.append("not settled" if at is None else f"settled at {at:.1f} s")
-    contacts = figures.get("contacts")
-    if contacts is not None:
+    if (contacts := figures.get("contacts")) is not None:
         words.append(counted(int(contacts), "contact"))
-    path = figures.get("path_length_m")
-    if path is not None:
+    if (path := figures.get("path_length_m")) is not None:
         words.append(f"{path:.2f} m of path per robot")
     return f"{'; '.join(words)}."
 
@@ -179,12 +170,9 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 def _runs_text(result: Result) -> str:
     done = len(result.fine)
     words = [str(done) if done == result.wanted else f"{done} done"]
-    if result.failed:
-        words.append(f"{len(result.failed)} failed")
-    if result.damaged:
-        words.append(f"{len(result.damaged)} unreadable")
-    if result.missing:
-        words.append(f"{result.missing} of {result.wanted} missing")
+    words += [f"{len(result.failed)} failed"] * bool(result.failed)
+    words += [f"{len(result.damaged)} unreadable"] * bool(result.damaged)
+    words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
     return ", ".join(words)
 
 
@@ -199,30 +187,24 @@ def _seeds_text(result: Result) -> str:
 def _team_text(result: Result) -> str:
     """Return limits and ranges of the team, and which of them vary."""
     team = result.facts.get("team")
-    parts = []
-    if isinstance(team, dict):
-        parts = [_parameter(str(key), value) for key, value in team.items()]
+    parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
     for name, _ in result.entries[0].team if result.entries else ():
-        values = list(dict.fromkeys(dict(entry.team)[name] for entry in result.entries))
+        values = dict.fromkeys(dict(entry.team)[name] for entry in result.entries)
         several = ", ".join(parameter_text(name, value) for value in values)
         parts.append(f"{name.replace('_', ' ')} {several}")
-    return ", ".join(part for part in parts if part)
+    return ", ".join(filter(None, parts))
 
 
 def _parameter(key: str, value: Any) -> str:
     """Return a parameter of a team as words: of a sweep's study, or of a run with the unit in the name."""
-    if isinstance(value, list):
-        same = all(each == value[0] for each in value)
-        value = value[0] if value and same else value
-    for name, unit in UNITS.items():
-        if key == name or key.startswith(f"{name}_"):
-            words = name.replace("_", " ")
-            if isinstance(value, str):
-                return f"{words} {parameter_text(name, value)}"
-            if value is None:
-                return f"{words} without limit"
-            if isinstance(value, int | float):
-                return f"{words} {value:.4g} {unit}"
-            if isinstance(value, list) and all(isinstance(each, int | float) for each in value):
-                return f"{words} {min(value):.4g} to {max(value):.4g} {unit}"
-    return ""
+    name = next((name for name in UNITS if key == name or key.startswith(f"{name}_")), None)
+    if name is None:
+        return ""
+    words, unit = name.replace("_", " "), UNITS[name]
+    values = value if isinstance(value, list) else [value]
+    if isinstance(value, str):
+        return f"{words} {parameter_text(name, value)}"
+    if values and all(isinstance(each, int | float) for each in values):
+        low, high = min(values), max(values)
+        return f"{words} {low:.4g} {unit}" if low == high else f"{words} {low:.4g} to {high:.4g} {unit}"
+    return f"{words} without limit" if values and all(each is None for each in values) else ""

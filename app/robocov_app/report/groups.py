@@ -17,18 +17,17 @@ from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Result
 from robocov_app.sweep.study import parameter_text
 
-# controllers with their gains up to which each is shown apart; of more, each controller as a whole
-MOST_GROUPS = 8
-
+MOST_GROUPS = (
+    8  # controllers with their gains up to which each is shown apart; of more, each controller as a whole
+)
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
-
 TUNED = " (tuned)"  # stands behind a controller's label where its gains were chosen on other runs than these
+
 _DIRECT = 12  # letters that a gain and its value may take in a label
 
-
 Gains: TypeAlias = tuple[tuple[str, Value], ...]
-
-Scales: TypeAlias = Mapping[tuple[object, ...], float]  # by setting, what costs are divided by
+Setting: TypeAlias = tuple[object, ...]
+Scales: TypeAlias = Mapping[Setting, float]  # what costs are divided by
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,26 +44,32 @@ class Group:
         """Mean distances at the end, (m,) m, nan where there is none."""
         return np.array([entry.final for entry in self.entries])
 
-    def at(self, setting: tuple[object, ...]) -> Group:
+    def at(self, setting: Setting) -> Group:
         """Return the part of the group in one setting."""
         return replace(self, entries=tuple(entry for entry in self.entries if entry.setting == setting))
 
 
 def variants(result: Result) -> list[Group]:
     """Return runs that did not fail by controller and gains, named by the differing gain or a letter."""
-    found: dict[str, dict[Gains, list[Entry]]] = {}
+    found: dict[tuple[str, Gains], list[Entry]] = {}
     for entry in result.fine:
-        found.setdefault(entry.controller, {}).setdefault(entry.gains, []).append(entry)
-    groups = {
-        (controller, gains): Group(f"{entries[0].label}{suffix}", controller, gains, tuple(entries))
-        for controller, sets in found.items()
-        for (gains, entries), suffix in zip(sets.items(), _suffixes(list(sets)), strict=True)
-    }
-    return [groups[key] for key in dict.fromkeys((entry.controller, entry.gains) for entry in result.fine)]
+        found.setdefault((entry.controller, entry.gains), []).append(entry)
+    suffixes: dict[tuple[str, Gains], str] = {}
+    for controller in {controller for controller, _ in found}:
+        sets = [gains for name, gains in found if name == controller]
+        suffixes |= {(controller, gains): text for gains, text in zip(sets, _suffixes(sets), strict=True)}
+    return [
+        Group(f"{entries[0].label}{suffixes[key]}", *key, tuple(entries)) for key, entries in found.items()
+    ]
+
+
+def labels(result: Result) -> dict[Entry, str]:
+    """Return what the variant of each run that did not fail is called."""
+    return {entry: group.label for group in variants(result) for entry in group.entries}
 
 
 def _suffixes(sets: Sequence[Gains]) -> list[str]:
-    """Return what tells sets of gains of one controller apart."""
+    """Return what tells sets of gains of one controller apart: the one that differs, or A, ..., Z, A2, ..."""
     if len(sets) == 1:
         return [""]
     differing = [own for own in zip(*sets, strict=False) if len(set(own)) > 1]
@@ -72,7 +77,8 @@ def _suffixes(sets: Sequence[Gains]) -> list[str]:
         named = [f" {name} {value_text(value, digits=4)}" for name, value in differing[0]]
         if len(set(named)) == len(sets) and max(map(len, named)) <= _DIRECT:
             return named
-    return [f" {_letters(number)}" for number in range(len(sets))]
+    turns = [divmod(number, len(LETTERS)) for number in range(len(sets))]
+    return [f" {LETTERS[place]}{turn + 1 if turn else ''}" for turn, place in turns]
 
 
 def styles(result: Result) -> dict[str, CurveStyle]:
@@ -106,27 +112,25 @@ def shown_groups(result: Result) -> list[Group]:
     return apart if len(apart) <= MOST_GROUPS else by_controller(result)
 
 
-def settings(result: Result) -> list[tuple[object, ...]]:
+def settings(result: Result) -> list[Setting]:
     """Return the settings of all runs that did not fail, in the result's order."""
     return list(dict.fromkeys(entry.setting for entry in result.fine))
 
 
-def setting_label(result: Result, setting: tuple[object, ...]) -> str:
+def setting_label(result: Result, setting: Setting) -> str:
     """Return what tells a setting from the others of the result: at least its map."""
-    every = settings(result)
     name, robots, team = setting
     parts = [str(name)]
-    if len({each[1] for each in every}) > 1:
+    if len({size for _, size, _ in settings(result)}) > 1:
         parts.append(f"{robots} robots")
     assert isinstance(team, tuple)
-    for parameter, value in team:
-        parts.append(f"{parameter.replace('_', ' ')} {parameter_text(parameter, value)}")
+    parts += [f"{each.replace('_', ' ')} {parameter_text(each, value)}" for each, value in team]
     return ", ".join(parts)
 
 
-def medians(result: Result) -> dict[tuple[object, ...], float]:
+def medians(result: Result) -> dict[Setting, float]:
     """Return the median of the final mean distances of all runs in each setting, m."""
-    found: dict[tuple[object, ...], list[float]] = {}
+    found: dict[Setting, list[float]] = {}
     for entry in result.fine:
         if np.isfinite(entry.final):
             found.setdefault(entry.setting, []).append(entry.final)
@@ -164,17 +168,8 @@ def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> s
     >>> gain_text([("k_rep", 0.3), ("attraction_limit", None)], {"k_rep": "N m³"})
     'k_rep 0.3 N m³, attraction_limit none'
     """
-    parts = []
-    for name, value in gains:
-        unit = "" if value is None else units.get(name, "")
-        parts.append(f"{name} {value_text(value)} {unit}".rstrip())
-    return ", ".join(parts)
-
-
-def _letters(number: int) -> str:
-    """Return A, B, ..., Z, A2, B2, ..."""
-    turn, place = divmod(number, len(LETTERS))
-    return LETTERS[place] + (str(turn + 1) if turn else "")
+    known = [(name, value, "" if value is None else units.get(name, "")) for name, value in gains]
+    return ", ".join(f"{name} {value_text(value)} {unit}".rstrip() for name, value, unit in known)
 
 
 Verdict: TypeAlias = Literal["better", "worse", "undecided"]
@@ -223,8 +218,7 @@ class Comparison:
 
     def tally(self) -> str:
         """Return on how many maps the first is better, worse, or neither, in words."""
-        counts = Counter(each.verdict for each in self.maps)
-        total = len(self.maps)
+        counts, total = Counter(each.verdict for each in self.maps), len(self.maps)
         if len(counts) == 1:
             where = {1: "the map", 2: "both maps"}.get(total, f"all {total} maps")
             return f"{self.maps[0].verdict} on {where}"
@@ -243,13 +237,6 @@ class Comparison:
         if self.pairs == 1:
             return f"{names}: ratio {ratio_text(ratio)} in the only pair."
         return f"{names}: {self.maps[0].verdict}, ratio {ratio_text(ratio)} over {self.pairs} pairs."
-
-
-class Compared(NamedTuple):
-    """The groups that are compared, and how their gains were chosen, in words."""
-
-    groups: list[Group]
-    words: str
 
 
 def ratio_text(ratio: Interval) -> str:
@@ -290,8 +277,8 @@ def compared(first: Group, second: Group) -> Comparison | None:
     return Comparison(first, second, tuple(maps), ratio, len(a.keys() ^ b.keys()))
 
 
-def compared_groups(result: Result) -> Compared:
-    """Return the groups that are compared: variants of one controller, or controllers with fair gains.
+def compared_groups(result: Result) -> tuple[list[Group], str]:
+    """Return the groups that are compared, variants of a controller or controllers with fair gains; and how.
 
     Where controllers have several sets of gains, those for a map are chosen on the other maps (on one map,
     those for a start and seed on the others): no run is compared that its own gains were chosen on.
@@ -301,8 +288,8 @@ def compared_groups(result: Result) -> Compared:
     for group in apart:
         by.setdefault(group.controller, []).append(group)
     if len(by) < 2 or len(by) == len(apart):
-        words = "Every set of gains is compared by itself; none was chosen." if len(by) < len(apart) else ""
-        return Compared(apart, words)
+        every = "Every set of gains is compared by itself; none was chosen."
+        return apart, every if len(by) < len(apart) else ""
     several_maps = len({entry.map for entry in result.fine}) > 1
 
     def part_of(entry: Entry) -> object:
@@ -311,7 +298,7 @@ def compared_groups(result: Result) -> Compared:
     parts = list(dict.fromkeys(part_of(entry) for entry in result.fine))
     if len(parts) < 2:
         words = "There is one case only, too few to choose gains fairly: the first of each take part."
-        return Compared([groups[0] for groups in by.values()], words)
+        return [groups[0] for groups in by.values()], words
     scales, groups, chosen_gains = medians(result), [], []
     costs: dict[object, list[tuple[object, float]]] = {}
     for entry in result.entries:
@@ -328,18 +315,15 @@ def compared_groups(result: Result) -> Compared:
             best = own[min(range(len(own)), key=standing.__getitem__)]
             entries += [entry for entry in best.entries if part_of(entry) == part]
             choices.append(best.label)
-        label = own[0].entries[0].label + TUNED
-        groups.append(Group(label, controller, None, tuple(entries)))
+        groups.append(Group(own[0].entries[0].label + TUNED, controller, None, tuple(entries)))
         counts = Counter(choices).most_common(3)
         chosen_gains.append(", ".join(f"{name} in {count} of {len(parts)}" for name, count in counts))
-    other = "median on the other maps" if several_maps else "median from the others"
-    words = (
-        f"Tuned: of a controller with several sets of gains, those for a "
-        f"{'map' if several_maps else 'start and seed'} are those with the lowest {other}, so that no run is "
-        f"compared on which its gains were chosen; a failed run counts as the worst. "
-        f"Chosen: {'; '.join(chosen_gains)}."
+    part, other = ("map", "on the other maps") if several_maps else ("start and seed", "from the others")
+    return groups, (
+        f"Tuned: of a controller with several sets of gains, those for a {part} are those with the lowest "
+        f"median {other}, so that no run is compared on which its gains were chosen; a failed run counts as "
+        f"the worst. Chosen: {'; '.join(chosen_gains)}."
     )
-    return Compared(groups, words)
 
 
 def _by_case(group: Group) -> dict[tuple[object, ...], Entry]:
@@ -349,8 +333,7 @@ def _by_case(group: Group) -> dict[tuple[object, ...], Entry]:
 def _exp(effect: Interval) -> Interval:
     """Return ratios for their logarithms."""
     with np.errstate(over="ignore"):
-        low, high = np.exp([effect.low, effect.high]).tolist()
-    return Interval(float(np.exp(effect.estimate)), low, high)
+        return Interval(*np.exp([effect.estimate, effect.low, effect.high]).tolist())
 
 
 MOST_RUNS = 50  # runs of a result that a page shows as pictures
@@ -371,29 +354,26 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
     worst, and of one case that is nearest to the middle of all controllers a run of each, so that they can
     be watched from the same starts. Where that is still too much, the same over all maps together.
     """
-    fine = result.fine
-    if len(fine) <= most:
-        return Choice(fine, "All runs.", _side_by_side(result, fine, panes))
-    what = (
-        "the best and the worst run of each controller by its final mean distance, and the case (start and "
-        "seed) that is nearest to the middle for all of them, with the gains that each is compared with"
-    )
-    maps = list(dict.fromkeys(entry.map for entry in fine))
-    found: set[Entry] = set()
-    for name in maps:
-        found |= _telling(result, [entry for entry in fine if entry.map == name])
-    words = f"{{count}} of {len(fine)} runs: on each map {what}."
-    if len(found) > most:
-        found = _telling(result, fine)
-        words = (
-            f"{{count}} of {len(fine)} runs: over all maps {what}; distances are divided by the median of "
-            f"the same map and team."
+    entries, words = result.fine, "All runs."
+    if len(entries) > most:
+        what = (
+            "the best and the worst run of each controller by its final mean distance, and the case (start "
+            "and seed) that is nearest to the middle for all of them, with the gains that each is compared "
+            "with"
         )
-    if not found:
-        words = f"The first {most} of {len(fine)} runs: none has a final cost."
-        return Choice(fine[:most], words, _side_by_side(result, fine[:most], panes))
-    entries = tuple(entry for entry in fine if entry in found)[:most]
-    return Choice(entries, words.format(count=len(entries)), _side_by_side(result, entries, panes))
+        every = f"{len(entries)} runs"
+        found: set[Entry] = set()
+        for name in dict.fromkeys(entry.map for entry in entries):
+            found |= _telling(result, [entry for entry in entries if entry.map == name])
+        words = f"on each map {what}."
+        if len(found) > most:
+            found = _telling(result, entries)
+            words = f"over all maps {what}; distances are divided by the median of the same map and team."
+        entries = tuple(entry for entry in entries if not found or entry in found)[:most]
+        words = f"{len(entries)} of {every}: {words}"
+        if not found:
+            words = f"The first {most} of {every}: none has a final cost."
+    return Choice(entries, words, _side_by_side(result, entries, panes))
 
 
 def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
@@ -412,10 +392,9 @@ def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
 
 def _best_variants(result: Result, entries: Iterable[Entry], few: int = 0) -> list[Group]:
     """Return of each controller the runs with the gains it is compared with, or all variants of few."""
-    among = set(entries)
-    groups = variants(result)
+    among, groups = set(entries), variants(result)
     if len(groups) > few:
-        groups = compared_groups(result).groups
+        groups, _ = compared_groups(result)
     return [replace(group, entries=tuple(e for e in group.entries if e in among)) for group in groups]
 
 
@@ -431,15 +410,10 @@ def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
             runs.setdefault(entry.case, []).append(entry)
     if not ranks:
         return ()
-    case = min(ranks, key=lambda each: (-len(ranks[each]), sum(ranks[each])))
-    return tuple(runs[case])
+    return tuple(runs[min(ranks, key=lambda case: (-len(ranks[case]), sum(ranks[case])))])
 
 
 def _side_by_side(result: Result, entries: Sequence[Entry], panes: int) -> tuple[int, ...]:
     """Return runs of as many controllers as there are, from the same starts if possible."""
-    if not entries:
-        return ()
-    middle = _middle_case(_best_variants(result, entries, panes), medians(result))
-    if not middle:
-        return (0,)
+    middle = _middle_case(_best_variants(result, entries, panes), medians(result)) or entries[:1]
     return tuple(entries.index(entry) for entry in middle[:panes])

@@ -5,25 +5,31 @@ Colours are CSS variables (`robocov_app.report.theme_css`): one picture suits li
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Iterable
 from html import escape
 
 import numpy as np
 import shapely
+from PIL import Image
 
 from robocov.arrays import Array
 from robocov.environment import Environment
+from robocov.errors import counted
 from robocov.metrics import CostHistory
 from robocov.record import Record
-from robocov_app.render.density import density_label
+from robocov_app.render.density import density_label, dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import MovingObstacle, moving_obstacles
-from robocov_app.render.theme import ONE_HUE_EACH, robot_hues
-from robocov_app.report.embedding import density_picture, has_path, lives
+from robocov_app.render.theme import DARK, LIGHT, ONE_HUE_EACH, mix, robot_hues
 from robocov_app.runs.saved import roster_of
 
 _MARGIN = 3.0  # pixels round the region
 _FINE = 0.2  # pixels by which a line may be simplified
+_DOTS = 80  # dots along the longer side of the picture of a density
+# seconds between the first moment and the last, if there are no others, above which they tell no path
+SPARSE = 1.5
 # robots up to which cells and trajectories are drawn: a larger team would make too large a picture
 MOST_ROBOTS = 400
 
@@ -42,6 +48,42 @@ class Frame:
     def at(self, points: Array) -> Array:
         """Return (..., 2) m as pixels from the upper left corner."""
         return np.asarray((points - self.corner) * np.array([self.zoom, -self.zoom]) + _MARGIN)
+
+
+def density_picture(environment: Environment) -> str:
+    """Return a ``data:image/png`` of the density over the region's box, clear outside; empty without one."""
+    if environment.density is None or environment.density.uniform:
+        return ""
+    picture = shading(environment, _DOTS, LIGHT)
+    # one colour for light and dark: it is between the two
+    picture[..., :3] = mix(LIGHT.density, DARK.density, 0.5)
+    x, y = np.meshgrid(*dots(environment, _DOTS))
+    places = np.column_stack([x.ravel(), y.ravel()])
+    picture[~environment.region.contains(places).reshape(x.shape), 3] = 0
+    file = io.BytesIO()
+    Image.fromarray(picture[::-1]).save(file, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def rings_of(area: shapely.Geometry) -> list[Array]:
+    """Return the rings of polygons, (k, 2) m each, open, of each polygon the outer one first."""
+    return [shapely.get_coordinates(ring)[:-1] for ring in shapely.get_rings(shapely.get_parts(area))]
+
+
+def has_path(record: Record) -> bool:
+    """Return whether there is more than the first moment and the last, to tell where the robots went."""
+    return len(record) > 2 or (len(record) == 2 and float(record.time[1] - record.time[0]) <= SPARSE)
+
+
+def lives(record: Record) -> list[tuple[float, float | None]]:
+    """Return when each robot is first there (never: after the end) and fails (never: None), s."""
+    since = record.time - record.time[0]
+    found: list[tuple[float, float | None]] = []
+    for present, working in zip(record.present.T, record.working.T, strict=True):
+        begins, failed = np.flatnonzero(present), np.flatnonzero(present & ~working)
+        begin = float(since[begins[0]]) if len(begins) else float(since[-1]) + 1.0
+        found.append((begin, float(since[failed[0]]) if len(failed) else None))
+    return found
 
 
 def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
@@ -72,41 +114,33 @@ def run_picture(
             if len(cell) > 2:
                 parts.append(f'<path class="cell c{hue}" d="{_path([frame.at(cell)], closed=True)}"/>')
     parts.append(_map_shapes(record.environment, frame, float(record.time[-1])))
-    tracks = np.moveaxis(frame.at(record.positions), 1, 0)
+    # before it joins, a robot goes nowhere
+    began, joined = np.argmax(record.present, axis=0), record.present.any(axis=0)
     if has_path(record) and n <= MOST_ROBOTS:
-        # before it joins, a robot goes nowhere
-        began = np.argmax(record.present, axis=0).tolist()
+        tracks = np.moveaxis(frame.at(record.positions), 1, 0)
         there = [track[first:] for track, first in zip(tracks, began, strict=True)]
         lines = [shapely.simplify(shapely.LineString(track), _FINE) for track in there if len(track) > 1]
-        parts.append(f'<path class="way" d="{_path([np.asarray(line.coords) for line in lines])}"/>')
-    joined = record.present.any(axis=0)
-    began = np.argmax(record.present, axis=0)[joined]
-    starts, ends = frame.at(record.positions[began, np.flatnonzero(joined)]), frame.at(last)
+        parts.append(f'<path class="way" d="{_path(map(shapely.get_coordinates, lines))}"/>')
+    starts, ends = frame.at(record.positions[began[joined], np.flatnonzero(joined)]), frame.at(last)
     ring = mark_size(starts, 2.4, 5.0) / 2
     parts += [f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="{ring:.1f}"/>' for x, y in starts]
-    most = 9.0 if numbers else 4.5
-    radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, most)
-    present, failed = record.present[-1], record.present[-1] & ~record.working[-1]
-    for row, (number, (x, y), r) in enumerate(zip(roster_of(record).numbers, ends, radii, strict=True)):
-        if failed[row]:
-            parts.append(_wreck(x, y, r))
-        if failed[row] or not present[row]:
+    radii = fitted_radii(ends, record.team.radius * frame.zoom, 1.5, 9.0 if numbers else 4.5)
+    states = zip(record.present[-1], record.working[-1], strict=True)
+    for number, (x, y), r, (there, works) in zip(roster_of(record).numbers, ends, radii, states, strict=True):
+        if not there:
             continue
-        parts.append(f'<circle class="robot" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>')
+        kind = "robot" if works else "failed"
+        parts.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{r:.1f}"/>')
         size = r * (1.35, 1.15, 0.9, 0.7)[min(len(str(number)), 4) - 1]
-        if numbers and size >= 6.0:
-            parts.append(
-                f'<text x="{x:.1f}" y="{y + 0.36 * size:.1f}" font-size="{size:.1f}">{number}</text>'
-            )
+        if not works:  # crossed out
+            a = 0.62 * r
+            ends_of = ((y - s * a, y + s * a) for s in (1, -1))
+            cross = "".join(f"M{x - a:.1f} {low:.1f}L{x + a:.1f} {high:.1f}" for low, high in ends_of)
+            parts.append(f'<path class="failed" d="{cross}"/>')
+        elif numbers and size >= 6.0:
+            below = y + 0.36 * size
+            parts.append(f'<text x="{x:.1f}" y="{below:.1f}" font-size="{size:.1f}">{number}</text>')
     return _svg(frame, "".join(parts), None if hidden else run_sentence(record, history))
-
-
-def _wreck(x: float, y: float, radius: float) -> str:
-    """Return a robot that has failed, crossed out."""
-    arm = 0.62 * radius
-    cross = "".join(f"M{x - arm:.1f} {y - s * arm:.1f}L{x + arm:.1f} {y + s * arm:.1f}" for s in (1, -1))
-    disc = f'<circle class="failed" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}"/>'
-    return f'{disc}<path class="failed" d="{cross}"/>'
 
 
 def changes_sentence(record: Record) -> str:
@@ -126,8 +160,7 @@ def map_sentence(environment: Environment) -> str:
     """Return what a picture of a map shows, in words."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
-    count = len(environment.obstacles)
-    weighed = density_label(environment)
+    count, weighed = len(environment.obstacles), density_label(environment)
     moving = sum(obstacle.path is not None for obstacle in environment.obstacles)
     obstacles = {0: "without obstacles", 1: "with one obstacle"}.get(count, f"with {count} obstacles")
     obstacles += f" ({moving} moving)" if moving else ""
@@ -140,79 +173,61 @@ def map_sentence(environment: Environment) -> str:
 
 def run_sentence(record: Record, history: CostHistory | None) -> str:
     """Return what a picture of a run shows, in words."""
-    n = len(record.team)
-    span = record.time[-1] - record.time[0]
+    robots, span = counted(len(record.team), "robot"), record.time[-1] - record.time[0]
     start = f" from start {record.start}" if record.start else ""
-    text = (
-        f"{record.label} on map {record.environment.name}: trajectories of {n} robot{'s' if n > 1 else ''}"
-        f"{start} over {span:.4g} s."
-    )
+    words = [
+        f"{record.label} on map {record.environment.name}: trajectories of {robots}{start} over {span:.4g} s."
+    ]
     if record.conditions is not None and (changes := changes_sentence(record)):
-        text += f" {changes}"
+        words.append(changes)
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
         first, final = history.mean_distance[[0, -1]]
-        word = "falls" if final < first else "goes"
+        goes = "falls" if final < first else "goes"
         weighed = ", weighed by φ," if density_label(record.environment) else ""
-        text += (
-            f" The mean distance to the nearest robot{weighed} {word} from {first:.3f} m to {final:.3f} m."
-        )
+        change = f"{goes} from {first:.3f} m to {final:.3f} m"
+        words.append(f"The mean distance to the nearest robot{weighed} {change}.")
         if history.mean_time is not None and np.isfinite(history.mean_time[[0, -1]]).all():
             first, final = history.mean_time[[0, -1]]
-            text += f" The mean time until the first is there goes from {first:.3f} s to {final:.3f} s."
-    return text
+            words.append(f"The mean time until the first is there goes from {first:.3f} s to {final:.3f} s.")
+    return " ".join(words)
 
 
 def _svg(frame: Frame, content: str, sentence: str | None) -> str:
     label = 'aria-hidden="true"' if sentence is None else f'role="img" aria-label="{escape(sentence)}"'
     # no size of its own: the page gives it a width, and the view box the height
-    return (
-        f'<svg class="robocov-picture" viewBox="0 0 {frame.width:g} {frame.height:g}" {label}>{content}</svg>'
-    )
+    box = f"0 0 {frame.width:g} {frame.height:g}"
+    return f'<svg class="robocov-picture" viewBox="{box}" {label}>{content}</svg>'
 
 
 def _map_shapes(environment: Environment, frame: Frame, time: float) -> str:
-    region = _path([frame.at(environment.region.vertices)], closed=True)
-    blocked = shapely.simplify(environment.at(time).blocked, _FINE / frame.zoom)
-    rings = [
-        frame.at(np.asarray(ring.coords)[:-1])
-        for part in shapely.get_parts(blocked)
-        for ring in (part.exterior, *part.interiors)
-    ]
-    shapes = f'<path class="blocked" d="{_path(rings, closed=True)}"/>' if rings else ""
+    """Return the shading of the density, what is blocked, what moves, and the boundary of the region."""
+    shapes = ""
+    if address := density_picture(environment):
+        wide, high = frame.width - 2 * _MARGIN, frame.height - 2 * _MARGIN
+        shapes = (
+            f'<image x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}" '
+            f'preserveAspectRatio="none" href="{address}"/>'
+        )
+    rings = rings_of(shapely.simplify(environment.at(time).blocked, _FINE / frame.zoom))
+    if rings:
+        shapes += f'<path class="blocked" d="{_path(map(frame.at, rings), closed=True)}"/>'
     for obstacle in moving_obstacles(environment, time):
         shapes += _motion(obstacle, environment, frame)
-    return f'{_density_image(environment, frame)}{shapes}<path class="region" d="{region}"/>'
+    region = _path([frame.at(environment.region.vertices)], closed=True)
+    return f'{shapes}<path class="region" d="{region}"/>'
 
 
 def _motion(obstacle: MovingObstacle, environment: Environment, frame: Frame) -> str:
     """Return a moving obstacle: its shape, its path as a dashed line, and an arrow where it heads."""
-    seen = shapely.get_parts(shapely.intersection(obstacle.polygon, environment.region.polygon))
-    rings = [
-        frame.at(np.asarray(ring.coords)[:-1])
-        for part in seen
-        if isinstance(part, shapely.Polygon)
-        for ring in (part.exterior, *part.interiors)
-    ]
+    seen = shapely.intersection(obstacle.polygon, environment.region.polygon)
     along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
     across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)
     arrow = [middle - along, middle + along]
     head = [middle + 0.2 * along + across, middle + along, middle + 0.2 * along - across]
     return (
-        f'<path class="blocked moving" d="{_path(rings, closed=True)}"/>'
+        f'<path class="blocked moving" d="{_path(map(frame.at, rings_of(seen)), closed=True)}"/>'
         f'<path class="motion" d="{_path([frame.at(obstacle.path)])}"/>'
         f'<path class="heading" d="{_path([np.array(arrow), np.array(head)])}"/>'
-    )
-
-
-def _density_image(environment: Environment, frame: Frame) -> str:
-    """Return the shading of the density as an image within the picture; empty without one."""
-    address = density_picture(environment)
-    wide, high = frame.width - 2 * _MARGIN, frame.height - 2 * _MARGIN
-    return (
-        f'<image x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}" '
-        f'preserveAspectRatio="none" href="{address}"/>'
-        if address
-        else ""
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple, TypeAlias
 
@@ -16,19 +15,13 @@ from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
 from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
 from robocov_app.figures.metrics import share
-from robocov_app.figures.results import (
-    Band,
-    Pairs,
-    Sample,
-    plot_cost_bands,
-    plot_final_costs,
-    plot_paired,
-    quartiles,
-)
+from robocov_app.figures.results import Band, Pairs, Sample, plot_cost_bands, plot_final_costs, plot_paired
+from robocov_app.figures.results import quartiles as quartiles_of
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.report import groups as grouped
-from robocov_app.report.embedding import ReplayRun, has_path
 from robocov_app.report.groups import Comparison, Group, ratio_text, setting_label, settings, shown_groups
+from robocov_app.report.pictures import has_path
+from robocov_app.report.replay import ReplayRun
 from robocov_app.report.results import Entry, Result
 from robocov_app.report.svg import inline_svg
 from robocov_app.sweep.study import UNITS, WORDS
@@ -137,7 +130,7 @@ def _band_plot(title: str, bands: list[Band], looks: Looks, key: str, what: str,
     ]
     words = []
     for band in bands:
-        low, middle, high = (row[np.isfinite(row)][-1] for row in quartiles(band.values))
+        low, middle, high = (row[np.isfinite(row)][-1] for row in quartiles_of(band.values))
         text = f"{band.label}: {middle:.3f} {unit}".rstrip()
         if len(band.values) > 1:
             text += f" at the end (median of {len(band.values)} runs, quartiles {low:.3f} to {high:.3f})"
@@ -162,19 +155,18 @@ def _sample_plot(
     own = [looks[sample.label] for sample in samples]
     figures = [
         plot_final_costs([("", samples)], size=(width, None), scale=SCALE, styles=own, label=what)
-        for width in ((PANEL[0],) if title else (WIDE[0], PANEL[0]))
+        for width, _ in ((PANEL,) if title else (WIDE, PANEL))
     ]
     words = []
     for label, _, found in samples:
         low, middle, high = np.percentile(found, [25, 50, 75])
         text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
         words.append(f"{text}, {counted(len(found), 'run')}")
-    sentence = f"{f'{title}: {what}' if title else what}. {'; '.join(words)}."
-    yield _alone(title, figures, key, sentence)
+    about = f"{title}: {what}" if title else what
+    yield _alone(title, figures, key, f"{about}. {'; '.join(words)}.")
 
 
-@dataclass(frozen=True)
-class _Parameter:
+class _Parameter(NamedTuple):
     """What a result may depend on: a gain, or a property of the team; `choices` are the words it may be."""
 
     title: str
@@ -197,46 +189,57 @@ class _Parameter:
         return value_text(self.level(place), digits=4)
 
 
-_Scale: TypeAlias = Callable[[Entry], float]  # what the final cost of a run is divided by, 0 where not known
+class _Scale(NamedTuple):
+    """What final costs are divided by: the medians of the parts of a result; and the label of the axis."""
+
+    label: str
+    part_of: Callable[[Entry], object]
+    medians: Mapping[object, float]
+
+    def depends(self, group: Group, parameter: _Parameter) -> Dependence:
+        """Return the scaled costs of a group's runs over a parameter, of those that have one."""
+        scales = [self.medians.get(self.part_of(entry), 0.0) for entry in group.entries]
+        known = [
+            (parameter.place(entry), entry.final / scale)
+            for entry, scale in zip(group.entries, scales, strict=True)
+            if np.isfinite(entry.final) and scale > 0.0
+        ]
+        places, values = np.array(known, dtype=float).reshape(-1, 2).T
+        return Dependence(group.label, group.controller, places, values)
+
+
+def _scale_by(result: Result, label: str, part_of: Callable[[Entry], object]) -> _Scale:
+    """Return a scale by the medians of parts of a result, or of one part metres."""
+    finals: dict[object, list[float]] = {}
+    for entry in result.fine:
+        finals.setdefault(part_of(entry), []).append(entry.final)
+    if len(finals) == 1:
+        return _Scale(METRES, part_of, dict.fromkeys(finals, 1.0))
+    known = {part: np.extract(np.isfinite(own), own) for part, own in finals.items()}
+    return _Scale(label, part_of, {part: float(np.median(own)) for part, own in known.items() if len(own)})
 
 
 def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     """Yield the final cost against every gain and limit that varies, then grids of gains."""
     groups, varying = grouped.by_controller(result), grouped.dependences(result)
-    scale, label = _scale_by(result, RELATIVE, lambda entry: entry.setting)
+    scale = _scale_by(result, RELATIVE, lambda entry: entry.setting)
     gains = {name: _gain(result, name) for name in varying}
     for k, (name, controllers) in enumerate(varying.items()):
         some = [group for group in groups if group.controller in controllers]
-        yield from _dependence_plot(gains[name], some, groups, scale, f"{key}-{k}", label)
+        yield from _dependence_plot(gains[name], some, groups, scale, f"{key}-{k}")
     # teams differ in their settings: by the medians of the maps alone
-    by_map, of_map = _scale_by(result, "final distance / median of map", lambda entry: entry.map)
+    by_map = _scale_by(result, "final distance / median of map", lambda entry: entry.map)
     for k, parameter in enumerate(_team_parameters(result)):
         if len({parameter.value_of(entry) for entry in result.fine}) > 1:
-            yield from _dependence_plot(parameter, groups, groups, by_map, f"{key}-team-{k}", of_map)
+            yield from _dependence_plot(parameter, groups, groups, by_map, f"{key}-team-{k}")
     count = 0
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for names in combinations(own, 2):
-            both = gains[names[0]], gains[names[1]]
-            number = f"{key}-grid-{count + 1}"
-            for plot in _grid_plot(group, names, both, scale, number, label):
+            plot = _grid_plot(group, names, [gains[name] for name in names], scale, f"{key}-grid-{count + 1}")
+            if plot is not None:
                 count += 1
                 yield plot
-
-
-def _scale_by(result: Result, label: str, part_of: Callable[[Entry], object]) -> tuple[_Scale, str]:
-    """Return a scale by the medians of parts of a result, with the label of the axis; none for one part."""
-    finals: dict[object, list[float]] = {}
-    for entry in result.fine:
-        finals.setdefault(part_of(entry), []).append(entry.final)
-    if len(finals) == 1:
-        return lambda entry: 1.0, METRES
-    medians = {
-        part: np.median(np.extract(np.isfinite(own), own))
-        for part, own in finals.items()
-        if np.isfinite(own).any()
-    }
-    return lambda entry: float(medians.get(part_of(entry), 0.0)), label
 
 
 def _gain(result: Result, name: str) -> _Parameter:
@@ -254,21 +257,14 @@ def _team_parameters(result: Result) -> Iterator[_Parameter]:
             yield _Parameter(title, lambda entry, name=name: dict(entry.team)[name])  # type: ignore[misc]
 
 
-def _dependence(group: Group, parameter: _Parameter, scale: _Scale) -> Dependence:
-    known = [entry for entry in group.entries if np.isfinite(entry.final) and scale(entry) > 0.0]
-    places = np.array([parameter.place(entry) for entry in known], dtype=float)
-    values = np.array([entry.final / scale(entry) for entry in known])
-    return Dependence(group.label, group.controller, places, values)
-
-
 def _dependence_plot(
-    parameter: _Parameter, some: Sequence[Group], groups: Sequence[Group], scale: _Scale, key: str, label: str
+    parameter: _Parameter, some: Sequence[Group], groups: Sequence[Group], scale: _Scale, key: str
 ) -> Iterator[Plot]:
-    rows = [row for row in (_dependence(group, parameter, scale) for group in some) if len(row.values)]
+    rows = [row for row in (scale.depends(group, parameter) for group in some) if len(row.values)]
     if not rows:
         return
     known = curve_styles(group.controller for group in groups)
-    looks, title, choices = [known[row.controller] for row in rows], parameter.title, parameter.choices
+    looks, (title, _, choices), label = [known[row.controller] for row in rows], parameter, scale.label
     figure = plot_gains(rows, title, size=PANEL, scale=SCALE, styles=looks, label=label, words=choices)
     words = []
     for row in rows:
@@ -287,35 +283,28 @@ def _dependence_plot(
 
 
 def _grid_plot(
-    group: Group,
-    names: tuple[str, str],
-    gains: tuple[_Parameter, _Parameter],
-    scale: _Scale,
-    key: str,
-    label: str,
-) -> Iterator[Plot]:
-    """Yield medians over two gains of a controller that were tried on a grid."""
-    first, second = (_dependence(group, gain, scale) for gain in gains)
+    group: Group, names: Sequence[str], gains: Sequence[_Parameter], scale: _Scale, key: str
+) -> Plot | None:
+    """Return medians over two gains of a controller; None where they were not tried on a grid."""
+    first, second = (scale.depends(group, gain) for gain in gains)
     columns, i = np.unique(first.gains, return_inverse=True)
     rows, j = np.unique(second.gains, return_inverse=True)
     if not (1 < len(columns) <= MOST_LEVELS and 1 < len(rows) <= MOST_LEVELS):
-        return
+        return None
     values = np.full((len(rows), len(columns)), np.nan)
     for row, column in set(zip(j.tolist(), i.tolist(), strict=True)):
         values[row, column] = np.median(first.values[(j == row) & (i == column)])
     if np.isnan(values).mean() > 0.5:
-        return  # no grid: a sample of a range
-    levels = [
-        [gain.level(place) for place in each] for gain, each in zip(gains, (columns, rows), strict=True)
-    ]
+        return None  # a sample of a range
+    levels = [[gain.level(place) for place in own] for gain, own in zip(gains, (columns, rows), strict=True)]
     titles = gains[0].title, gains[1].title
     figure = plot_gain_grid(levels[0], levels[1], values, titles, size=PANEL, scale=SCALE)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {names[0]} and {names[1]}"
-    what = "final distance in m" if label == METRES else RELATIVE
+    what = "final distance in m" if scale.label == METRES else RELATIVE
     best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
     span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"
-    yield Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
+    return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
 
 
 MOST_MEASURED = 4  # runs up to which they are measured: what is in sight takes a while to know
@@ -335,6 +324,7 @@ def _in_contact(gaps: Array) -> Array:
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 
+_PARTS = "parts of the team that hear each other"
 _PANELS = (
     _Panel("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
     _Panel("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
@@ -342,12 +332,7 @@ _PANELS = (
     _Panel("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
     _Panel("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
     _Panel("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
-    _Panel(
-        "Connectivity",
-        "parts of the team that hear each other",
-        "",
-        lambda m: np.asarray(m.components, float),
-    ),
+    _Panel("Connectivity", _PARTS, "", lambda m: np.asarray(m.components, float)),
 )
 
 
@@ -363,43 +348,38 @@ def measure_plots(
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):
         return []
-    label_of = {entry: group.label for group in shown_groups(result) for entry in group.entries}
+    labels = {entry: group.label for group in shown_groups(result) for entry in group.entries}
     measured = [_measured(run) for run in runs]
     curves = [
         (panel, [(metrics.time, panel.of(metrics)) for metrics in measured])
         for panel in _PANELS
-        if panel.title != "Connectivity" or any((m.components != m.components[0]).any() for m in measured)
+        if panel.label != _PARTS or any((m.components != m.components[0]).any() for m in measured)
     ]
     histories = [run.history for run in runs]
     times = [(each.time, each.mean_time) for each in histories if each and each.mean_time is not None]
     if len(times) == len(runs):
-        title, what = "Time to come", "mean time until the first robot is there (s)"
-        curves.insert(0, (_Panel(title, what, "s", lambda m: m.time), times))
+        what = "mean time until the first robot is there (s)"
+        curves.insert(0, (_Panel("Time to come", what, "s", lambda m: m.time), times))
     plots = []
-    for panel, found in curves:
+    for (title, label, unit, _), found in curves:
         bands = [
-            Band(label_of[entry], entry.controller, time - time[0], np.where(known, values, np.nan)[None])
+            Band(labels[entry], entry.controller, time - time[0], np.where(known, values, np.nan)[None])
             for entry, (time, values) in zip(entries, found, strict=True)
-            if entry in label_of and (known := np.isfinite(values)).any()
+            if entry in labels and (known := np.isfinite(values)).any()
         ]
-        if bands:
-            own, name = [looks[band.label] for band in bands], panel.title.lower().replace(" ", "-")
-            figure = plot_cost_bands(
-                bands, size=PANEL, scale=SCALE, title="", styles=own, label=panel.label, unit=panel.unit
-            )
-            plots.append(Plot(panel.title, inline_svg(figure, f"{key}-{name}", _sentence(panel, bands))))
+        if not bands:
+            continue
+        own = [looks[band.label] for band in bands]
+        figure = plot_cost_bands(bands, size=PANEL, scale=SCALE, title="", styles=own, label=label, unit=unit)
+        words = []
+        for band in bands:
+            first, last = band.values[0][np.isfinite(band.values[0])][[0, -1]]
+            words.append(f"{band.label}: from {first:.4g} to {last:.4g} {unit}".rstrip())
+        sentence = f"{title}: {label} against time. {'; '.join(words)}."
+        plots.append(Plot(title, inline_svg(figure, f"{key}-{title.lower().replace(' ', '-')}", sentence)))
     return plots
 
 
 def _measured(run: ReplayRun) -> RunMetrics:
     seconds = float(run.record.time[-1] - run.record.time[0])
     return run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)
-
-
-def _sentence(panel: _Panel, bands: Sequence[Band]) -> str:
-    """Return a plot's curves in words."""
-    words = []
-    for band in bands:
-        first, last = band.values[0][np.isfinite(band.values[0])][[0, -1]]
-        words.append(f"{band.label}: from {first:.4g} to {last:.4g} {panel.unit}".rstrip())
-    return f"{panel.title}: {panel.label} against time. {'; '.join(words)}."

@@ -1,21 +1,218 @@
-"""The interactive replay of runs, as HTML that needs nothing else: in reports and in notebooks."""
+"""The interactive replay of runs, as HTML that needs nothing else: in reports and in notebooks.
+
+Runs and maps are in it as small JSON: quantised positions and costs at even times, maps rounded.
+"""
 
 from __future__ import annotations
 
+import base64
+import json
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from html import escape
 from importlib.resources import files
+from itertools import product
+from typing import Any
 
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+
+from robocov.arrays import Array
+from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.figures.styles import styles_of
-from robocov_app.report.embedding import BUDGET, ReplayRun, embedded, script_json
-from robocov_app.report.pictures import run_picture
+from robocov.metrics import CostHistory
+from robocov.record import Record
+from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
+from robocov_app.report.pictures import density_picture, has_path, lives, rings_of, run_picture
 from robocov_app.report.theme_css import theme_rules
+from robocov_app.runs.saved import roster_of
 
 MOST_PANES = 4  # runs side by side
 
 _SCRIPTS = ("data.js", "arena.js", "chart.js", "replay.js")
+RATE = 5.0  # moments of a run per simulated second, where there is room
+BUDGET = 1_500_000  # bytes that runs of one page take together; beyond, they are embedded at a lower rate
+NONE = 65535  # stands for a number that is not there
+_VERTICES = 4000  # vertices of a map's obstacles above which they are simplified
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayRun:
+    """A run to be replayed with its words and look; by default the record's label and an own style."""
+
+    record: Record
+    history: CostHistory | None
+    title: str
+    facts: str = ""
+    label: str = ""
+    style: CurveStyle | None = None
+
+
+def even_times(end: float, rate: float) -> Array:
+    """Return multiples of 1/rate seconds up to `end`, s, and `end` itself.
+
+    >>> even_times(1.0, 2.5).tolist()
+    [0.0, 0.4, 0.8, 1.0]
+    """
+    count = math.floor(end * rate + 1e-9)
+    times = np.arange(count + 1) / rate
+    if end - times[-1] > 1e-9:
+        times = np.append(times, end)
+    return np.asarray(times)
+
+
+def quantised(values: Array, low: float, high: float) -> str:
+    """Return numbers as base64 of 16 bits, 0 at `low`, 65534 at `high`, `NONE` if not finite."""
+    span = high - low if high > low else 1.0
+    with np.errstate(invalid="ignore"):
+        steps = np.rint(np.clip((values - low) / span, 0.0, 1.0) * (NONE - 1))
+    words = np.where(np.isfinite(values), steps, NONE).astype("<u2")
+    return base64.b64encode(words.tobytes()).decode("ascii")
+
+
+def embedded_map(environment: Environment) -> dict[str, Any]:
+    """Return a map: ``region`` ring, ``blocked`` list of polygons (lists of rings), flat rings of x, y.
+
+    Where not every place counts the same there is also the address of a picture of the ``density``. Obstacles
+    that move are apart, in ``movers``: each with its rings, the line of one turn and its speed in m/s.
+
+    Coordinates are whole numbers of ``unit`` metres, a millimetre or, for tiny maps, less.
+    """
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    extent = max(high_x - low_x, high_y - low_y)
+    unit = 10.0 ** min(-3, math.floor(math.log10(extent)) - 3)
+    blocked = environment.static.blocked
+    if shapely.get_num_coordinates(blocked) > _VERTICES:
+        blocked = shapely.simplify(blocked, extent / 2000)
+
+    def whole(points: ArrayLike) -> list[int]:
+        return [int(value) for value in np.rint(np.asarray(points) / unit).ravel()]
+
+    movers = []
+    for shape in environment.obstacles:
+        if (path := shape.path) is not None:
+            back = path.points[:1] if path.repeat == "loop" else path.points[-2::-1]
+            rings, line = [whole(ring) for ring in rings_of(shape.polygon)], whole([*path.points, *back])
+            movers.append({"rings": rings, "line": line, "speed": path.speed})
+    return {
+        "name": environment.name,
+        "unit": unit,
+        "bounds": whole([[low_x, low_y], [high_x, high_y]]),
+        "region": whole(environment.region.vertices),
+        **({"density": picture} if (picture := density_picture(environment)) else {}),
+        "blocked": [[whole(ring) for ring in rings_of(part)] for part in shapely.get_parts(blocked)],
+        **({"movers": movers} if movers else {}),
+    }
+
+
+def embedded_run(
+    run: ReplayRun, place: int, style: CurveStyle, rate: float, *, goals: bool
+) -> dict[str, Any]:
+    """Return one run: `place` is the number of its map, `rate` in Hz, `goals` whether those come along."""
+    record = run.record
+    begin, end = float(record.time[0]), float(record.time[-1])
+    times = even_times(end - begin, rate) if has_path(record) else np.unique([0.0, end - begin])
+    wanted = goals and bool(np.isfinite(record.goals).any())
+    radius = record.team.radius.tolist()
+    life = lives(record) if record.conditions is not None else []
+    return {
+        "title": run.title,
+        "facts": run.facts,
+        "label": run.label or record.label,
+        "style": style.name,
+        "dashes": [] if isinstance(style.dashes, str) else list(style.dashes[1]),
+        "mark": MARKS[style.mark],
+        "map": place,
+        "radius": radius[0] if len(set(radius)) == 1 else radius,
+        **({"speeds": record.team.max_speed.tolist()} if record.by_time else {}),
+        "numbers": list(roster_of(record).numbers),
+        **({"begin": begin} if begin and record.environment.moves else {}),
+        **({"lives": life} if any(each != (0.0, None) for each in life) else {}),
+        "path": has_path(record),
+        "step": 1.0 / rate if has_path(record) else max(end - begin, 1e-9),
+        "end": end - begin,
+        "count": len(times),
+        "positions": _places(record, record.positions, times + begin),
+        "goals": _places(record, record.goals, times + begin) if wanted else None,
+        "cost": _cost(run.history, begin, even_times(end - begin, rate), 1.0 / rate),
+    }
+
+
+def embedded(
+    runs: Sequence[ReplayRun], styles: Sequence[CurveStyle], panes: Sequence[int], budget: int = BUDGET
+) -> dict[str, Any]:
+    """Return all that a replay needs, at the rate up to `RATE`, and with goals, that fits the `budget`."""
+    rate, goals = _affordable(runs, budget)
+    environments = [roster_of(run.record).environment for run in runs]
+    places = {environment: k for k, environment in enumerate(dict.fromkeys(environments))}
+    found = [
+        embedded_run(run, places[environment], style, rate, goals=goals)
+        for run, style, environment in zip(runs, styles, environments, strict=True)
+    ]
+    maps = list(map(embedded_map, places))
+    return {"version": 1, "rate": rate, "maps": maps, "runs": found, "panes": list(panes)}
+
+
+def script_json(content: Any) -> str:
+    """Return JSON that may stand in a script element, whatever names are in it.
+
+    >>> script_json("</script>")
+    '"\\\\u003c/script\\\\u003e"'
+    """
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII: no U+2028 is left
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _affordable(runs: Sequence[ReplayRun], budget: int) -> tuple[float, bool]:
+    """Return the rate, and whether goals may come along."""
+
+    def bytes_at(rate: float, goals: bool) -> float:
+        total = 0.0
+        for record in (run.record for run in runs):
+            moments = float(record.time[-1] - record.time[0]) * rate + 2 if has_path(record) else 2
+            pairs = 2 if goals and np.isfinite(record.goals).any() else 1
+            total += moments * (4 * len(record.team) * pairs + 2) * 4 / 3
+        return total
+
+    for goals, rate in product((True, False), (RATE, 4.0, 2.5, 2.0, 1.25, 1.0)):
+        if bytes_at(rate, goals) <= budget:
+            return rate, goals
+    return max(min(budget / bytes_at(1.0, False), 1.0), 0.05), False
+
+
+def _places(record: Record, values: Array, times: Array) -> str:
+    """Return places (T, n, 2) m at other times, quantised between the corners of the region."""
+    low, high = np.array(record.environment.region.bounds).reshape(2, 2)
+    flat = _between(record.time, values.reshape(len(record), -1), times).reshape(len(times), -1, 2)
+    return quantised((flat - low) / (high - low), 0.0, 1.0)
+
+
+def _between(time: Array, rows: Array, times: Array) -> Array:
+    """Return (T, m) rows at other times, linear in between; nan where either neighbour is."""
+    after = np.clip(np.searchsorted(time, times), 1, max(len(time) - 1, 1))
+    if len(time) == 1:
+        return np.asarray(np.repeat(rows, len(times), axis=0))
+    before = after - 1
+    part = ((times - time[before]) / (time[after] - time[before]))[:, None]
+    # at a moment of the record that moment counts alone: beside it there may be nothing
+    mixed = np.where(part >= 1.0 - 1e-9, rows[after], (1.0 - part) * rows[before] + part * rows[after])
+    return np.where(part <= 1e-9, rows[before], mixed)
+
+
+def _cost(history: CostHistory | None, begin: float, times: Array, step: float) -> dict[str, Any] | None:
+    """Return the mean distance at even times from the run's begin; None where it is not known."""
+    if history is None:
+        return None
+    values = _between(history.time - begin, history.mean_distance[:, None], times)[:, 0]
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return None
+    low, high, last = float(finite.min()), float(finite.max()), float(history.mean_distance[-1])
+    known = {"low": low, "high": high, "values": quantised(values, low, high)}
+    return {"step": step, "count": len(times), **known, "last": last if np.isfinite(last) else None}
 
 
 def replay_html(

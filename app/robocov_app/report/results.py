@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,66 +18,21 @@ from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, RobocovError, shown
 from robocov.files.array_files import ArrayCache
 from robocov.files.result_folder import settle
+from robocov.files.strictjson import read_document
 from robocov.mapfile import from_json, to_json
 from robocov.metrics import CostHistory, mean_over_run
 from robocov.metrics.results import read_history, read_results
 from robocov.optimum import optimum
 from robocov.record import Record
-from robocov_app.runs.saved import Saved, load_saved, roster_of
+from robocov_app.runs.saved import ComparisonDocument, Saved, load_saved, roster_of
 from robocov_app.sweep.study import UNITS, parameter_column
 from robocov_app.sweep.table import gain_column
 
 RESTARTS = 24  # searches of which the best counts
 
 
-class Reference(NamedTuple):
-    """The lowest cost found for a team that knows the map: J_ref in m, and the uncovered area in m²."""
-
-    mean_distance: float
-    uncovered_area: float
-
-
-def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
-    """Return the result with centralised references, cached or by `search`; none where things change."""
-    lattice = result.facts.get("lattice")
-    first = {entry.setting: entry for entry in reversed(result.fine)}
-    found = {}
-    for done, (setting, entry) in enumerate(first.items(), start=1):
-        record = result.record(entry)
-        environment = record.environment
-        everybody = bool(record.present.all() and record.working.all())
-        if isinstance(lattice, int) and everybody and not environment.moves:
-            radius = float(record.team.radius.max())
-            reference = _reference(environment, len(record.team), radius, lattice, search=search)
-            if reference is not None:
-                found[setting] = reference
-        if tell is not None:
-            tell(done)
-    return replace(result, references=found)
-
-
-def _reference(
-    environment: Environment, robots: int, radius: float, lattice: int, *, search: bool
-) -> Reference | None:
-    cache = ArrayCache.of_user()
-    content = json.dumps(to_json(environment), sort_keys=True)
-    key = ArrayCache.key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
-    kept = None if cache is None else cache.load(key)
-    if kept is not None:
-        return Reference(*kept["reference"].tolist())
-    if not search:
-        return None
-    try:
-        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
-    except ParameterError:
-        return None  # more robots than have room at rest
-    reference = Reference(best.mean_distance, best.uncovered_area)
-    if cache is not None:
-        cache.save(key, {"reference": np.array(reference)})
-    return reference
-
-
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
+Gains: TypeAlias = tuple[tuple[str, Value], ...]
 
 # what is known of a run in numbers, by the names of the columns of a sweep's table
 FIGURES = (
@@ -88,21 +43,19 @@ FIGURES = (
 
 @dataclass(frozen=True)
 class Entry:
-    """One run of a result; `label` is the controller's name as shown to people.
-
-    `team` are the parameters of the team of which the result has several values (None for no limit);
-    `figures` are `FIGURES` (None where not known), empty where the run failed with `error`.
-    """
+    """One run of a result."""
 
     map: str
     controller: str
-    label: str
+    label: str  # the controller's name as shown to people
     robots: int
-    team: tuple[tuple[str, float | None], ...]
+    team: tuple[tuple[str, float | None], ...]  # parameters of which there are several values; None: no limit
     start: str | None
     seed: int | None
-    gains: tuple[tuple[str, Value], ...]
-    figures: Mapping[str, float | None] = field(compare=False)
+    gains: Gains
+    figures: Mapping[str, float | None] = field(
+        compare=False
+    )  # `FIGURES`, None where not known; empty on error
     error: str | None
     folder: Path
 
@@ -128,6 +81,13 @@ class Entry:
         return *self.setting, self.start, self.seed
 
 
+class Reference(NamedTuple):
+    """The lowest cost found for a team that knows the map: J_ref in m, and the uncovered area in m²."""
+
+    mean_distance: float
+    uncovered_area: float
+
+
 class Damaged(NamedTuple):
     """A run that cannot be read: its folder's name, and why."""
 
@@ -137,26 +97,21 @@ class Damaged(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Results of one folder: its runs, their maps, and how many there were to be (`wanted`).
-
-    `facts` are what all runs have in common: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``,
-    ``versions``. `loaded` are runs that were read already, `damaged` those that cannot be read and are no
-    entries, `references` the centralised references of settings (`robocov_app.report.results`). `part` tells
-    which part of a story it is.
-    """
+    """Results of one folder."""
 
     kind: Kind
     folder: Path
     entries: tuple[Entry, ...]
     maps: Mapping[str, Environment]
-    wanted: int
-    units: Mapping[str, str]
+    wanted: int  # how many runs there were to be
+    units: Mapping[str, str]  # of gains
     meanings: Mapping[str, str]
+    # the same of all runs: ``duration_s``, ``dt_s``, ``lattice``, ``record_hz``, ``team``, ``versions``
     facts: Mapping[str, Any]
-    loaded: Mapping[Path, Saved]
-    damaged: tuple[Damaged, ...] = ()
-    references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)
-    part: str = ""
+    loaded: Mapping[Path, Saved]  # runs that were read already
+    damaged: tuple[Damaged, ...] = ()  # runs that cannot be read and are no entries
+    references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)  # of settings
+    part: str = ""  # which part of a story it is
 
     @cached_property
     def fine(self) -> tuple[Entry, ...]:
@@ -215,6 +170,46 @@ class Result:
         return read_history(path) if path.exists() else None
 
 
+def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
+    """Return the result with centralised references, cached or by `search`; none where things change."""
+    lattice = result.facts.get("lattice")
+    first = {entry.setting: entry for entry in reversed(result.fine)}
+    found = {}
+    for done, (setting, entry) in enumerate(first.items(), start=1):
+        record = result.record(entry)
+        environment = record.environment
+        everybody = bool(record.present.all() and record.working.all())
+        if isinstance(lattice, int) and everybody and not environment.moves:
+            radius = float(record.team.radius.max())
+            reference = _reference(environment, len(record.team), radius, lattice, search=search)
+            if reference is not None:
+                found[setting] = reference
+        if tell is not None:
+            tell(done)
+    return replace(result, references=found)
+
+
+def _reference(
+    environment: Environment, robots: int, radius: float, lattice: int, *, search: bool
+) -> Reference | None:
+    cache = ArrayCache.of_user()
+    content = json.dumps(to_json(environment), sort_keys=True)
+    key = ArrayCache.key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
+    kept = None if cache is None else cache.load(key)
+    if kept is not None:
+        return Reference(*kept["reference"].tolist())
+    if not search:
+        return None
+    try:
+        best = optimum(environment, robots, radius=radius, lattice=lattice, restarts=RESTARTS)
+    except ParameterError:
+        return None  # more robots than have room at rest
+    reference = Reference(best.mean_distance, best.uncovered_area)
+    if cache is not None:
+        cache.save(key, {"reference": np.array(reference)})
+    return reference
+
+
 def gathered(folder: Path) -> Result:
     """Return what is in the folder of a run, comparison or sweep; raises InputError that names the file."""
     if not folder.is_dir():
@@ -247,14 +242,11 @@ def _damaged(folder: Path, error: InputError) -> Damaged:
 
 def _of_runs(folder: Path) -> Result:
     """Read a run or a comparison."""
-    kind: Kind = "comparison" if (folder / "comparison.json").is_file() else "run"
-    parts, unfinished = [folder], False
-    if kind == "comparison":
-        content = _json(folder / "comparison.json")
-        names = content.get("folders")
-        if not isinstance(names, list) or not all(isinstance(n, str) and Path(n).name == n for n in names):
-            raise InputError(f"{folder / 'comparison.json'}: folders: names of folders were wanted")
-        parts, unfinished = [folder / name for name in names], not content.get("runs")
+    kind: Kind = "run"
+    parts, unfinished, path = [folder], False, folder / "comparison.json"
+    if path.is_file():
+        kind, document = "comparison", read_document(path, ComparisonDocument, "robocov-comparison", 1)
+        parts, unfinished = [folder / name for name in document.folders], not document.runs
     saved: list[Saved] = []
     damaged: list[Damaged] = []
     for part in parts:
@@ -269,15 +261,17 @@ def _of_runs(folder: Path) -> Result:
         except InputError as error:
             damaged.append(_damaged(part, error))
     if not saved and not damaged:
-        raise InputError(f"{folder / 'comparison.json'}: there is no run in it")
+        raise InputError(f"{path}: there is no run in it")
     entries: list[Entry] = []
     maps: dict[str, Environment] = {}
     facts: dict[str, Any] = {}
     for each in saved:
-        record = each.record
-        content = _json(each.folder / "run.json")
+        record, content = each.record, _json(each.folder / "run.json")
         name = printable(record.environment.name)
         maps.setdefault(name, roster_of(record).environment)
+        facts = facts or {"duration_s": float(record.time[-1]), "dt_s": record.dt} | {
+            key: content.get(key) for key in ("lattice", "team", "versions")
+        }
         entries.append(
             Entry(
                 map=name,
@@ -293,26 +287,9 @@ def _of_runs(folder: Path) -> Result:
                 folder=each.folder,
             )
         )
-        facts = facts or {
-            "duration_s": float(record.time[-1]),
-            "dt_s": record.dt,
-            "lattice": content.get("lattice"),
-            "team": content.get("team"),
-            "versions": content.get("versions"),
-        }
-    units, meanings = _known_gains(entries, {})
-    return Result(
-        kind=kind,
-        folder=folder,
-        entries=_labelled(entries),
-        maps=maps,
-        wanted=len(parts),
-        facts=facts,
-        loaded={each.folder: each for each in saved},
-        damaged=tuple(damaged),
-        units=units,
-        meanings=meanings,
-    )
+    loaded = {each.folder: each for each in saved}
+    known = _known_gains(entries, {})
+    return Result(kind, folder, _labelled(entries), maps, len(parts), *known, facts, loaded, tuple(damaged))
 
 
 def _of_sweep(folder: Path) -> Result:
@@ -335,42 +312,37 @@ def _of_sweep(folder: Path) -> Result:
         raise InputError(f"{folder}: not one of the {wanted} runs of the sweep is done")
     entries = []
     for row in rows:
-        controller = str(row["controller"])
+        controller, trouble = str(row["controller"]), row["error"]
+        # a user's controller is not loaded for what it is called
+        label = getattr(CONTROLLERS.get(controller), "label", controller.rpartition(":")[2])
         entries.append(
             Entry(
                 map=printable(str(row["map"])),
                 controller=controller,
-                label=printable(_label(controller)),
+                label=printable(label),
                 robots=int(row["robots"]),
                 team=tuple((name, row.get(parameter_column(name))) for name in swept),
                 start=printable(str(row["start"])),
                 seed=row["seed"],
                 gains=_gains({name: row.get(gain_column(name)) for name in gains.get(controller, ())}),
-                figures={name: row.get(name) for name in FIGURES} if row["error"] is None else {},
-                error=None if row["error"] is None else printable(str(row["error"])),
+                figures={name: row.get(name) for name in FIGURES} if trouble is None else {},
+                error=None if trouble is None else printable(str(trouble)),
                 folder=folder / "runs" / Path(str(row["run"])).name,
             )
         )
     if teams:
         facts["team"] = {name: value for name, value in teams[0].items() if name not in swept}
     facts["versions"] = _versions(entries)
-    documented: dict[str, tuple[str, str]] = {}
-    for column in results.dataset.schema:
-        about = column.metadata or {}
-        documented[column.name] = (about.get(b"unit", b"").decode(), about.get(b"meaning", b"").decode())
-    names = [name for own in gains.values() for name in own if gain_column(name) in documented]
-    units, meanings = _known_gains(entries, {name: documented[gain_column(name)] for name in names})
-    return Result(
-        kind="sweep",
-        folder=folder,
-        entries=_labelled(entries),
-        maps={printable(name): environment for name, environment in maps.items()},
-        wanted=wanted,
-        facts=facts,
-        loaded={},
-        units=units,
-        meanings=meanings,
-    )
+    columns = {column.name: column.metadata or {} for column in results.dataset.schema}
+    documented = {
+        name: [columns[gain_column(name)].get(key, b"").decode() for key in (b"unit", b"meaning")]
+        for own in gains.values()
+        for name in own
+        if gain_column(name) in columns
+    }
+    maps = {printable(name): environment for name, environment in maps.items()}
+    known = _known_gains(entries, documented)
+    return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
 
 
 def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
@@ -383,12 +355,7 @@ def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
     return tuple(replace(entry, label=labels[entry.controller]) for entry in entries)
 
 
-def _label(controller: str) -> str:
-    """Return what a controller is called; a user's is not loaded for that."""
-    return str(getattr(CONTROLLERS.get(controller), "label", controller.rpartition(":")[2]))
-
-
-def _gains(gains: Mapping[str, Value]) -> tuple[tuple[str, Value], ...]:
+def _gains(gains: Mapping[str, Value]) -> Gains:
     return tuple(
         (printable(str(name)), printable(value) if isinstance(value, str) else value)
         for name, value in gains.items()
@@ -396,7 +363,7 @@ def _gains(gains: Mapping[str, Value]) -> tuple[tuple[str, Value], ...]:
 
 
 def _known_gains(
-    entries: list[Entry], documented: Mapping[str, tuple[str, str]]
+    entries: list[Entry], documented: Mapping[str, Sequence[str]]
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
     units: dict[str, str] = {}

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
-from robocov_app.figures.styles import CurveStyle
+from robocov_app.report import groups as grouped
 from robocov_app.report.groups import (
     Comparison,
     Group,
     gain_text,
-    medians,
     ratio_text,
-    relative,
     setting_label,
     settings,
     shown_groups,
-    variants,
 )
 from robocov_app.report.results import RESTARTS, Entry, Result
 
@@ -30,15 +27,6 @@ MOST_ROWS = 60  # runs up to which each has a row of its own
 MOST_SETS = 200  # sets of gains up to which they are listed
 MOST_SETTINGS = 40  # settings up to which the summary is told for each
 
-Styles: TypeAlias = dict[str, CurveStyle]
-
-
-class Cell(NamedTuple):
-    """A cell: its text, and the style of the curve that it names."""
-
-    text: str
-    style: CurveStyle | None = None
-
 
 @dataclass(frozen=True)
 class Table:
@@ -46,64 +34,66 @@ class Table:
 
     caption: str
     head: tuple[str, ...]
-    rows: Sequence[tuple[Cell, ...]]
+    rows: Sequence[tuple[str, ...]]
     texts: frozenset[int] = frozenset()
     notes: tuple[str, ...] = ()
 
 
-class Column(NamedTuple):
-    """A column of figures: its head, and its text of one or several runs."""
-
-    head: str
-    text: Callable[[Sequence[Entry]], str]
+Column: TypeAlias = tuple[str, Callable[[Sequence[Entry]], str]]  # head, and text of one or several runs
 
 
-def controllers_table(result: Result, styles: Styles) -> Table:
+def controllers_table(result: Result) -> Table:
     """Return the controllers with their gains, or between which values these are."""
     groups = shown_groups(result)
     known = {group.controller for group in groups}
     lost = {e.controller: Group(e.label, e.controller, None, (e,)) for e in reversed(result.failed)}
     order = dict.fromkeys(entry.controller for entry in result.failed if entry.controller not in known)
-    caption = "Controllers and their gains"
-    return _gains_table(caption, [*groups, *(lost[name] for name in order)], result, styles)
+    return _gains_table("Controllers and their gains", [*groups, *(lost[name] for name in order)], result)
 
 
-def gains_table(result: Result, styles: Styles) -> Table | None:
+def gains_table(result: Result) -> Table | None:
     """Return all sets of gains by letters, None where `controllers_table` has them or they are many."""
-    apart = variants(result)
+    apart = grouped.variants(result)
     if len(apart) == len(shown_groups(result)) or len(apart) > MOST_SETS:
         return None
-    return _gains_table("Sets of gains", apart, result, styles)
+    return _gains_table("Sets of gains", apart, result)
 
 
-def _gains_table(caption: str, groups: Sequence[Group], result: Result, styles: Styles) -> Table:
+def _gains_table(caption: str, groups: Sequence[Group], result: Result) -> Table:
     rows = []
     for group in groups:
         gains = _ranges_text(group, result) if group.gains is None else gain_text(group.gains, result.units)
-        rows.append((_name(group.label, styles), Cell(group.controller), Cell(gains or NOTHING)))
+        rows.append((group.label, group.controller, gains or NOTHING))
     return Table(caption, ("Controller", "Name", "Gains"), rows, frozenset({1, 2}))
 
 
-def summary_tables(result: Result, styles: Styles) -> list[Table]:
+def summary_tables(result: Result) -> list[Table]:
     """Return what came of each group, over everything and in each setting."""
     groups, every = shown_groups(result), settings(result)
     distance, over_run, *others = _figure_columns(result)
-    gap = [Column("Above J_ref, %", lambda own: _quartiles(_gaps(result, own), 1))] * bool(result.references)
-    settled = Column("Settled", _settled)
+
+    def above(entries: Sequence[Entry]) -> str:
+        gaps = [100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))]
+        return _quartiles(gaps, 1)
+
+    gap: list[Column] = [("Above J_ref, %", above)] * bool(result.references)
+    settled: Column = "Settled", _settled
 
     def table(caption: str, columns: Sequence[Column], parts: Sequence[Group], *notes: str) -> Table:
-        columns = [Column("Runs", lambda own: str(len(own))), *columns]
         rows = [
-            (_name(part.label, styles), *(Cell(column.text(part.entries)) for column in columns))
+            (part.label, str(len(part.entries)), *(text(part.entries) for _, text in columns))
             for part in parts
         ]
-        return Table(caption, ("Controller", *(column.head for column in columns)), rows, notes=notes)
+        return Table(caption, ("Controller", "Runs", *(head for head, _ in columns)), rows, notes=notes)
 
     tables = []
     if len(every) > 1:
-        scales = medians(result)
+        scales = grouped.medians(result)
         # metres of different maps have no common median
-        parted = Column("Mean distance / median", lambda own: _quartiles(relative(own, scales).tolist(), 3))
+        parted: Column = (
+            "Mean distance / median",
+            lambda own: _quartiles(grouped.relative(own, scales).tolist(), 3),
+        )
         note = (
             "Mean distance / median: divided by the median over all runs on the same map with the same team."
         )
@@ -127,22 +117,19 @@ def summary_tables(result: Result, styles: Styles) -> list[Table]:
     return tables
 
 
-def runs_table(result: Result, styles: Styles) -> Table | None:
+def runs_table(result: Result) -> Table | None:
     """Return every run in a row of its own, None where they are too many."""
-    if len(result.fine) > MOST_ROWS or len(result.fine) == len(variants(result)):
+    labels = grouped.labels(result)
+    if len(result.fine) > MOST_ROWS or len(result.fine) == len(set(labels.values())):
         return None  # too many, or the summary tells all of them
     columns = _figure_columns(result, unsettled="no")
     rows = []
-    for group in variants(result):
-        for entry in group.entries:
-            where = setting_label(result, entry.setting), entry.start or NOTHING
-            texts = *where, NOTHING if entry.seed is None else str(entry.seed)
-            figures = (column.text([entry]) for column in columns)
-            rows.append((entry, (_name(group.label, styles), *map(Cell, (*texts, *figures)))))
-    order = {entry: number for number, entry in enumerate(result.fine)}
-    rows.sort(key=lambda row: order[row[0]])
-    head = ("Controller", "Map", "Start", "Seed", *(column.head for column in columns))
-    return Table("Every run", head, [row for _, row in rows], frozenset({1, 2}))
+    for entry in result.fine:
+        seed = NOTHING if entry.seed is None else str(entry.seed)
+        where = labels[entry], setting_label(result, entry.setting), entry.start or NOTHING, seed
+        rows.append((*where, *(text([entry]) for _, text in columns)))
+    head = ("Controller", "Map", "Start", "Seed", *(head for head, _ in columns))
+    return Table("Every run", head, rows, frozenset({1, 2}))
 
 
 def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
@@ -153,25 +140,25 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
 
     timed = any(entry.has("mean_time_s") for entry in result.fine)
     return [
-        Column("Mean distance, m", spread("mean_distance_m", 3)),
-        Column("Over the run, m", spread("mean_distance_over_run_m", 3)),
-        Column("Settled at, s", spread("settled_at_s", 1, unsettled)),
-        Column("Contacts", _contacts),
-        Column("Clearance, m", _clearance),
-        Column("Path, m", spread("path_length_m", 2)),
-        Column("Stuck robots", _stuck),
-        *([Column("Mean time, s", spread("mean_time_s", 3))] if timed else []),
+        ("Mean distance, m", spread("mean_distance_m", 3)),
+        ("Over the run, m", spread("mean_distance_over_run_m", 3)),
+        ("Settled at, s", spread("settled_at_s", 1, unsettled)),
+        ("Contacts", _contacts),
+        ("Clearance, m", _clearance),
+        ("Path, m", spread("path_length_m", 2)),
+        ("Stuck robots", _stuck),
+        *([("Mean time, s", spread("mean_time_s", 3))] if timed else []),
     ]
 
 
-def pairs_table(comparisons: Sequence[Comparison], styles: Styles) -> Table:
+def pairs_table(comparisons: Sequence[Comparison]) -> Table:
     """Return how the groups compare over maps, one row a comparison."""
     rows = []
     for each in comparisons:
         lower = sum(int((own.a < own.b).sum()) for own in each.maps)
         words = each.tally() if each.pairs > 1 else "one pair only"
-        texts = each.second.label, ratio_text(each.ratio), words, f"{lower} of {each.pairs}"
-        rows.append((_name(each.first.label, styles), *map(Cell, texts)))
+        labels = each.first.label, each.second.label
+        rows.append((*labels, ratio_text(each.ratio), words, f"{lower} of {each.pairs}"))
     head = ("First", "Second", "Ratio", "First is", "First is lower in")
     return Table("Final mean distance of the first by that of the second", head, rows, frozenset({1, 3}))
 
@@ -183,39 +170,30 @@ def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
     for each in comparisons:
         rows = []
         for own in each.maps:
+            count, lower = len(own.a), (own.a < own.b).sum()
             means = [f"{np.mean(values):.3f}" for values in (own.a, own.b)]
-            lower = f"{int((own.a < own.b).sum())} of {len(own.a)}"
-            texts = own.name, str(len(own.a)), *means, ratio_text(own.ratio), own.verdict, lower
-            rows.append(tuple(map(Cell, texts)))
+            rows.append(
+                (own.name, str(count), *means, ratio_text(own.ratio), own.verdict, f"{lower} of {count}")
+            )
         if len(rows) > 1:
             tables.append(Table(each.label, head, rows, frozenset({5})))
     return tables
 
 
-def failures_table(result: Result, styles: Styles) -> Table | None:
+def failures_table(result: Result) -> Table | None:
     """Return the runs that failed, each with its error, and those that cannot be read; None without any."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[tuple[str, ...]] = []
     for entry in result.failed:
-        gains = gain_text(entry.gains, result.units)
-        texts = setting_label(result, entry.setting), f"{entry.start}, {entry.seed}", gains, entry.error or ""
-        rows.append((_name(entry.label, styles), *map(Cell, texts)))
+        where, gains = setting_label(result, entry.setting), gain_text(entry.gains, result.units)
+        rows.append((entry.label, where, f"{entry.start}, {entry.seed}", gains, entry.error or ""))
     # what cannot be read is known by its folder alone
-    rows += [tuple(map(Cell, (each.folder, *3 * [NOTHING], each.reason))) for each in result.damaged]
+    rows += [(each.folder, *3 * [NOTHING], each.reason) for each in result.damaged]
     if not rows:
         return None
     left = len(rows) - MOST_ROWS
     notes = (f"{counted(left, 'more run')}.",) if left > 0 else ()
     head = ("Controller or folder", "Map", "Start, seed", "Gains", "Error")
     return Table("Runs that failed or cannot be read", head, rows[:MOST_ROWS], frozenset({1, 2, 3, 4}), notes)
-
-
-def _name(label: str, styles: Styles) -> Cell:
-    return Cell(label, styles[label])
-
-
-def _gaps(result: Result, entries: Sequence[Entry]) -> list[float]:
-    """Return J / J_ref - 1 of the runs that have it, %."""
-    return [100.0 * gap for entry in entries if np.isfinite(gap := result.gap(entry))]
 
 
 def _values(entries: Sequence[Entry], name: str) -> list[float]:
@@ -238,9 +216,11 @@ def _settled(entries: Sequence[Entry]) -> str:
 
 def _contacts(entries: Sequence[Entry]) -> str:
     values = _values(entries, "contacts")
-    if len(entries) == 1:
-        return f"{values[0]:.0f}" if values else NOTHING
-    return f"{sum(value > 0 for value in values)} of {len(values)}" if values else NOTHING
+    if not values:
+        return NOTHING
+    return (
+        f"{values[0]:.0f}" if len(entries) == 1 else f"{sum(value > 0 for value in values)} of {len(values)}"
+    )
 
 
 def _clearance(entries: Sequence[Entry]) -> str:
@@ -265,15 +245,15 @@ def _ranges_text(group: Group, result: Result) -> str:
             values.setdefault(name, []).append(value)
     parts = []
     for name, every in values.items():
-        finite = [value for value in every if isinstance(value, int | float)]
-        words = [value for value in every if isinstance(value, str)]
-        span, also = "none", ""
-        if words:
+        numbers = [value for value in every if isinstance(value, int | float)]
+        if any(isinstance(value, str) for value in every):
             span = " or ".join(dict.fromkeys(map(value_text, every)))
-        elif finite:
-            one = min(finite) == max(finite)
-            unit = result.units.get(name, "")
-            span = f"{finite[0]:.6g}" if one else f"{min(finite):.4g} to {max(finite):.4g}"
-            span, also = f"{span} {unit}".rstrip(), " or none" if len(finite) < len(every) else ""
-        parts.append(f"{name} {span}{also}")
+        elif numbers:
+            low, high = min(numbers), max(numbers)
+            unit = f" {result.units.get(name, '')}".rstrip()
+            span = (f"{low:.6g}" if low == high else f"{low:.4g} to {high:.4g}") + unit
+            span += " or none" if len(numbers) < len(every) else ""
+        else:
+            span = "none"
+        parts.append(f"{name} {span}")
     return ", ".join(parts)

@@ -19,8 +19,7 @@ from robocov.voronoi import partition
 from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.report.document import report
-from robocov_app.report.embedding import ReplayRun, embedded_map, embedded_run
-from robocov_app.report.replay import asset, replay_html
+from robocov_app.report.replay import ReplayRun, asset, embedded_map, embedded_run, replay_html
 from robocov_app.report.results import Damaged
 
 pytestmark = [

@@ -14,7 +14,8 @@ from reported_results import HOSTILE, falling, walk
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
 from robocov_app.figures.styles import curve_styles
-from robocov_app.report.embedding import (
+from robocov_app.report.pictures import has_path, lives
+from robocov_app.report.replay import (
     NONE,
     RATE,
     ReplayRun,
@@ -22,8 +23,6 @@ from robocov_app.report.embedding import (
     embedded_map,
     embedded_run,
     even_times,
-    has_path,
-    lives,
     quantised,
     script_json,
 )

@@ -9,8 +9,7 @@ from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
 from robocov.errors import ParameterError
-from robocov_app.report.embedding import ReplayRun
-from robocov_app.report.replay import MOST_PANES, replay_css, replay_html, replay_js, replay_part
+from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
 
 
 def runs_of(count: int = 2, name: str = "run") -> list[ReplayRun]:
