@@ -22,8 +22,8 @@ from robocov.files.atomic import written
 from robocov_app.formats.files import begins_with, is_number, located_errors, positions, read_json, refused
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.coordinates import DIGITS, free_area, on_grid, rings
 from robocov_app.formats.geometry.enclosing import BOUNDARY, foreign_map
+from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid, rings
 from robocov_app.formats.geometry.shapes import Figure, Kind, Shapes
 from robocov_app.formats.georeference import LocalPlane, in_metres
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions

@@ -13,7 +13,7 @@ from robocov.errors import MapError, counted, one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats.files import begins_with, located_errors, read_json, refused
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.fills import Crossings, edges_of, enclosed
+from robocov_app.formats.geometry.polygons import Crossings, enclosed
 from robocov_app.formats.options import Importer, ReadOptions
 
 _MIN_HOLE = 1e-4
@@ -35,7 +35,6 @@ def read_houseexpo(path: Path, options: ReadOptions) -> ForeignMap:
     document, content, where = read_json(path)
     with located_errors(content, where):
         vertices = _vertices(document, where)
-        Crossings(where).add(edges_of([vertices], closed=True))
         repaired: list[str] = []
         parts = _parts(vertices, where, repaired)
     small = [hole for part in parts for hole in map(Polygon, part.interiors) if hole.area < _MIN_HOLE]
@@ -73,7 +72,7 @@ def _parts(vertices: Array, where: str, repaired: list[str]) -> list[Polygon]:
         repaired.append(f"{len(vertices) - len(ring)} repeated vertices taken out")
     if len(ring) < 3:
         raise MapError(f"{where}: verts: {len(ring)} different points, but at least 3 were wanted")
-    area, reason, _ = enclosed([ring])
+    area, reason, _ = enclosed([ring], crossings=Crossings(where))
     if reason is not None:
         repaired.append(f"the outline met itself: {reason}")
     if area.is_empty:

@@ -26,7 +26,7 @@ from robocov_app.formats import files
 from robocov_app.formats.files import named_file
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.enclosing import foreign_map, surrounding
-from robocov_app.formats.geometry.fills import polygons_of
+from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.options import Importer, ReadOptions

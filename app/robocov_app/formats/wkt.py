@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Environment
@@ -21,8 +21,8 @@ from robocov.files.strictjson import line_and_column
 from robocov_app.formats.files import MAX_DEPTH, read_text
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.coordinates import DIGITS, decimal, free_on_grid, rings
 from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
 from robocov_app.formats.geometry.shapes import Figure, Shapes
 from robocov_app.formats.georeference import in_metres
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
@@ -290,8 +290,8 @@ IMPORTER = Importer(
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     digits = DIGITS if options.digits is None else options.digits
-    free = free_on_grid(environment, digits)
-    parts = [_text(part, digits) for part in free.geoms]
+    free = on_grid(environment.free, digits)
+    parts = [_text(part, digits) for part in free]
     text = f"POLYGON {parts[0]}" if len(parts) == 1 else f"MULTIPOLYGON ({', '.join(parts)})"
     with written(path) as part:
         part.write_text(text + "\n", encoding="ascii")
@@ -302,7 +302,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         EXPORTER.name,
         (path,),
         environment.free_area,
-        float(free.area),
+        float(MultiPolygon(free).area),
         dropped=(
             *not_held(environment),
             "the boundary and the obstacles as such: only what is free is there",

@@ -13,8 +13,9 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import bounded, rounded
+from robocov_app.formats.geometry.enclosing import bounded
 from robocov_app.formats.geometry.passages import roomiest
+from robocov_app.formats.geometry.polygons import rounded
 from robocov_app.formats.geometry.shaping import Shaping, shaped
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)

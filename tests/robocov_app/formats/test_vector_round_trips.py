@@ -25,7 +25,7 @@ from robocov_app.formats import (
     import_map,
     shaped,
 )
-from robocov_app.formats.geometry.coordinates import decimal, on_grid, rings
+from robocov_app.formats.geometry.polygons import decimal, on_grid, rings
 
 FORMATS = [("svg", {}), ("wkt", {}), ("geojson", {}), ("geojson", {"origin": (180.0, -75.0)})]
 AS_IT_IS = Shaping(simplify=0.0, keep="all")

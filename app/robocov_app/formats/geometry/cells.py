@@ -17,6 +17,7 @@ from robocov.environment import Environment
 from robocov.errors import ParameterError, counted
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.files import MAX_CELLS
+from robocov_app.formats.geometry.polygons import sides_of
 
 CELL = 0.05
 """Side of a cell in metres where none is given: what maps of robots mostly have."""
@@ -92,14 +93,10 @@ class Grid:
 
         Lines are rows, or with `across` columns; centres are at whole numbers.
         """
-        cell = self.cell / finer
-        rings = shapely.get_rings(shapely.get_parts(geometry))
-        points, ring = shapely.get_coordinates(rings, return_index=True)
-        same = ring[1:] == ring[:-1]
-        points = (points - self.origin) / cell - 0.5
+        sides = (sides_of(geometry) - self.origin) / (self.cell / finer) - 0.5
         if across:
-            points = points[:, ::-1]
-        (x0, y0), (x1, y1) = points[:-1][same].T, points[1:][same].T
+            sides = sides[..., ::-1]
+        (x0, y0), (x1, y1) = sides[:, 0].T, sides[:, 1].T
         # each side crosses the lines from its lower end, that one too, to its upper end
         low = np.ceil(np.minimum(y0, y1)).astype(np.intp)
         count = np.ceil(np.maximum(y0, y1)).astype(np.intp) - low

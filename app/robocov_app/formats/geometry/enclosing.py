@@ -14,38 +14,11 @@ from robocov.environment import GRID
 from robocov.errors import MapError, counted, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.fills import polygons_of, united
+from robocov_app.formats.geometry.polygons import filled, polygons, polygons_of, rounded, united
 from robocov_app.formats.geometry.shapes import Line, Outline, Shapes, polygonised
 
 CRUMB = 1e-4
 """Obstacles and parts that are smaller, in m², come of rounding."""
-
-
-def polygons(geometry: BaseGeometry) -> list[Polygon]:
-    """Return the polygons in `geometry`, counter-clockwise, the largest first; lines and points go."""
-    flat = shapely.get_parts(shapely.get_parts(geometry))
-    parts = [shapely.orient_polygons(part) for part in flat if isinstance(part, Polygon) and part.area > 0.0]
-    return sorted(parts, key=lambda part: (-part.area, part.bounds))
-
-
-def filled(geometry: BaseGeometry) -> Polygon:
-    """Return the largest polygon in `geometry`, without its holes."""
-    return Polygon(polygons(geometry)[0].exterior)
-
-
-def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
-    """Return the polygons of `geometry` with rounded coordinates, valid; the largest first."""
-
-    def decimal(points: np.ndarray) -> np.ndarray:
-        # no negative zero
-        return np.round(points, digits) + 0.0
-
-    plain = shapely.transform(geometry, decimal)
-    if not plain.is_valid:
-        # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
-        valid = shapely.make_valid(geometry, method="structure", keep_collapsed=False)
-        plain = shapely.transform(shapely.set_precision(valid, 10.0**-digits), decimal)
-    return MultiPolygon(polygons(plain))
 
 
 def bounded(

@@ -11,6 +11,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, IntArray, ranges
 from robocov.environment import Point
+from robocov_app.formats.geometry.polygons import sides_of
 
 _CHUNK = 2048
 """Sides that are looked at together, which bounds the memory."""
@@ -45,7 +46,7 @@ def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple
     Squares that may hold a place that is better by `tolerance` are cut into four, `_SQUARES` of them, the
     most promising: where there are more, as in a long hall, a place may be a bit better than what is found.
     """
-    sides = _sides(free)
+    sides = shapely.linestrings(sides_of(free))
     walls = STRtree(sides)
     shapely.prepare(free)
     low_x, low_y, high_x, high_y = free.bounds
@@ -91,18 +92,11 @@ def moved_walls(before: MultiPolygon, after: MultiPolygon) -> Moved:
     distance = 0.0
     for one, other in ((before, after), (after, before)):
         points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
-        _, away = STRtree(_sides(other)).query_nearest(points, return_distance=True, all_matches=False)
+        _, away = STRtree(shapely.linestrings(sides_of(other))).query_nearest(
+            points, return_distance=True, all_matches=False
+        )
         distance = max(distance, float(away.max()))
     return Moved(float(shapely.symmetric_difference(before, after).area), distance)
-
-
-def _sides(area: Polygon | MultiPolygon) -> Array:
-    """Return the sides of the rings of an area, as linestrings."""
-    rings = shapely.get_rings(shapely.get_parts(area))
-    points, ring = shapely.get_coordinates(rings, return_index=True)
-    along = ring[1:] == ring[:-1]
-    sides: Array = shapely.linestrings(np.stack([points[:-1][along], points[1:][along]], axis=1))
-    return sides
 
 
 def _rays(sides: Array, y: Array) -> int:

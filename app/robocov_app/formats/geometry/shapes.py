@@ -18,7 +18,7 @@ from robocov.environment import CircleObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
 from robocov.mapfile.models import FARTHEST, LONGEST_LABEL, SMALLEST
 from robocov_app.formats import files
-from robocov_app.formats.geometry.fills import Crossings, Rule, edges_of, enclosed
+from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed
 from robocov_app.formats.options import ReadOptions
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
@@ -36,11 +36,10 @@ _MITRE_LIMIT = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A geometry of a file, before it is known what its coordinates are.
+    """A geometry of a file, before it is known what its coordinates are; `at` is its place, for messages.
 
-    `kind`: ``polygon`` (a ring and its holes), ``line`` or ``point``. `at`: its place in the file, for
-    messages. `rule`: what the rings of a polygon enclose; see `robocov_app.formats.geometry.fills.enclosed`.
-    `width`, m: of a line, where the file says it.
+    `rule`: what the rings of a polygon enclose; see `polygons.enclosed`. `width`, m: of a line, where the
+    file says it.
     """
 
     kind: Kind
@@ -53,9 +52,8 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A closed outline.
+    """What a closed outline encloses, m, valid; its names, ids, classes, layers, the most particular first.
 
-    `area`, m: what it encloses; valid. `labels`: its names, ids, classes, layers; the most particular first.
     `circle`: the same as an obstacle of a map, where it is a disc.
     """
 
@@ -66,9 +64,8 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An open or closed line that is a wall.
+    """An open or closed line, (k, 2) m, that is a wall; `cap` and `join` are shapely's words.
 
-    `points`: (k, 2) m. `width` in m. `cap`, `join`: shapes of its ends and corners, in the words of shapely.
     `stretched`, (points, width, matrix) or None: a pen that is no circle: (k, 2) points and a width in other
     units, and the (3, 3) matrix that makes them metres.
     """
@@ -98,21 +95,19 @@ class Line:
         if self.stretched is not None or self.cap == "round":
             return None
         points = self.points.copy()
-        if self.cap == "square":
-            for end, inner in ((0, 1), (-1, -2)):
-                along = points[end] - self.points[inner]
-                points[end] += along / max(np.hypot(*along), 1e-300) * self.width / 2
+        for end, inner in ((0, 1), (-1, -2)) if self.cap == "square" else ():
+            along = points[end] - self.points[inner]
+            points[end] += along / max(np.hypot(*along), 1e-300) * self.width / 2
         return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
 
 
 @dataclass(eq=False)
 class Shapes:
-    """What a reader has found, as it finds it: checked, counted, chosen by name.
+    """What a reader has found in the file `where`, as it finds it: checked, counted, chosen by name.
 
-    `where`: what messages call the file. `outlines`, `lines`, `pillars`: pillars are obstacles whatever
-    outlines are. `vertices`: all that were read. `left_out`: things that are no part of the map, with the
-    reason where it needs one, and how many there are. `labels`: all labels, as they are compared and as they
-    are written. `mended`: things that had to be put right, what was done to them, and how many there are.
+    `pillars`: obstacles whatever outlines are. `vertices`: all that were read. `left_out`, `mended`: things
+    that are no part of the map, with the reason where it needs one, or had to be put right, with what was
+    done, and how many there are. `labels`: all of them, as they are compared and as they are written.
     """
 
     where: str
@@ -122,14 +117,14 @@ class Shapes:
     pillars: list[CircleObstacle] = field(default_factory=list)
     vertices: int = 0
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
-    labels: dict[str, str] = field(default_factory=dict)
     mended: Counter[tuple[str, str]] = field(default_factory=Counter)
+    labels: dict[str, str] = field(default_factory=dict)
     _heights: list[Array] = field(default_factory=list)
     _met: list[str] = field(default_factory=list)
-    _crossings: Crossings = field(init=False)
 
-    def __post_init__(self) -> None:
-        self._crossings = Crossings(self.where)
+    @cached_property
+    def _crossings(self) -> Crossings:
+        return Crossings(self.where)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
@@ -237,9 +232,8 @@ class Shapes:
     @property
     def dropped(self) -> tuple[str, ...]:
         """What was left out."""
-        told = [
-            f"{_many(count, thing)} {why}".strip() for (thing, why), count in sorted(self.left_out.items())
-        ]
+        left = sorted(self.left_out.items())
+        told = [f"{_many(count, thing)} {why}".strip() for (thing, why), count in left]
         if self._heights:
             heights = np.concatenate(self._heights)
             span = f"z from {heights.min():.4g} to {heights.max():.4g}"
@@ -247,35 +241,20 @@ class Shapes:
         return tuple(told)
 
     def require_known_names(self) -> None:
-        """Check that every name of the options is one of the file's.
-
-        Raises ParameterError on the first that is none; the message names the nearest.
-        """
+        """Raise ParameterError on a name of the options that the file has not; it names the nearest."""
         options = self.options
-        for name, labels in (
-            ("boundary", () if options.boundary is None else (options.boundary,)),
-            ("only", options.only or ()),
-            ("skip", options.skip or ()),
-        ):
-            for label in labels:
+        boundary = () if options.boundary is None else (options.boundary,)
+        for name, labels in (("boundary", boundary), ("only", options.only), ("skip", options.skip)):
+            for label in labels or ():
                 if label.casefold() not in self.labels:
                     known = list(self.labels.values())[:_SHOWN]
                     what = unknown_name("name", label, known) if known else "no shape has a name"
                     raise ParameterError(f"{self.where}: {name}: {what}")
 
     def require_untangled(self) -> None:
-        """Check that what is free among the shapes can be computed.
-
-        Raises MapError when they cross each other too often.
-        """
-        rings = [
-            np.asarray(ring.coords)[:-1]
-            for outline in self.outlines
-            for part in outline.area.geoms
-            for ring in (part.exterior, *part.interiors)
-        ]
-        lines = edges_of([line.points for line in self.lines], closed=False)
-        Crossings(self.where).add(np.concatenate([edges_of(rings, closed=True), lines]))
+        """Raise MapError when the shapes cross each other too often to compute what is free among them."""
+        rings = shapely.get_rings(shapely.get_parts([outline.area for outline in self.outlines]))
+        Crossings(self.where).add([*rings, *(shapely.linestrings(line.points) for line in self.lines)])
 
     def _checked(self, rings: Sequence[Array], at: str) -> list[Array]:
         """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
@@ -294,7 +273,7 @@ class Shapes:
 
 
 def _many(count: int, thing: str) -> str:
-    """Return how many things there are: of English nouns with y and x, too.
+    """Return how many things there are, also of nouns in y and x.
 
     >>> _many(2, "empty geometry"), _many(2, "box")
     ('2 empty geometries', '2 boxes')

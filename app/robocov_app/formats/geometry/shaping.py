@@ -31,8 +31,9 @@ from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.foreign import ForeignMap, ImportReport, square_metres
 from robocov_app.formats.geometry.corners import sharpened
-from robocov_app.formats.geometry.enclosing import CRUMB, bounded, filled, polygons, rounded
+from robocov_app.formats.geometry.enclosing import CRUMB, bounded
 from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
+from robocov_app.formats.geometry.polygons import filled, made_valid, polygons, rounded
 from robocov_app.formats.geometry.primitives import Primitive, with_primitives
 from robocov_app.formats.geometry.simplify import simplified
 
@@ -219,7 +220,7 @@ def _valid_boundary(outer: Polygon | None, told: _Told) -> Polygon | None:
         return None
     if not outer.is_valid:
         told.repaired.append(f"the boundary met itself: {_reason(outer)}")
-        valid = polygons(shapely.make_valid(outer, method="structure", keep_collapsed=False))
+        valid = polygons(made_valid(outer))
         return Polygon(valid[0].exterior) if valid else None
     return Polygon(outer.exterior)
 
@@ -232,7 +233,7 @@ def _valid(given: MultiPolygon, outer: Polygon | None, told: _Told, where: str) 
     free: BaseGeometry = shapely.transform(given, lambda points: np.where(abs(points) < _ZERO, 0.0, points))
     if not free.is_valid:
         told.repaired.append(f"outlines met themselves or each other: {_reason(free)}")
-        free = shapely.make_valid(free, method="structure", keep_collapsed=False)
+        free = made_valid(free)
     if outer is not None and not shapely.covers(outer, free):
         inside = shapely.intersection(free, outer)
         if free.area - inside.area > CRUMB:
@@ -512,7 +513,7 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
     """Return what an import has changed of the free space."""
     before, after = foreign.free, environment.free
     if not before.is_valid:
-        before = shapely.make_valid(before, method="structure", keep_collapsed=False)
+        before = made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
     return Comparison(
         before,

@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.errors import MapError
 from robocov_app.formats.files import MAX_VERTICES, require_shapes
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
-from robocov_app.formats.geometry.fills import Rule
+from robocov_app.formats.geometry.polygons import Rule
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.svg.path import (
     MOST_DRAWS,

@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.files.atomic import written
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.coordinates import decimal, free_area
+from robocov_app.formats.geometry.polygons import decimal, free_area
 from robocov_app.formats.options import Exporter, ExportReport, WriteOptions
 from robocov_app.render.theme import DARK, LIGHT, Colour, Theme
 

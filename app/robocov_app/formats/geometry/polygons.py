@@ -1,9 +1,9 @@
-"""What rings enclose: by the rules of polygons with holes, and by those of filled paths."""
+"""What rings enclose, by the rules of polygons with holes and of filled paths; and polygons' decimals."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -18,6 +18,9 @@ from robocov.errors import MapError
 
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
 """The first ring with the others as holes, or what SVG calls ``fill-rule``."""
+
+DIGITS = 6
+"""Decimals of metres by default: the free space is known to a micrometre."""
 
 MAX_CROSSINGS = 30_000
 """Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
@@ -36,49 +39,57 @@ most, and crossings that are enough for one."""
 
 @dataclass
 class Crossings:
-    """Count of edge crossings in a file, over all of its shapes, with `MAX_CROSSINGS` at most.
-
-    `where`: what messages call the file. `count`: so far; an estimate where edges are many.
-    """
+    """Count of edge crossings in the file `where`, of all its shapes; an estimate where edges are many."""
 
     where: str = "rings"
     count: float = 0.0
 
-    def add(self, edges: Array) -> None:
-        """Count the crossings of some edges, (n, 2, 2) m: start and end of each.
+    def add(self, lines: Iterable[BaseGeometry]) -> None:
+        """Count how often the edges of lines and rings cross each other, but for ends and what they share.
 
-        Ends that meet, and edges on each other, do not count. Where edges are many, some are looked at.
-        Raises MapError when there are too many.
+        Where edges are many, some are looked at. Raises MapError when there are more than `MAX_CROSSINGS`.
         """
+        edges = shapely.linestrings(edges_of(lines))
         n = len(edges)
-        lines = shapely.linestrings(edges)
         if n <= _FEW:
             one, other = np.triu_indices(n, 1)
-            self.count += float(shapely.crosses(lines[one], lines[other]).sum())
-            self._require_few(self.count)
+            self._add(float(shapely.crosses(edges[one], edges[other]).sum()))
             return
-        tree = shapely.STRtree(lines)
+        tree = shapely.STRtree(edges)
         order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
         crossings = work = seen = 0
         for begin in range(0, len(order), _TOGETHER):
             some = order[begin : begin + _TOGETHER]
-            one, other = tree.query(lines[some])
+            one, other = tree.query(edges[some])
             work += len(one)
             seen += len(some)
-            crossings += int(shapely.crosses(lines[some[one]], lines[other]).sum())
-            if crossings > _CERTAIN:  # each is seen from both of its edges
-                self._require_few(self.count + crossings * n / seen / 2)
-            if work > _WORK:
+            crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
+            # enough for an estimate of too many, or worked enough
+            if work > _WORK or (
+                crossings > _CERTAIN and self.count + crossings * n / seen / 2 > MAX_CROSSINGS
+            ):
                 break
-        self.count += crossings * n / seen / 2
-        self._require_few(self.count)
+        self._add(crossings * n / seen / 2)  # each is seen from both of its edges
 
-    def _require_few(self, count: float) -> None:
-        if count > MAX_CROSSINGS:
+    def _add(self, count: float) -> None:
+        self.count += count
+        if self.count > MAX_CROSSINGS:
             raise MapError(
-                f"{self.where}: its lines cross each other some {count:.1g} times, but at most "
+                f"{self.where}: its lines cross each other some {self.count:.1g} times, but at most "
                 f"{MAX_CROSSINGS} times was wanted"
             )
+
+
+def edges_of(lines: Iterable[BaseGeometry]) -> Array:
+    """Return the (n, 2, 2) edges of lines and rings: start and end of each."""
+    points, line = shapely.get_coordinates(lines, return_index=True)
+    along = line[1:] == line[:-1]
+    return np.stack([points[:-1][along], points[1:][along]], axis=1)
+
+
+def sides_of(area: BaseGeometry) -> Array:
+    """Return the (n, 2, 2) sides of polygons."""
+    return edges_of(shapely.get_rings(shapely.get_parts(area)))
 
 
 def enclosed(
@@ -91,9 +102,13 @@ def enclosed(
     what the rings wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the
     largest part first; empty where nothing is enclosed. `reason`: where a ring meets itself or another one,
     of polygons with holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the
-    reason. Raises MapError when the rings cross each other too often. Examples -------- >>> square, inner =
-    np.array([[0, 0], [4, 0], [4, 4], [0, 4]]), np.array([[1, 1], [3, 1], [3, 3], [1, 3]]) >>>
-    [enclosed([square, inner], rule)[0].area for rule in ("holes", "evenodd", "nonzero")] [12.0, 12.0, 16.0]
+    reason. Raises MapError when the rings cross each other too often.
+
+    Examples
+    --------
+    >>> square = np.array([[0, 0], [4, 0], [4, 4], [0, 4]])
+    >>> [enclosed([square, 1 + square / 2], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
+    [12.0, 12.0, 16.0]
     """
     crossings = Crossings() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
@@ -104,11 +119,12 @@ def enclosed(
     plain = Polygon(rings[0], rings[1:])
     if (rule == "holes" or len(rings) == 1) and plain.is_valid:
         return polygons_of(plain), None, +lost
-    crossings.add(edges_of(rings, closed=True))
-    if rule == "holes":
-        area = _mended(rings, lost)
-        return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
-    return _filled(rings, rule), None, {}
+    lines = [shapely.linearrings(ring) for ring in rings]
+    crossings.add(lines)
+    if rule != "holes":
+        return _filled(lines, rule), None, {}
+    area = _mended(rings, lost)
+    return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
 
 
 def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
@@ -125,18 +141,6 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     return shapely.union_all(areas, grid_size=GRID)
 
 
-def edges_of(rings: Sequence[Array], *, closed: bool) -> Array:
-    """Return the (n, 2, 2) edges of rings, or of lines."""
-    parts = [
-        np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
-        if closed
-        else np.stack([ring[:-1], ring[1:]], axis=1)
-        for ring in rings
-        if len(ring) > 1
-    ]
-    return np.concatenate(parts) if parts else np.empty((0, 2, 2))
-
-
 def _has_three(ring: Array) -> bool:
     """Return whether there are three different points in a ring; ten times as fast as to sort them."""
     others = ring[(ring != ring[:1]).any(axis=1)]
@@ -145,7 +149,7 @@ def _has_three(ring: Array) -> bool:
 
 def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
     """Return the area of a polygon that is not valid: of the outer ring, without those of the holes."""
-    areas = [shapely.make_valid(Polygon(ring), method="structure", keep_collapsed=False) for ring in rings]
+    areas = [made_valid(Polygon(ring)) for ring in rings]
     # of rings that run along themselves the parts may share an edge
     areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
     outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
@@ -155,15 +159,13 @@ def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
     return polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
 
 
-def _filled(rings: Sequence[Array], rule: Rule) -> MultiPolygon:
-    """Return the faces between the rings that the rule fills, as one area."""
-    closed = [np.concatenate([ring, ring[:1]]) for ring in rings]
-    noded = shapely.unary_union([shapely.linestrings(ring) for ring in closed])
-    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
+    """Return the faces between rings that the rule fills, as one area."""
+    faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.union_all(lines))))
     if not len(faces):
         return MultiPolygon()
     inside = shapely.get_coordinates(shapely.point_on_surface(faces))
-    edges = edges_of(rings, closed=True)
+    edges = edges_of(lines)
     tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
     most = max(_RAYS // len(edges), 1)
     parts = [_windings(inside[k : k + most], edges, tree) for k in range(0, len(inside), most)]
@@ -177,28 +179,80 @@ def _filled(rings: Sequence[Array], rule: Rule) -> MultiPolygon:
 
 def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array, Array]:
     """Return how often edges wind around each of (m, 2) points, and how many a ray to the right crosses."""
-    start, end = edges[:, 0], edges[:, 1]
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     which, near = tree.query(shapely.linestrings(np.stack([points, far], axis=1)))
-    p, a, b = points[which], start[near], end[near]
+    p, a, b = points[which], edges[near, 0], edges[near, 1]
     up = (a[:, 1] <= p[:, 1]) & (p[:, 1] < b[:, 1])
     down = (b[:, 1] <= p[:, 1]) & (p[:, 1] < a[:, 1])
     left = (b[:, 0] - a[:, 0]) * (p[:, 1] - a[:, 1]) - (p[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     sign = np.where(up & (left > 0), 1, np.where(down & (left < 0), -1, 0))
-    winding = np.bincount(which, weights=sign, minlength=len(points))
-    crossings = np.bincount(which, weights=np.abs(sign), minlength=len(points))
+    winding, crossings = (np.bincount(which, turn, len(points)) for turn in (sign, np.abs(sign)))
     return winding.astype(float), crossings.astype(float)
 
 
+def made_valid(area: BaseGeometry) -> BaseGeometry:
+    """Return a valid area of rings that may cross themselves or each other."""
+    made: BaseGeometry = shapely.make_valid(area, method="structure", keep_collapsed=False)
+    return made
+
+
+def polygons(geometry: BaseGeometry) -> list[Polygon]:
+    """Return the polygons in `geometry`, counter-clockwise, the largest first; lines and points go."""
+    flat = shapely.get_parts(shapely.get_parts(geometry))
+    parts = [part for part in flat if isinstance(part, Polygon) and part.area > 0.0]
+    return [shapely.orient_polygons(part) for part in sorted(parts, key=lambda p: (-p.area, p.bounds))]
+
+
 def polygons_of(geometry: BaseGeometry) -> MultiPolygon:
-    """Return the polygons of `geometry`, counter-clockwise, the largest first; lines and points go."""
-    parts = [part for part in _flat(geometry) if isinstance(part, Polygon) and part.area > 0.0]
-    parts.sort(key=lambda part: (-part.area, part.bounds))
-    return MultiPolygon([shapely.orient_polygons(part) for part in parts])
+    """Return the polygons in `geometry` as one geometry."""
+    return MultiPolygon(polygons(geometry))
 
 
-def _flat(geometry: BaseGeometry) -> list[BaseGeometry]:
-    parts = [geometry]
-    while any(hasattr(part, "geoms") for part in parts):
-        parts = [inner for part in parts for inner in getattr(part, "geoms", [part])]
-    return parts
+def filled(geometry: BaseGeometry) -> Polygon:
+    """Return the largest polygon in `geometry`, without its holes."""
+    return Polygon(polygons(geometry)[0].exterior)
+
+
+def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
+    """Return the polygons of `geometry` with coordinates of so many decimals, valid; the largest first."""
+
+    def decimals(points: Array) -> Array:
+        return np.round(points, digits) + 0.0  # no negative zero
+
+    plain = shapely.transform(geometry, decimals)
+    if not plain.is_valid:
+        # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
+        plain = shapely.transform(shapely.set_precision(made_valid(geometry), 10.0**-digits), decimals)
+    return polygons_of(plain)
+
+
+def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
+    """Return the polygons of a valid geometry with coordinates of so many decimals, valid, the largest first.
+
+    Outer rings run counter-clockwise, holes clockwise. What has no area any more is not there.
+    """
+    near = shapely.set_precision(geometry, 10.0**-digits)
+    return polygons(shapely.transform(near, lambda points: np.round(points, digits)))
+
+
+def decimal(value: float, digits: int) -> str:
+    """Return a number with at most so many decimals, and none that say nothing.
+
+    >>> decimal(1.5, 3), decimal(-0.0001, 3), decimal(1200.0, 0)
+    ('1.5', '0', '1200')
+    """
+    text = f"{value:.{digits}f}"
+    if "." in text:
+        text = text.rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def rings(polygon: Polygon) -> list[list[tuple[float, float]]]:
+    """Return the rings of a polygon, the outer one first; their last point is the first."""
+    return [[(x, y) for x, y in ring.coords] for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def free_area(boundary: BaseGeometry, obstacles: Iterable[BaseGeometry]) -> float:
+    """Return the area inside of a boundary and outside of obstacles, as `Environment.free` has it, m²."""
+    blocked = shapely.union_all(list(obstacles), grid_size=GRID)
+    return float(shapely.difference(boundary, blocked, grid_size=GRID).area)

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from shapely import Polygon, box
 
 from robocov.errors import MapError
-from robocov_app.formats.geometry.fills import (
+from robocov_app.formats.geometry.polygons import (
     MAX_CROSSINGS,
     Crossings,
     edges_of,
     enclosed,
     polygons_of,
+    sides_of,
     united,
 )
 
@@ -86,18 +87,18 @@ def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
     count = 2000
     angle = np.arange(count) * math.tau / count
     star = np.column_stack([np.cos(angle), np.sin(angle)]) * np.where(np.arange(count) % 2, 1.0, 3.0)[:, None]
-    Crossings("star").add(edges_of([star], closed=True))
+    Crossings("star").add([shapely.LinearRing(star)])
     x = np.arange(count, dtype=float)
     parallel = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x + 900, 0 * x + 900])], axis=1)
-    Crossings("hatch").add(parallel)
+    Crossings("hatch").add(shapely.linestrings(parallel))
 
 
 @pytest.mark.parametrize("count", [800, 3000, 20_000])
 def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
     ring = np.random.default_rng(1).random((count, 2))
     with pytest.raises(MapError, match=rf"knot: its lines cross .* but at most {MAX_CROSSINGS} times"):
-        Crossings("knot").add(edges_of([ring], closed=True))
-    Crossings("loose").add(edges_of([ring[:200]], closed=True))
+        Crossings("knot").add([shapely.LinearRing(ring)])
+    Crossings("loose").add([shapely.LinearRing(ring[:200])])
 
 
 def test_crossings_are_those_of_all_shapes_together() -> None:
@@ -128,9 +129,10 @@ def test_holes_that_take_nothing_out_are_counted() -> None:
 
 def test_edges_and_parts() -> None:
     ring = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    assert edges_of([ring, ring], closed=True).shape == (6, 2, 2)
-    assert edges_of([ring], closed=False).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
-    assert edges_of([], closed=True).shape == (0, 2, 2)
+    assert edges_of([shapely.LinearRing(ring)] * 2).shape == (6, 2, 2)
+    assert edges_of([shapely.LineString(ring)]).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]]]
+    assert edges_of([]).shape == (0, 2, 2)
+    assert sides_of(shapely.box(0, 0, 1, 1) - shapely.box(0.2, 0.2, 0.5, 0.5)).shape == (8, 2, 2)
     nested = shapely.GeometryCollection(
         [shapely.Point(0, 0), shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(5, 5, 9, 9)])]
     )
