@@ -96,7 +96,7 @@ class Hands(Driver):
         return [item.shape for item in self.editor.sketch.obstacles]
 
     def pixel(self, point: tuple[float, float], pane: int = 0) -> tuple[float, float]:
-        return self.window.arena.to_pixel(point)
+        return self.window.canvas.to_pixel(point)
 
     def hold(self, *names: str) -> None:
         """Hold keys down, or none."""

@@ -52,7 +52,7 @@ def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
         hands.turn("map")
         assert len(hands.editor.measurement.components) == 2
         assert not hands.editor.measurement.sealed.is_empty
-        words = [entry.text for entry in hands.window.arena.strips._entries]
+        words = [entry.text for entry in hands.window.canvas.strips._entries]
         assert "cut off" in words
 
 
@@ -61,7 +61,7 @@ def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: P
     with opened_editor(tmp_path, sheet(CROSSED, outside)) as hands:
         problems = hands.editor.problems
         assert problems[0].grave and "cross" in problems[0].words
-        hands.window.arena.fit()
+        hands.window.canvas.fit()
         hands.frames(1)
         spot = problems[0].where.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
@@ -70,11 +70,11 @@ def test_a_problem_has_a_badge_with_its_words_and_a_click_goes_there(tmp_path: P
         hands.click(*at)
         assert hands.editor.problem is problems[0] and hands.said == problems[0].words
         hands.turn("problems")
-        hands.window.arena.zoom(8.0, (100.0, 100.0))
+        hands.window.canvas.zoom(8.0, (100.0, 100.0))
         hands.click(*hands.widget("option", f"problem:{len(problems) - 1}").rect.center)
         assert hands.editor.problem is problems[-1]
         where = problems[-1].where.representative_point()
-        assert hands.window.arena.over(hands.pixel((where.x, where.y)))
+        assert hands.window.canvas.over(hands.pixel((where.x, where.y)))
 
 
 def test_the_strip_says_whose_map_it_is_and_that_it_is_a_draft(tmp_path: Path) -> None:
@@ -134,12 +134,12 @@ def await_that(hands: Hands, seen: Callable[[], bool]) -> None:
 def test_the_team_at_a_start_is_drawn_and_follows_the_map(tmp_path: Path) -> None:
     with opened_editor(tmp_path, of_map("rooms")) as hands:
         hands.key("a")
-        await_that(hands, lambda: hands.window.arena.team is not None)
-        team = hands.window.arena.team
+        await_that(hands, lambda: hands.window.canvas.team is not None)
+        team = hands.window.canvas.team
         assert len(team.places) == 6
         hands.key("shift+=")
-        await_that(hands, lambda: hands.window.arena.team.robots == 7)
-        assert len(hands.window.arena.team.places) == 7
+        await_that(hands, lambda: hands.window.canvas.team.robots == 7)
+        assert len(hands.window.canvas.team.places) == 7
 
 
 def test_what_is_wrong_is_marked_already_while_something_is_dragged(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ class Monkey:
         elif which == 3:
             window.panel.show_tab(self.random.choice(TABS))
         elif which == 4:
-            window.arena.fit()
+            window.canvas.fit()
         else:
             self.hands.post(pygame.KEYDOWN, key=pygame.K_ESCAPE, mod=0, unicode="", scancode=0)
 

@@ -27,9 +27,9 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         hands.key("r")
         hands.drag_at((4, 4), (4.5, 4.5), (5, 5))
         hands.key("v")
-        hands.window.arena.zoom(2.0, (200.0, 200.0))
+        hands.window.canvas.zoom(2.0, (200.0, 200.0))
         hands.window.frame(0.0)
-        before, camera, selection = hands.sketch, hands.window.arena.camera, hands.editor.selection
+        before, camera, selection = hands.sketch, hands.window.canvas.camera, hands.editor.selection
         picture = hands.picture()
         trial = tried(hands)
         assert trial.viewer.session.environment == before.environment()
@@ -38,7 +38,7 @@ def test_back_with_nothing_lost(tmp_path: Path) -> None:
         assert trial.viewer.session.time > 0.0
         hands.key("f5")
         assert hands.window.trial is None
-        assert hands.sketch is before and hands.window.arena.camera == camera
+        assert hands.sketch is before and hands.window.canvas.camera == camera
         assert hands.editor.selection == selection
         hands.editor.message = ""
         hands.window.frame(0.0)

@@ -9,7 +9,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle
-from robocov_app.editor.canvas import arena
+from robocov_app.editor.canvas import canvas
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
@@ -197,31 +197,31 @@ def test_the_list_of_what_was_done_leads_back_and_forth(hands: Hands) -> None:
 
 def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
     at = hands.pixel((5, 5))
-    zoom = hands.window.arena.camera.zoom
+    zoom = hands.window.canvas.camera.zoom
     hands.wheel(*at, 3)
-    assert hands.window.arena.camera.zoom > zoom * 1.3
+    assert hands.window.canvas.camera.zoom > zoom * 1.3
     assert hands.pixel((5, 5)) == pytest.approx(at, abs=1)
-    center = hands.window.arena.camera.center
+    center = hands.window.canvas.camera.center
     hands.drag((300, 300), (330, 310), (360, 320), button=3)
-    moved = hands.window.arena.camera.center
+    moved = hands.window.canvas.camera.center
     assert moved[0] < center[0] and hands.window.menu is None
     hands.key("f")
-    assert hands.window.arena.camera.zoom == pytest.approx(zoom)
+    assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
 
 
 def test_space_and_the_pan_tool_move_the_sheet(hands: Hands) -> None:
-    center = hands.window.arena.camera.center
+    center = hands.window.canvas.camera.center
     hands.key("g")
     hands.drag((300, 300), (330, 310), (360, 320))
-    assert hands.window.arena.camera.center != center
+    assert hands.window.canvas.camera.center != center
     hands.key("v")
-    before, center = hands.sketch, hands.window.arena.camera.center
+    before, center = hands.sketch, hands.window.canvas.camera.center
     hands.post(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
     hands.settle()
     hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
     hands.post(pygame.KEYUP, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0)
     hands.settle()
-    assert hands.sketch is before and hands.window.arena.camera.center != center
+    assert hands.sketch is before and hands.window.canvas.camera.center != center
     hands.drag_at((3, 3), (3.5, 3.5), (4, 4))
     assert hands.sketch is not before
 
@@ -230,12 +230,12 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
     for _ in range(80):
         hands.key("ctrl+left")
         hands.wheel(300, 300, -5)
-    low_x, low_y, high_x, high_y = hands.window.arena.camera.visible()
+    low_x, low_y, high_x, high_y = hands.window.canvas.camera.visible()
     assert low_x < 10 and high_x > 0 and low_y < 10 and high_y > 0
     hands.key("f")
     hands.select(1)
     hands.key("z")
-    low_x, _, high_x, _ = hands.window.arena.camera.visible()
+    low_x, _, high_x, _ = hands.window.canvas.camera.visible()
     assert high_x - low_x < 5
 
 
@@ -358,7 +358,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
     shapes = [PolygonObstacle(tuple(map(tuple, ring.tolist()))) for ring in rings]
     sketch = Sketch(boundary=((0, 0), (32, 0), (32, 32), (0, 32))).added(shapes)[0]
     with opened_editor(tmp_path, sketch, size=(1280, 720), readings=NoReadings()) as hands:
-        window, sheet = hands.window, hands.window.arena.sheet
+        window, sheet = hands.window, hands.window.canvas.sheet
         hands.editor.snapper.patient = False
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
@@ -409,7 +409,7 @@ def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path
     shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]
     pictures = []
     for many in (200, 10_000):
-        monkeypatch.setattr(arena, "MANY", many)
+        monkeypatch.setattr(canvas, "MANY", many)
         with opened_editor(tmp_path, sheet(*shapes)) as hands:
             hands.key("ctrl+a")
             hands.frames(2)

@@ -15,7 +15,7 @@ from x11_hands import MARKS, PATIENCE, Hands, ended, invisible_display, run_wind
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.mapfile import load_map
-from robocov_app.editor.canvas.arena import MARGIN
+from robocov_app.editor.canvas.canvas import MARGIN
 from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import Camera
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS

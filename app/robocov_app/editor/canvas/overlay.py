@@ -421,7 +421,7 @@ def tag_gap(canvas: Canvas, gap: Gap, radius: float, cursor: tuple[float, float]
     _, a, b, across = _gap(canvas, gap, radius)
     scale = canvas.scale
     sign = "<" if gap.width < 2 * radius else "≥"
-    words = f"{length_words(gap.width)} {sign} {length_words(2 * radius)}"
+    words = f"gap {length_words(gap.width)} {sign} {length_words(2 * radius)}"
     side = 1.0 if abs(across[0]) < 1e-9 else float(np.sign(across[0]))
     at = (a + b) / 2 + across * side * 2.4
     x, y = float(at[0]) + 8 * scale, float(at[1]) - 16 * scale

@@ -40,9 +40,9 @@ class Strips:
         self._unfree: tuple[object, bool] = (None, False)
         self._kept: tuple[object, pygame.Surface | None] = (None, None)
 
-    def room(self, arena: Box, scale: float) -> tuple[float, float, float, float]:
-        """Return what of the arena is left: left, top, width and height, px."""
-        left, top, width, height = arena
+    def room(self, box: Box, scale: float) -> tuple[float, float, float, float]:
+        """Return what of a box is left: left, top, width and height, px."""
+        left, top, width, height = box
         above = round((10 + LEGEND_ROW * self._rows) * scale) if "legend" in self._editor.shown else 0
         return (
             float(left),
@@ -52,7 +52,7 @@ class Strips:
         )
 
     def update(self, canvas: Canvas, team: Team | None) -> None:
-        """Look what there is to tell, on a canvas as wide as the arena.
+        """Look what there is to tell, on a canvas as wide as the sheet.
 
         The legend does not become lower again while things come and go: the map is not to jump.
         """
@@ -80,9 +80,9 @@ class Strips:
             found.append(density_entry(range_label(span)))
         return found
 
-    def draw(self, screen: pygame.Surface, canvas: Canvas, arena: Box) -> None:
+    def draw(self, screen: pygame.Surface, canvas: Canvas, box: Box) -> None:
         """Draw both strips."""
-        left, top, width, height = arena
+        left, top, width, height = box
         if self._entries:
             key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
             if self._kept[0] != key:

@@ -170,6 +170,7 @@ class Panel:
         count = len(self.editor.problems)
         titles = {name: name.capitalize() for name in TABS}
         titles["problems"] += f" {min(count, 99)}" if count else ""
+        ui.space(6)
         ui.row(44, 56, 46, 72, 0, below=8)
         for name, title in titles.items():
             if ui.button(title, key=f"tab:{name}", chosen=name == self.tab, small=True):

@@ -14,7 +14,7 @@ from robocov_app.toolkit.layout import inside
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robocov_app.editor.canvas.arena import Arena
+    from robocov_app.editor.canvas.canvas import EditorCanvas
     from robocov_app.editor.ui.editor import Editor
     from robocov_app.editor.ui.panel import Panel
 
@@ -37,9 +37,9 @@ class Pointer:
     """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
 
     def __init__(
-        self, editor: Editor, arena: Arena, panel: Panel, menu: Callable[[tuple[int, int]], object]
+        self, editor: Editor, canvas: EditorCanvas, panel: Panel, menu: Callable[[tuple[int, int]], object]
     ) -> None:
-        self._editor, self._arena, self._panel, self._menu = editor, arena, panel, menu
+        self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
         self.at = (0, 0)
         self.held = False
         """Whether the sheet is panned by the left button, for as long as a key is held."""
@@ -69,12 +69,12 @@ class Pointer:
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self._panel.ui.stop_typing()
             self._pressed(event, now)
-        elif self._arena.over(self.at):
-            self._arena.zoom(WHEEL ** wheel_notches(event), self.at)
+        elif self._canvas.over(self.at):
+            self._canvas.zoom(WHEEL ** wheel_notches(event), self.at)
 
     def aim(self, pixel: tuple[int, int]) -> PointerEvent:
         """Return where a pixel means, with what is held down on the keyboard."""
-        raw, reach = self._arena.to_world(pixel), self._arena.reach
+        raw, reach = self._canvas.to_world(pixel), self._canvas.reach
         held = pygame.key.get_mods()
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
         tool = self._editor.tool
@@ -89,25 +89,25 @@ class Pointer:
     def leave(self) -> None:
         """The mouse is not in the window any more."""
         self._editor.cursor = None
-        self._arena.at = None
-        self._arena.hovered = None
+        self._canvas.at = None
+        self._canvas.hovered = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         editor = self._editor
-        if self._drag or not self._arena.over(event.pos) or event.button not in (1, 2, 3):
+        if self._drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
             return
         self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
         if event.button != 1 or editor.tool.name == "pan" or self.held:
             self._drag = "pan"
             return
-        problem = self._arena.problem_at(event.pos)
+        problem = self._canvas.problem_at(event.pos)
         if problem is not None and not editor.tool.busy:
             editor.problem = None if editor.problem is problem else problem
             editor.say(problem.words, trouble=problem.grave)
             editor.version += 1
             return
         then, where = self._last_click
-        double = now - then < DOUBLE and _far(where, event.pos) < SLIP * self._arena.layout.scale
+        double = now - then < DOUBLE and _far(where, event.pos) < SLIP * self._canvas.layout.scale
         self._last_click = (-1.0 if double else now), event.pos
         self._drag = "tool"
         aim = self.aim(event.pos)
@@ -115,17 +115,17 @@ class Pointer:
         editor.attempt(lambda: act(editor, aim))
 
     def _moved(self, event: pygame.event.Event) -> None:
-        editor, arena = self._editor, self._arena
-        over = arena.over(event.pos) and not inside(arena.layout.panel, event.pos)
+        editor, canvas = self._editor, self._canvas
+        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
         aimed = over or self._drag == "tool"
-        editor.cursor = arena.to_world(event.pos) if aimed else None
-        arena.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
-        arena.hovered = arena.problem_at(event.pos) if over and not self._drag else None
-        far = _far(event.pos, self._pressed_at) >= SLIP * arena.layout.scale
+        editor.cursor = canvas.to_world(event.pos) if aimed else None
+        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
+        canvas.hovered = canvas.problem_at(event.pos) if over and not self._drag else None
+        far = _far(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
         self._moved_off = self._moved_off or (bool(self._drag) and far)
         if self._drag == "pan":
             if self._moved_off:
-                arena.pan(*event.rel)
+                canvas.pan(*event.rel)
         elif aimed:
             aim = self.aim(event.pos)
             self._quietly(lambda: editor.tool.move(editor, aim))
@@ -155,14 +155,14 @@ class Pointer:
 
     def show(self) -> None:
         """Let the cursor tell what a press would do."""
-        arena, editor = self._arena, self._editor
-        if inside(arena.layout.panel, self.at):
+        canvas, editor = self._canvas, self._editor
+        if inside(canvas.layout.panel, self.at):
             self._shape = -1  # the panel has set its own
             return
         shape = "arrow"
-        if arena.over(self.at):
+        if canvas.over(self.at):
             panned = self._drag == "pan" or self.held
-            shape = "move" if panned else "hand" if arena.hovered else editor.tool.shape_of_cursor(editor)
+            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
         if _SHAPES[shape] != self._shape:
             self._shape = _SHAPES[shape]
             show_cursor(self._shape)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pygame
 
-from robocov_app.editor.canvas.arena import Arena
+from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
@@ -61,21 +61,21 @@ class EditorWindow(BaseWindow):
         self.editor, self.scale = editor, scale
         self.help = False
         self.trial: PlayWindow | None = None
-        self.arena = Arena(editor)
-        self.documents = FileCommands(editor, drafts, self.arena.fit, patient=patient)
+        self.canvas = EditorCanvas(editor)
+        self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
         self.dialogs = editor.dialogs
         listed = editor_commands(editor, {**self.documents.commands(), **self._what_to_do()})
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
         self.panel = Panel(editor, self.commands, self.do, self._show_problem)
         self.menu: Menu | None = None
-        self.pointer = Pointer(editor, self.arena, self.panel, self.open_menu)
+        self.pointer = Pointer(editor, self.canvas, self.panel, self.open_menu)
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._tried: Environment | None = None
         self._caption = ""
         self._arrange()
-        self.arena.fit()
+        self.canvas.fit()
         editor.ask_readings()
         self.draw()
 
@@ -93,7 +93,7 @@ class EditorWindow(BaseWindow):
         """Return all that changes the picture without an event; None while something moves."""
         if self.trial is not None:
             return self.trial.look()
-        editor, arena, ui = self.editor, self.arena, self.panel.ui
+        editor, canvas, ui = self.editor, self.canvas, self.panel.ui
         importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
             return None
@@ -101,7 +101,7 @@ class EditorWindow(BaseWindow):
             *(editor.version, editor.message, editor.trouble, editor.typed, editor.readings.busy),
             *(editor.problem, editor.sketch, editor.selection, editor.measurement, editor.tool),
             *(editor.cursor, frozenset(editor.shown), editor.grid, frozenset(editor.snaps)),
-            *(arena.team, arena.camera, arena.hovered, self.help, id(editor.asked)),
+            *(canvas.team, canvas.camera, canvas.hovered, self.help, id(editor.asked)),
             *(self._arranged, self._caption),
         )
 
@@ -137,7 +137,7 @@ class EditorWindow(BaseWindow):
             self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
             answer = self.team.poll()
             if answer is not None:
-                self.arena.team = answer
+                self.canvas.team = answer
                 if answer.words:
                     editor.say(answer.words, trouble=True)
 
@@ -150,7 +150,7 @@ class EditorWindow(BaseWindow):
         self._arranged = key
         self.theme = theme_named(editor.theme)
         self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
-        self.arena.arrange(self.layout, self.theme)
+        self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
@@ -159,8 +159,8 @@ class EditorWindow(BaseWindow):
             self.trial.draw()
             return
         layout, theme, editor = self.layout, self.theme, self.editor
-        self.arena.draw(self.screen)
-        told = facts(editor, self.rate, self.arena.team)
+        self.canvas.draw(self.screen)
+        told = facts(editor, self.rate, self.canvas.team)
         draw_status(self.screen, layout.status, theme, layout.scale, told, HINT)
         if layout.panel[2]:
             self.panel.draw(self.screen)
@@ -190,7 +190,7 @@ class EditorWindow(BaseWindow):
 
     def _show_problem(self) -> None:
         if self.editor.problem is not None:
-            self.arena.go_to(self.editor.problem)
+            self.canvas.go_to(self.editor.problem)
 
     def open_palette(self, text: str = "") -> None:
         """Open the palette, with the beginning of a command."""
@@ -205,14 +205,14 @@ class EditorWindow(BaseWindow):
 
     def _what_to_do(self) -> dict[str, Callable[[], object]]:
         return {
-            "fit": self.arena.fit,
-            "fit:selection": self.arena.fit_selection,
-            "zoom:in": lambda: self.arena.zoom(1.25, self._middle()),
-            "zoom:out": lambda: self.arena.zoom(0.8, self._middle()),
-            "pan:left": lambda: self.arena.pan(_PAN, 0),
-            "pan:right": lambda: self.arena.pan(-_PAN, 0),
-            "pan:up": lambda: self.arena.pan(0, _PAN),
-            "pan:down": lambda: self.arena.pan(0, -_PAN),
+            "fit": self.canvas.fit,
+            "fit:selection": self.canvas.fit_selection,
+            "zoom:in": lambda: self.canvas.zoom(1.25, self._middle()),
+            "zoom:out": lambda: self.canvas.zoom(0.8, self._middle()),
+            "pan:left": lambda: self.canvas.pan(_PAN, 0),
+            "pan:right": lambda: self.canvas.pan(-_PAN, 0),
+            "pan:up": lambda: self.canvas.pan(0, _PAN),
+            "pan:down": lambda: self.canvas.pan(0, -_PAN),
             "pan:hold": lambda: setattr(self.pointer, "held", True),
             "theme": self._switch_theme,
             "panel": self._switch_panel,
@@ -227,9 +227,9 @@ class EditorWindow(BaseWindow):
         }
 
     def _middle(self) -> tuple[float, float]:
-        if self.arena.over(self.pointer.at):
+        if self.canvas.over(self.pointer.at):
             return self.pointer.at
-        left, top, width, height = self.arena.camera.view
+        left, top, width, height = self.canvas.camera.view
         return left + width / 2, top + height / 2
 
     def _switch_theme(self) -> None:
@@ -255,8 +255,8 @@ class EditorWindow(BaseWindow):
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the menu for what is at a pixel; what is not selected yet is selected then."""
         editor = self.editor
-        if self.arena.over(pixel):
-            there = owners_at(editor.sketch, self.arena.to_world(pixel), 0.5 * self.arena.reach)
+        if self.canvas.over(pixel):
+            there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
             near = editor.selection.vertices or any(each in editor.selection.owners for each in there)
             if not near:
                 editor.select(Selection.of(*there[:1]))

@@ -1,4 +1,4 @@
-"""The arena: the sheet under a camera, and all that is drawn on top of it while it is edited."""
+"""The canvas: the sheet under a camera, and all that is drawn on top of it while it is edited."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ EMPTY = (0.0, 0.0, 10.0, 10.0)
 """What is shown of a sheet with nothing on it, m."""
 
 
-class Arena:
+class EditorCanvas:
     """Draws what is in the editor, and finds what is under the cursor."""
 
     def __init__(self, editor: Editor) -> None:
@@ -226,7 +226,7 @@ class Arena:
         clip = view.clip
         screen.blit(page, clip, clip)
         screen.set_clip(clip)
-        # words keep to the arena
+        # words keep to the canvas
         canvas = view.canvas(screen.subsurface(pygame.Rect(left, top, width, height)))
         canvas.surface.set_clip(clip)
         if carried is not None:
