@@ -16,7 +16,7 @@ from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.replication.running import Forecast, RunnerOptions
+    from robocov_app.replication.results import Forecast, RunnerOptions
     from robocov_app.replication.verdicts import Claim
 
 _MOST_WORKERS = 1024
@@ -69,7 +69,7 @@ def command(options: Arguments) -> int:
     """Run the study and write all that comes of it."""
     from robocov_app.replication import beyond_claims, claims, pages, results
     from robocov_app.replication.plan import FULL, QUICK
-    from robocov_app.replication.running import Interrupted, RunnerOptions, forecast, open_folder
+    from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
     from robocov_app.terminal.interruption import Interruption
     from robocov_app.terminal.output import finite

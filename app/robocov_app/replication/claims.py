@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from robocov.arrays import Array
 from robocov_app.figures.statistics import Interval, bootstrap, spread
 from robocov_app.replication.contenders import LABELS, potential_text
-from robocov_app.replication.maps import CONVEX_KINDS
 from robocov_app.replication.outcomes import (
     EARLY,
     FIRST_MINUTE,
@@ -23,6 +22,7 @@ from robocov_app.replication.outcomes import (
     Outcomes,
     spread_of_placements,
 )
+from robocov_app.replication.plan import CONVEX_KINDS
 from robocov_app.replication.verdicts import Claim, Criterion, amount, described
 
 SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1

@@ -1,11 +1,17 @@
-"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``."""
+"""The results as files: figures, ``claims.json`` and the two pages, ``index.html`` and ``beyond.html``.
+
+In the pages are small pictures of numbers as SVG: intervals of claims, and medians map by map. Their colours
+are CSS variables; what they show is said in words as well.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +24,7 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import beyond_claims, claims, contenders, maps, step_times, studies
+from robocov_app.replication import beyond_claims, claims, contenders, step_times, studies
 from robocov_app.replication.contenders import LABELS, OURS
 from robocov_app.replication.evidence import (
     ASSETS,
@@ -30,11 +36,10 @@ from robocov_app.replication.evidence import (
     worst_text,
 )
 from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
-from robocov_app.replication.plan import FULL, ROBOTS, TEAM, Plan
+from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
 from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
-from robocov_app.replication.svg import Strip, interval_bar, strips
-from robocov_app.replication.verdicts import LEAST_MAPS, Claim, amount, described, verdict_counts
+from robocov_app.replication.verdicts import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules
@@ -55,6 +60,8 @@ _CASES = {
     "b": "Figure 6",
     "other": "Figure 8",
 }  # which shows which runs
+
+_TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|m|s|m²|m³|N)(?![\w³²]))")
 
@@ -166,7 +173,7 @@ def paper_page(
         "versions": versions(),
         "resamples": RESAMPLES,
         "least_maps": LEAST_MAPS,
-        "all_bundled": len(plan.bundled) == len(maps.NON_CONVEX),
+        "all_bundled": len(plan.bundled) == len(NON_CONVEX),
     }
     if results is not None:
         outcomes, best = results.claims, {each.key: each for each in results.contenders}
@@ -238,7 +245,6 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         "t": claims,
         "rules": beyond_claims,
         "contender": contenders,
-        "map_rules": maps,
         "studies": studies,
         "timing": step_times,
         "units": UNITS,
@@ -293,3 +299,95 @@ def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
     rows = [one, *(other for other in each if other.account.controller == beside and other is not one)]
     parts = [Strip(row.rows[0].contender.label, row.account.controller in OURS, row.maps) for row in rows]
     return strips(parts, highest)
+
+
+def interval_bar(criterion: Criterion) -> Markup:
+    """Return an SVG element: the wanted range shaded, the interval a line, the estimate a mark."""
+    interval, wide, edge = criterion.interval, 320.0, 14.0
+    known = [value for value in (interval.estimate, interval.low, interval.high) if math.isfinite(value)]
+    ends = [value for value in (criterion.low, criterion.high) if math.isfinite(value)]
+    if not known or not ends:
+        return Markup("")
+    low, high = min(known + ends), max(known + ends)
+    least = 0.0 if criterion.unit == "%" and low >= 0.0 else -math.inf
+    room = 0.18 * (high - low) if high > low else max(0.1 * abs(high), 0.01)
+    low, high = max(low - room, least), high + room
+
+    def at(value: float) -> float:
+        part = (min(max(value, low), high) - low) / (high - low)
+        return round(edge + part * (wide - 2 * edge), 1)
+
+    begin, end = at(criterion.low), at(criterion.high)
+    parts = [
+        f'<rect class="wanted" x="{begin}" y="4" width="{round(end - begin, 1)}" height="26" rx="3"/>',
+        f'<path class="axis" d="M{edge} 30H{wide - edge}"/>',
+    ]
+    near = len(ends) == 2 and end - begin < 40.0  # their numbers then stand aside
+    for value, anchor in zip(ends, ("end", "start"), strict=False):
+        parts.append(f'<path class="bound" d="M{at(value)} 4V34"/>')
+        aside = f' style="text-anchor: {anchor}"' if near else ""
+        parts.append(f'<text x="{at(value)}" y="43"{aside}>{amount(value, criterion.unit)}</text>')
+    state = {True: "yes", False: "no", None: "open"}[criterion.met]
+    if math.isfinite(interval.low):
+        parts.append(f'<path class="interval {state}" d="M{at(interval.low)} 17.0H{at(interval.high)}"/>')
+    parts.append(f'<circle class="estimate {state}" cx="{at(interval.estimate)}" cy="17.0" r="5.5"/>')
+    return _svg("bar", wide, 44.0, f"{criterion.found}; wanted: {criterion.wanted}", parts)
+
+
+class Strip(NamedTuple):
+    """A row of dots: the median gap on each map; `ours` stands out."""
+
+    label: str
+    ours: bool
+    maps: Mapping[str, float]
+
+
+def strips(rows: Sequence[Strip], highest: float) -> Markup:
+    """Return an SVG element: a dot for each map that says which it is, on an axis of square roots.
+
+    `highest` is the largest gap of all pictures that are to be compared.
+    """
+    rows = [row for row in rows if row.maps]
+    if not rows:
+        return Markup("")
+    wide, left, right, tall, name_height = 440.0, 12.0, 16.0, 40.0, 13.0
+    highest, lowest = max(highest, 0.01), min(0.0, *(min(row.maps.values()) for row in rows))
+    begin, end = _root(lowest), _root(highest)
+
+    def at(value: float) -> float:
+        part = (_root(value) - begin) / (end - begin)
+        return round(left + min(max(part, 0.0), 1.0) * (wide - left - right), 1)
+
+    bottom = tall * len(rows) + 22.0
+    parts, words = [], []
+    last = -math.inf
+    for tick in _TICKS:
+        x = at(tick)
+        if tick <= highest and x - last >= 36.0:
+            last = x
+            parts.append(f'<path class="grid" d="M{x} 0V{tall * len(rows)}"/>')
+            parts.append(f'<text class="tick" x="{x}" y="{bottom - 6}">{amount(tick, "%")}</text>')
+    for number, row in enumerate(rows):
+        top, kind, label = tall * number, "ours" if row.ours else "other", escape(row.label)
+        parts.append(f'<text class="name" x="{left - 4}" y="{top + name_height - 2}">{label}</text>')
+        middle = top + name_height + (tall - name_height) / 2
+        ranked = sorted(row.maps.items(), key=lambda item: item[1])
+        for k, (name, value) in enumerate(ranked):
+            y = round(middle + 7.0 * ((k * 5 % 8) / 7.0 - 0.5) * 2.0, 1)
+            title = f"<title>{escape(name)}: {amount(value, '%')}</title>"
+            parts.append(f'<circle class="{kind}" cx="{at(value)}" cy="{y}" r="3">{title}</circle>')
+        half = ranked[(len(ranked) - 1) // 2][1] / 2 + ranked[len(ranked) // 2][1] / 2
+        parts.append(f'<path class="middle" d="M{at(half)} {middle - 11}V{middle + 11}"/>')
+        words.append(f"{label}: {amount(ranked[0][1], '%')} to {amount(ranked[-1][1], '%')}")
+    most = max(len(row.maps) for row in rows)
+    return _svg("strips", wide, bottom, f"Median gap on each of {most} maps. {'; '.join(words)}", parts)
+
+
+def _svg(kind: str, wide: float, tall: float, words: str, parts: Sequence[str]) -> Markup:
+    head = f'<svg class="{kind}" viewBox="0 0 {wide:g} {tall:g}" role="img" aria-label="{words}">'
+    return Markup(f"{head}{''.join(parts)}</svg>")
+
+
+def _root(value: float) -> float:
+    """Return the square root, with the sign of the value."""
+    return math.copysign(math.sqrt(abs(value)), value)

@@ -7,10 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 from robocov_app.replication.contenders import OURS
-from robocov_app.replication.maps import KINDS, NON_CONVEX
 
 ROBOTS = 6  # as in the paper
 PARTITION_SEED = 56  # of the robots in figure 1: none hides the centre of mass of its cell
+
+# Kinds of starts, the same on all maps: a disc near the lower left corner, as in the paper's figures 4 and 6,
+# one near the middle, or anywhere in the free space; in convex regions also the smallest disc that holds six
+# robots with a little room, near the corner. All but the last are clustered.
+KINDS = ("corner", "centre", "uniform")
+CONVEX_KINDS = ("corner", "centre", "tight", "uniform")
+
+# bundled maps of the study: all that are not convex, but for ``campus``, which is 120 m wide: at 1 m/s the
+# robots would not have arrived when the run ends
+NON_CONVEX = (
+    *("blocks-a", "blocks-b", "l-shape", "rooms", "trap", "gaps", "cave", "courtyard", "corridor"),
+    *("museum", "office", "warehouse", "city"),
+)
+CONVEX = ("square", "pentagon")  # bundled maps of the convex case
 
 # Of every controller's team. The sensors reach as far as the longest repulsion of the grids, so that `rho_0`
 # alone says how far an obstacle acts; robots hear each other everywhere.

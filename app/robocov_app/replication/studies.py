@@ -18,15 +18,21 @@ Beyond the paper:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
+import numpy as np
+import shapely
+
 from robocov.controllers.gains import Value
+from robocov.density import Gaussian, Gaussians
+from robocov.environment import DiscStart, Environment, StartSpec, UniformStart
+from robocov.errors import StartError
+from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov_app.replication import contenders as laws
-from robocov_app.replication import maps
 from robocov_app.replication.contenders import (
     GRIDS,
     LLOYD,
@@ -36,9 +42,17 @@ from robocov_app.replication.contenders import (
     RPF_SHARED,
     Contender,
 )
-from robocov_app.replication.plan import ROBOTS, TEAM, Plan
+from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
 from robocov_app.sweep import study as sweep_study
 from robocov_app.sweep.study import Study, StudyMap
+
+RADII = (0.8, 0.6, 0.45)  # m, of the discs of clustered starts; the first that fits is taken
+TIGHT = 0.35  # m, of the disc of "tight": it has room for the centres of six robots, and hardly more
+
+SIDE = 10.0  # m, of the square in which regions are drawn by chance
+HOT_SPOTS = 2  # Gaussians drawn by chance on a map: in the middle of one a place counts 20 times as much
+
+_POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 # which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
 FIGURES = {
@@ -76,23 +90,89 @@ class Contest:
     contenders: tuple[Contender, ...]
 
 
+def bundled(name: str, kinds: Iterable[str] = KINDS) -> StudyMap:
+    """Return a bundled map with the study's starts."""
+    return StudyMap(name, with_kinds_of_starts(load_map(name), kinds))
+
+
+def generated(seed: int) -> StudyMap:
+    """Return a non-convex map drawn by chance, with the study's starts.
+
+    Four to eight obstacles, of five about three convex, one an L and one a U, block 16 to 25 % of a square of
+    ten metres; every passage is at least 0.6 m wide, and the free space is in one piece.
+    """
+    rng = np.random.default_rng([seed, 2])
+    obstacles, area = int(rng.integers(4, 9)), round(float(rng.uniform(0.16, 0.25)), 3)
+    environment = generated_map(seed, kind="polygons", obstacles=obstacles, area=area, gap=0.6, side=SIDE)
+    return StudyMap(f"generated-{seed}", with_kinds_of_starts(environment))
+
+
+def convex_region(seed: int) -> StudyMap:
+    """Return a convex region without obstacles drawn by chance, with the study's starts.
+
+    It is the convex hull of nine points that are uniform in a square of ten metres; hulls below 40 m², and
+    those narrower than 5 m, are drawn again. Coordinates are whole centimetres.
+    """
+    rng = np.random.default_rng([seed, 1])
+    while True:
+        points = np.round(rng.uniform(0.0, SIDE, size=(_POINTS, 2)), 2)
+        hull = shapely.convex_hull(shapely.MultiPoint(points))
+        corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
+        width = np.hypot(*np.diff(corners[:3], axis=0).T).min()
+        if hull.area >= _LEAST_AREA and width >= _LEAST_WIDTH:
+            break
+    ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
+    boundary = tuple((float(x), float(y)) for x, y in ring)
+    region = Environment(f"convex-{seed}", boundary, description="A convex region drawn by chance.")
+    return StudyMap(region.name, with_kinds_of_starts(region, CONVEX_KINDS))
+
+
+def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
+    """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
+    start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
+    centres = start.sample(HOT_SPOTS, seed=seed, radius=0.3)
+    peaks = tuple(
+        Gaussian((round(float(x), 2), round(float(y), 2)), weight=20.0, sigma=1.0) for x, y in centres
+    )
+    return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
+
+
+def with_kinds_of_starts(environment: Environment, kinds: Iterable[str] = KINDS) -> Environment:
+    """Return the map with the study's starts in place of its own; StartError where no disc fits."""
+    return replace(environment, starts={kind: _start(environment, kind) for kind in kinds})
+
+
+def _start(environment: Environment, kind: str) -> StartSpec:
+    if kind == "uniform":
+        return UniformStart()
+    low_x, low_y, high_x, high_y = environment.region.bounds
+    wanted = ((low_x + high_x) / 2, (low_y + high_y) / 2) if kind == "centre" else (low_x, low_y)
+    for radius in (TIGHT,) if kind == "tight" else RADII:
+        room = environment.free.geoms[0].buffer(-radius)
+        if not room.is_empty:
+            nearest = shapely.shortest_line(room, shapely.Point(wanted)).coords[0]
+            # whole centimetres are the same on every processor
+            return DiscStart((round(nearest[0], 2), round(nearest[1], 2)), radius)
+    raise StartError(f"map {environment.name!r}: no free disc of {RADII[-1]:g} m radius")
+
+
 @cache
 def generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
     """Return non-convex maps drawn by chance, with the study's starts."""
-    return tuple(map(maps.generated, seeds))
+    return tuple(map(generated, seeds))
 
 
 @cache
 def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the non-convex maps on which the claims are tested."""
-    return (*map(maps.bundled, plan.bundled), *generated_maps(plan.generated))
+    return (*map(bundled, plan.bundled), *generated_maps(plan.generated))
 
 
 @cache
 def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the convex regions."""
-    bundled = (maps.bundled(name, maps.CONVEX_KINDS) for name in maps.CONVEX)
-    return (*bundled, *map(maps.convex_region, plan.convex_generated))
+    known = (bundled(name, CONVEX_KINDS) for name in CONVEX)
+    return (*known, *map(convex_region, plan.convex_generated))
 
 
 def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
@@ -103,7 +183,7 @@ def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 def density_maps(plan: Plan) -> tuple[StudyMap, ...]:
     """Return the small maps with a density."""
-    return tuple(map(maps.with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
+    return tuple(map(with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
 
 
 def contest(
@@ -147,12 +227,12 @@ def gains_study(plan: Plan) -> Study:
 def convex_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
     """Return all but RPF in convex regions."""
     part = [each for each in contenders if each.controller != "rpf"]
-    return contest(plan, convex_maps(plan), part, maps.CONVEX_KINDS, plan.convex_seeds)
+    return contest(plan, convex_maps(plan), part, CONVEX_KINDS, plan.convex_seeds)
 
 
 def claims_contest(plan: Plan, contenders: Sequence[Contender]) -> Contest:
     """Return all of the paper's contenders on non-convex maps."""
-    return contest(plan, claim_maps(plan), contenders, maps.KINDS, plan.seeds)
+    return contest(plan, claim_maps(plan), contenders, KINDS, plan.seeds)
 
 
 def baseline_gains_study(plan: Plan) -> Study | None:
@@ -226,7 +306,7 @@ def probes(plan: Plan, *, beyond: bool) -> list[Study]:
     on, short = "blocks-a", replace(plan, duration=min(plan.beyond.probe, plan.duration))
     papers = (RAPF_SHARED, RPF_SHARED, LLOYD)
     others = (*laws.baselines({}), *OWN) if beyond else ()
-    shorts = [contest(short, (maps.bundled(on),), (each,), ("corner",), (0,)).study for each in others]
+    shorts = [contest(short, (bundled(on),), (each,), ("corner",), (0,)).study for each in others]
     return [contest(plan, (StudyMap(on, load_map(on)),), papers, ("paper",), (0,)).study, *shorts]
 
 

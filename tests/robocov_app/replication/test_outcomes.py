@@ -14,7 +14,7 @@ from robocov.controllers import gain_values, make_controller
 from robocov.errors import RobocovError
 from robocov.mapfile import load_map
 from robocov.metrics import CostHistory
-from robocov_app.replication import maps, results, studies
+from robocov_app.replication import results, studies
 from robocov_app.replication.contenders import LLOYD, RAPF_SHARED, RPF_SHARED, of_paper
 from robocov_app.replication.evidence import gains_text
 from robocov_app.replication.outcomes import (
@@ -39,7 +39,7 @@ CONTENDERS = (RAPF_SHARED, SAME, RPF_SHARED, LLOYD)
 @pytest.fixture(scope="module")
 def study():
     plan = replace(TINY, duration=1.0)
-    return studies.contest(plan, (maps.bundled("blocks-a"),), CONTENDERS, ("corner", "uniform"), (0, 1))
+    return studies.contest(plan, (studies.bundled("blocks-a"),), CONTENDERS, ("corner", "uniform"), (0, 1))
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from robocov.controllers import CONTROLLERS, gain_values, gains_of, make_control
 from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonObstacle
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.replication import maps, studies
+from robocov_app.replication import studies
 from robocov_app.replication.contenders import (
     GRIDS,
     LLOYD,
@@ -23,7 +23,7 @@ from robocov_app.replication.contenders import (
     paper_contenders,
 )
 from robocov_app.replication.evidence import account_of
-from robocov_app.replication.plan import FULL, QUICK, TEAM
+from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM
 from robocov_app.replication.verdicts import LEAST_MAPS
 from robocov_app.sweep.study import TEAM as TEAM_PARAMETERS
 from robocov_app.sweep.study import tasks_of
@@ -40,10 +40,10 @@ both = pytest.mark.parametrize(
 
 
 class TestMaps:
-    @pytest.mark.parametrize("name", [*maps.NON_CONVEX, *maps.CONVEX])
+    @pytest.mark.parametrize("name", [*NON_CONVEX, *CONVEX])
     def test_every_kind_of_start_has_room_on_every_map(self, name):
-        environment = maps.bundled(name, maps.CONVEX_KINDS).environment
-        assert tuple(environment.starts) == maps.CONVEX_KINDS
+        environment = studies.bundled(name, CONVEX_KINDS).environment
+        assert tuple(environment.starts) == CONVEX_KINDS
         for kind, spec in environment.starts.items():
             assert environment.start(kind).sample(6, seed=1).shape == (6, 2)
             if isinstance(spec, DiscStart):
@@ -51,13 +51,13 @@ class TestMaps:
 
     def test_they_are_all_but_three_of_those_that_are_not_convex(self):
         convex = {name for name in bundled_maps() if load_map(name).blocked.is_empty}
-        assert convex == set(maps.CONVEX)
-        assert set(bundled_maps()) - convex - set(maps.NON_CONVEX) == {"campus", "forklifts", "hospital"}
+        assert convex == set(CONVEX)
+        assert set(bundled_maps()) - convex - set(NON_CONVEX) == {"campus", "forklifts", "hospital"}
 
     def test_clustered_starts_are_as_near_as_can_be(self):
         ring = ((0, 0), (8, 0), (8, 6), (0, 6))
         pillar = Environment("pillar", ring, (CircleObstacle((4.0, 3.0), 1.0),))
-        starts = maps.with_kinds_of_starts(pillar).starts
+        starts = studies.with_kinds_of_starts(pillar).starts
         assert starts["corner"] == DiscStart((0.8, 0.8), 0.8)
         centre = starts["centre"]
         assert isinstance(centre, DiscStart)
@@ -66,30 +66,30 @@ class TestMaps:
     def test_narrow_maps_get_smaller_discs_and_too_narrow_ones_none(self):
         for width, radius in ((1.3, 0.6), (1.0, 0.45)):
             alley = Environment("alley", ((0, 0), (9, 0), (9, width), (0, width)))
-            spec = maps.with_kinds_of_starts(alley).starts["corner"]
+            spec = studies.with_kinds_of_starts(alley).starts["corner"]
             assert isinstance(spec, DiscStart)
             assert spec.radius == radius
         block = PolygonObstacle(((0.5, 0.5), (8.5, 0.5), (8.5, 8.5), (0.5, 8.5)))
         ring = Environment("ring", ((0, 0), (9, 0), (9, 9), (0, 9)), (block,))
         with pytest.raises(StartError, match=r"map 'ring': no free disc of 0\.45 m radius"):
-            maps.with_kinds_of_starts(ring)
+            studies.with_kinds_of_starts(ring)
 
     @pytest.mark.parametrize("seed", range(6))
     def test_convex_regions_are_convex_large_and_the_same_every_time(self, seed):
-        region = maps.convex_region(seed).environment
+        region = studies.convex_region(seed).environment
         polygon = region.boundary_polygon
         assert polygon.is_valid and polygon.equals(polygon.convex_hull)
         assert polygon.area >= 40.0 and region.blocked.is_empty
-        assert region == maps.convex_region(seed).environment
-        assert region.boundary != maps.convex_region(seed + 1).environment.boundary
+        assert region == studies.convex_region(seed).environment
+        assert region.boundary != studies.convex_region(seed + 1).environment.boundary
         assert not polygon.buffer(-1.8).is_empty  # no strip
 
     @pytest.mark.parametrize("seed", [1, 2, 3, pytest.param(101, marks=pytest.mark.slow)])
     def test_generated_maps_are_as_they_are_described(self, seed):
-        each = maps.generated(seed)
+        each = studies.generated(seed)
         environment = each.environment
-        assert environment == maps.generated(seed).environment and each.name == f"generated-{seed}"
-        assert tuple(environment.starts) == maps.KINDS
+        assert environment == studies.generated(seed).environment and each.name == f"generated-{seed}"
+        assert tuple(environment.starts) == KINDS
         assert 4 <= len(environment.obstacles) <= 8
         assert 0.155 <= 1.0 - environment.free_area / environment.area <= 0.255
         assert len(environment.free.geoms) == 1
@@ -137,7 +137,7 @@ class TestPaper:
     def test_the_full_study_is_as_large_as_it_is_said_to_be(self):
         assert len(studies.claim_maps(FULL)) == 33 and len(studies.convex_maps(FULL)) == 8
         study = studies.claims_contest(FULL, PAPERS).study
-        assert study.starts == maps.KINDS
+        assert study.starts == KINDS
         assert len(study) == 33 * 3 * 4 * 6
         assert len(studies.gains_study(FULL)) == 6 * 3 * (20 + 80)
 
@@ -269,7 +269,7 @@ class TestBeyond:
         tested = {each.environment.obstacles for each in studies.claim_maps(FULL)}
         assert not tested & {each.environment.obstacles for each in study.maps}
         assert set(FULL.beyond.tuning) <= set(FULL.tuning)
-        assert (study.seeds, study.starts) == ((FULL.tuning_seed,), maps.KINDS)
+        assert (study.seeds, study.starts) == ((FULL.tuning_seed,), KINDS)
         assert studies.baseline_gains_study(QUICK) is None
 
     def test_a_baseline_has_its_best_gains(self):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.svg import Strip, interval_bar, strips
+from robocov_app.replication.pages import Strip, interval_bar, strips
 from robocov_app.replication.verdicts import Criterion, amount
 
 gaps = st.dictionaries(

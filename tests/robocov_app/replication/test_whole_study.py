@@ -23,14 +23,14 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.replication import beyond_claims, claims, pages, results, running, step_times, studies
+from robocov_app.replication import beyond_claims, claims, pages, results, step_times, studies
 from robocov_app.replication import plan as planned
 from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
 from robocov_app.replication.figures import arrival, describe_figure
 from robocov_app.replication.pages import Image
 from robocov_app.replication.plots import WORDS, beyond_plots, gap_samples
-from robocov_app.replication.running import Interrupted, forecast, open_folder
+from robocov_app.replication.results import Interrupted, forecast, open_folder
 from robocov_app.replication.verdicts import amount
 from robocov_app.sweep.study import Study, tasks_of
 
@@ -195,7 +195,7 @@ class TestRuns:
         }
         both = {"one": Study(controllers=("rpf",), **common)}
         both["two"] = Study(controllers=("rpf", "lloyd"), **common)
-        running.run_together(both, tmp_path, options(), "x")
+        results.run_together(both, tmp_path, options(), "x")
         tables = [read_results(tmp_path / "studies" / name).to_table() for name in both]
         assert [len(table) for table in tables] == [2, 4]
         finals = [
@@ -335,7 +335,7 @@ class TestStopping:
         with pytest.raises(Interrupted):
             results.run_paper(tmp_path / "out", TINY, stopped)
         with pytest.raises(Interrupted):
-            running.run_together(studies.conditions_studies(TINY), tmp_path, stopped, "x")
+            results.run_together(studies.conditions_studies(TINY), tmp_path, stopped, "x")
         assert not list(tmp_path.glob("studies/*/runs/*"))
         with pytest.raises(Interrupted):
             results.time_steps(tmp_path, TINY, stopped)
