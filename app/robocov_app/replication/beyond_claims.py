@@ -203,10 +203,7 @@ def _highest_text(values: Mapping[str, float], bound: float) -> str:
 
 
 def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> Claim | None:
-    """Return whether the first goals hold on maps that played no part in the development; None without any.
-
-    `outcomes` are those on these maps.
-    """
+    """Return whether the first goals hold for `outcomes` on maps that played no part in the development."""
     key, label = ours.key, ours.label
     fine = outcomes.measured("gap", key)
     if not fine.scenarios:
@@ -365,10 +362,7 @@ def capitalised(words: str) -> str:
 
 
 def worst_median(values: Array, maps: Sequence[str]) -> Interval:
-    """Return the highest median of a map, with a bootstrap interval that draws runs within each map.
-
-    It speaks of these maps: drawing maps would only leave the worst one out now and then.
-    """
+    """Return the highest median of a map, with an interval of these maps: runs are drawn within each map."""
     return _highest(lambda rows: np.median(values[rows], axis=-1), maps)
 
 

@@ -139,10 +139,7 @@ def distinct_gains(contenders: Sequence[Contender]) -> dict[str, list[dict[str, 
 
 
 def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
-    """Return gains of the potential: "(k_rep 1, rho_0 2)"; `no_limit` stands for an unlimited attraction.
-
-    Gains that are words are left out, and what goes with them: no contender of the paper's claims has others.
-    """
+    """Return gains of the potential, numbers all: "(k_rep 1, rho_0 2)"; `no_limit`: unlimited attraction."""
     parts = []
     for name, value in gains.items():
         if isinstance(value, str) or name == "height":

@@ -174,10 +174,7 @@ def worst_text(outcomes: Outcomes, scenario: Scenario, law: str, others: Mapping
 
 
 def gains_text(controller: str, grid: GainOutcomes) -> str:
-    """Return in words which of a baseline's gains are best, and how its defaults and the worst set compare.
-
-    Ratios are medians over the runs, pair by pair, in those scenarios in which no set failed.
-    """
+    """Return in words which gains of a baseline are best, and how its defaults and the worst set compare."""
     grid = grid.complete
     if not grid.scenarios:
         return "Gains: its defaults; in every scenario of the tuning some run failed."

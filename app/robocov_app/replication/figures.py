@@ -1,6 +1,5 @@
 """The paper's figures 1 to 8 on environments of the same kinds, ready for print, and what they show in words.
 
-Seven inches wide (two columns of a journal) at 300 dots an inch, texts in the sizes they are read at.
 Starts are green, final positions blue, trajectories red; RAPF's cost is blue, RPF's red, as in the paper.
 """
 
@@ -54,11 +53,7 @@ COSTS = (3, 5, 7)  # figures of the cost against time; all but the first of the 
 
 
 def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme: Theme | str) -> Figure:
-    """Draw one of the paper's figures 1 to 8.
-
-    `runs` are ``convex/rapf``, ``convex/lloyd``, and of ``a``, ``b`` and ``other`` those of ``rapf`` and
-    ``rpf``; the first moment of `first` is figure 1.
-    """
+    """Draw a figure of the paper: of `runs` by "case/controller", figure 1 the first moment of `first`."""
     theme = theme_named(theme)
     if number == 1:
         return partition_figure(first, theme)
@@ -123,10 +118,7 @@ def side_by_side(
     theme: Theme,
     unnamed: Sequence[str] = (),
 ) -> Figure:
-    """Draw runs on one map side by side, each with its title and its final cost above.
-
-    Entries of the legend that are `unnamed` are left out.
-    """
+    """Draw runs on one map side by side, titles and final costs above; the legend leaves `unnamed` out."""
     with plain_style():
         handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
         handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]

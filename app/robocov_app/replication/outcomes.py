@@ -142,11 +142,7 @@ class Comparison:
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
-    """Return the outcomes of several sweeps together; a contender has nan where it did not take part.
-
-    Scenarios keep the order in which they are first met. Where several parts have a contender in the same
-    scenario, the last one counts.
-    """
+    """Return the outcomes of several sweeps, nan where a contender took no part; of two, the last counts."""
     scenarios = tuple(dict.fromkeys(scenario for part in parts for scenario in part.scenarios))
     place = {scenario: k for k, scenario in enumerate(scenarios)}
     values: dict[tuple[str, str], Array] = {}
@@ -191,10 +187,7 @@ class GainOutcomes:
         return GainOutcomes(kept, self.gains, self.excess[:, np.array(chosen, dtype=bool)])
 
     def best(self, columns: Sequence[int] | None = None) -> int:
-        """Return the number of the gains whose mean of J/J_ref is least, over all scenarios or some.
-
-        Scenarios in which any run failed do not count. Of gains that are equally good the first is taken.
-        """
+        """Return the number of the gains whose mean of J/J_ref is least where no run failed."""
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 
@@ -210,10 +203,7 @@ def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Valu
 
 
 def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Reference]) -> Outcomes:
-    """Return what the contenders of a sweep reached; without a reference there is no gap on a map.
-
-    Raises InputError when the results cannot be read.
-    """
+    """Return what the contenders of a sweep reached; without a reference there is no gap on a map."""
     results, scenarios = read_results(folder), scenarios_of(contest.study)
     laws = {each.key: _law(each.controller, each.all_gains) for each in contest.contenders}
     measures = (*COLUMNS, "early", "first_minute", "gap")
@@ -238,10 +228,7 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
 def read_gain_outcomes(
     folder: Path, study: Study, references: Mapping[str, Reference]
 ) -> dict[str, GainOutcomes]:
-    """Return what each controller of a sweep reached with every set of its gains.
-
-    Raises InputError when the results cannot be read.
-    """
+    """Return what each controller of a sweep reached with every set of its gains."""
     scenarios = scenarios_of(study)
     choices = {name: study.gains_of(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
@@ -265,10 +252,7 @@ def scenarios_of(study: Study) -> tuple[Scenario, ...]:
 
 
 def mean_until(history: CostHistory, until: float) -> float:
-    """Return the mean distance averaged over the time up to `until`, s, by the trapezoidal rule; m.
-
-    A run that ends before is averaged over all of it.
-    """
+    """Return the mean distance, m, averaged by trapezoids over the time up to `until`, s, or the end."""
     end = min(until, float(history.time[-1]))
     inside = history.time < end
     time = np.append(history.time[inside], end)
@@ -279,11 +263,7 @@ def mean_until(history: CostHistory, until: float) -> float:
 
 
 def matched_distance(first: Array, second: Array) -> float:
-    """Return the mean distance, m, between the robots of two placements (n, 2), matched as well as can be.
-
-    Robots are alike: each place of one is assigned to one of the other with the least sum of straight
-    distances.
-    """
+    """Return the mean distance, m, of robots of two placements (n, 2), matched so that its sum is least."""
     from scipy.optimize import linear_sum_assignment
 
     apart = np.hypot(*(first[:, None] - second[None]).transpose(2, 0, 1))
@@ -291,10 +271,7 @@ def matched_distance(first: Array, second: Array) -> float:
 
 
 def spread_of_placements(placements: Array, starts: Sequence[str]) -> float:
-    """Return the median matched distance between the ends (m, n, 2) of runs on one map from different starts.
-
-    Runs with nan do not count; nan where there is no pair.
-    """
+    """Return the median matched distance of finite ends (m, n, 2) from different starts; nan without any."""
     fine = np.flatnonzero(np.isfinite(placements).all(axis=(1, 2))).tolist()
     pairs = [
         matched_distance(placements[i], placements[k])

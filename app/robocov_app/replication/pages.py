@@ -84,10 +84,7 @@ def save_claims(folder: Path, found: Sequence[Claim]) -> None:
 def save_paper_figures(
     folder: Path, runs: Mapping[str, FigureRun], first: Record, results: PaperResults | None, *, quiet: bool
 ) -> dict[str, Image]:
-    """Write the paper's figures to ``figures/``, and the plots of the claims; may raise OutputError.
-
-    The first moment of `first` is figure 1; without `results` there are no claims.
-    """
+    """Write the paper's figures to ``figures/``, and the plots of the claims, without `results` none."""
 
     def drawn(theme: str) -> Mapping[str, Callable[[], Figure]]:
         figures = {f"figure-{number}": partial(draw_figure, number, runs, first, theme) for number in FIGURES}
@@ -343,10 +340,7 @@ class Strip(NamedTuple):
 
 
 def strips(rows: Sequence[Strip], highest: float) -> Markup:
-    """Return an SVG element: a dot for each map that says which it is, on an axis of square roots.
-
-    `highest` is the largest gap of all pictures that are to be compared.
-    """
+    """Return an SVG element: a dot for each map, on an axis of square roots up to the `highest` of all."""
     rows = [row for row in rows if row.maps]
     if not rows:
         return Markup("")

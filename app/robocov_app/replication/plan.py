@@ -35,11 +35,7 @@ TEAM: Mapping[str, Any] = {"radius": 0.1, "max_speed": 1.0, "max_acceleration": 
 
 @dataclass(frozen=True)
 class BeyondPlan:
-    """How much is run beyond the paper; by default that of the full study.
-
-    There, baselines begin on every map and from every kind of start of the claims, once; our own as often as
-    RAPF.
-    """
+    """How much is run beyond the paper; by default that of the full study, ours as often as RAPF."""
 
     # of baselines and ours: bundled maps, seeds of generated ones, kinds and seeds of starts, of the claims'
     bundled: tuple[str, ...] = NON_CONVEX

@@ -1,7 +1,4 @@
-"""The plots beside the claims, and the figures beyond the paper, made of the plots of reports.
-
-Each is drawn by a function of nothing, so that only those are drawn that are wanted.
-"""
+"""Plots beside the claims, and figures beyond the paper: functions of nothing, that draw what is wanted."""
 
 from __future__ import annotations
 

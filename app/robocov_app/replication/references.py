@@ -79,11 +79,7 @@ def find_references(
     robots: int = ROBOTS,
     radius: float = TEAM["radius"],
 ) -> dict[str, Reference]:
-    """Return the reference of every map by its name: as kept in a file of `folder`, else searched for.
-
-    `stop` is asked now and then; what is there by then is returned. Raises OutputError when a file cannot be
-    written, or a process ends in the midst of a search.
-    """
+    """Return the reference of every map by its name, kept in `folder` or searched for until `stop`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

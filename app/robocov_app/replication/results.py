@@ -147,11 +147,7 @@ class BeyondResults:
 
 
 def open_folder(folder: Path, plan: Plan) -> None:
-    """Make the folder of a study, or make sure that it is that of the same study.
-
-    Raises InputError when it holds something else, or the other one of the quick and the full study;
-    OutputError when it cannot be made or written to.
-    """
+    """Make the folder of a study, or make sure that it is that of the same study, quick or full."""
     mark = folder / MARK
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -176,10 +172,7 @@ def open_folder(folder: Path, plan: Plan) -> None:
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
-    """Do the runs of a sweep that are not done yet, in ``studies/`` under its name; return that folder.
-
-    Raises Interrupted after Ctrl-C, and otherwise as `robocov_app.sweep.sweeping.sweep`.
-    """
+    """Do the runs of a sweep that are left, in ``studies/`` under its name; return that folder."""
     target = folder / "studies" / name
     try:
         target.parent.mkdir(exist_ok=True)
@@ -203,9 +196,8 @@ def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> 
 def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptions, title: str) -> None:
     """Do the runs of several sweeps, each in ``studies/`` under its name, with one pool of processes.
 
-    Most sweeps are so small that starting processes would take longer than they do. What came of a run stands
-    in the folder of its sweep, as if each had been done alone, and each then writes its table. Raises as
-    `run_study`.
+    Most are so small that starting processes would take longer than they do. What came of a run stands in the
+    folder of its sweep, as if each had been done alone, and each then writes its table.
     """
     if options.scheduler is None:
         (folder / "studies").mkdir(parents=True, exist_ok=True)
@@ -259,10 +251,7 @@ def _fill(
 def references_of(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
 ) -> dict[str, Reference]:
-    """Return the centralised reference of every map by its name, searched for where it is not there yet.
-
-    Raises Interrupted after Ctrl-C, and OutputError as `find_references`.
-    """
+    """Return the centralised reference of every map by its name, searched for where it is not there yet."""
     at, workers, quiet = folder / "references", options.workers, options.quiet
     found = find_references(maps, at, plan, workers=workers, quiet=quiet, stop=options.stop)
     if options.stop.requested:
@@ -271,11 +260,7 @@ def references_of(
 
 
 def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bool) -> Forecast:
-    """Return how many runs there are, and how long those that are left will take, by probes.
-
-    `claims` and `beyond`: whether the paper's claims are tested, and what goes beyond it is done. The time
-    for references, for timing steps and for the pages is not in it.
-    """
+    """Return how many runs there are, and by probes how long those that are left will take."""
     sweeps = studies.figure_studies(plan)
     papers = expected_contenders(plan) if claims or (beyond and grid_is_done(folder, plan)) else UNTUNED
     if claims:
@@ -325,10 +310,7 @@ def grid_is_done(folder: Path, plan: Plan) -> bool:
 
 
 def runs_there(folder: Path, name: str, study: Study | None = None) -> int:
-    """Return how many runs are there under the name of a sweep, whether its table is written or not.
-
-    Of a `study` that is given only its own: runs of a former one, of an older version say, may lie beside.
-    """
+    """Return how many runs of a sweep are there, with or without a table; of a `study` its own alone."""
     there = {each.name for each in (folder / "studies" / name / "runs").glob("[!.]*")}
     return len(there if study is None else there.intersection(task.name for task in tasks_of(study)))
 
@@ -361,10 +343,7 @@ def _figure_runs(folder: Path) -> Iterator[tuple[dict[str, Any], FigureRun]]:
 
 
 def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
-    """Do all runs of the paper's claims that are not done yet, and read what came of them.
-
-    Raises as `run_study`.
-    """
+    """Do all runs of the paper's claims that are not done yet, and read what came of them."""
     figures = run_figures(folder, plan, options)
     gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
     papers = paper_contenders(best_gains(gains))
@@ -389,7 +368,7 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     """Do all runs beyond the paper that are not done yet, and read what came of them.
 
     Without the paper's own part the paper's controllers are run here, with their best gains if the grids of
-    gains have been run before. Raises as `run_study`.
+    gains have been run before.
     """
     known: dict[str, Reference] = {}
     if paper is not None:
@@ -444,10 +423,7 @@ def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
 
 
 def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:
-    """Return how long the steps of every registered controller take beside RAPF's.
-
-    Raises Interrupted after Ctrl-C, and OutputError when they cannot be kept.
-    """
+    """Return how long the steps of every registered controller take beside RAPF's."""
     everybody = tuple(CONTROLLERS)
     wanted = {ROBOTS: everybody, plan.beyond.large: everybody, plan.beyond.huge: OURS[:1]}
     found = step_times(folder, wanted, plan, stopped=lambda: options.stop.requested)
@@ -500,10 +476,7 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
 def _finals(
     folder: Path, column: str = "", only: float | None = None
 ) -> dict[tuple[str, float | None], dict[tuple[str, int], float]]:
-    """Return the final costs by map and seed, for each controller and value of a column.
-
-    A table has no column of what has one value: that is the `only` one.
-    """
+    """Return final costs by map and seed, by controller and value of a column, `only` if there is none."""
     found: dict[tuple[str, float | None], dict[tuple[str, int], float]] = {}
     for row in read_results(folder).to_table().to_pylist():
         if row["mean_distance_m"] is not None:

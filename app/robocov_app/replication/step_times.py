@@ -69,8 +69,7 @@ def step_times(
 
     Times that were kept are those of the machine that measured them. `stopped` is asked between two blocks;
     what is whole by then is returned. `clock` returns seconds; by default those that this process computes,
-    where the system counts them finely: what else is going on then hardly matters. Raises OutputError when
-    the file cannot be written.
+    where the system counts them finely: what else is going on then hardly matters.
     """
     found = {}
     path = folder / FILE

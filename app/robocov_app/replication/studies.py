@@ -249,8 +249,7 @@ def beyond_contests(
 ) -> dict[str, Contest]:
     """Return the sweeps of contenders beyond the paper, but for that of the baselines' gains.
 
-    Baselines have their `best` gains or their defaults. Beside ours on unseen maps are the strongest of the
-    paper's.
+    Baselines have their `best` gains or their defaults; beside ours on unseen maps are the paper's strongest.
     """
     beyond, starts, on = plan.beyond, plan.beyond.map_starts, generated_maps(plan.beyond.maps)
     found = {

@@ -1,7 +1,4 @@
-"""Small pictures of maps and runs as SVG without a script: they print, and stand where no script may run.
-
-Colours are CSS variables (`robocov_app.report.theme_css`): one picture suits light and dark.
-"""
+"""Small pictures of maps and runs as SVG without a script, in CSS variables: for light, dark and paper."""
 
 from __future__ import annotations
 

@@ -78,7 +78,6 @@ def embedded_map(environment: Environment) -> dict[str, Any]:
 
     Where not every place counts the same there is also the address of a picture of the ``density``. Obstacles
     that move are apart, in ``movers``: each with its rings, the line of one turn and its speed in m/s.
-
     Coordinates are whole numbers of ``unit`` metres, a millimetre or, for tiny maps, less.
     """
     low_x, low_y, high_x, high_y = environment.region.bounds
@@ -218,12 +217,11 @@ def _cost(history: CostHistory | None, begin: float, times: Array, step: float) 
 def replay_html(
     runs: Sequence[ReplayRun], *, standalone: bool, panes: Sequence[int] | None = None, budget: int = BUDGET
 ) -> str:
-    """Return runs as HTML in which they can be watched side by side.
+    """Return runs as HTML in which they can be watched side by side, those of `panes` at first.
 
     It asks for no network, defines no global name and has no ids: several may stand on one page. Where
     scripts do not run (and on paper) it shows pictures of the last moments. `standalone`: a whole page; else
-    a fragment with its own style and script, for a notebook. `panes`: the runs to be shown at first.
-    `budget`: bytes that the runs may take; beyond, they hold fewer moments a second.
+    a fragment with its own style and script, for a notebook.
     """
     content = replay_part(runs, panes, budget)
     style = theme_rules(".robocov-replay") + replay_css()

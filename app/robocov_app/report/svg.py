@@ -1,8 +1,4 @@
-"""matplotlib's figures as SVG that is a part of a page: small, with text as text, in the page's colours.
-
-A figure is drawn once, in the colours of the light theme. Every colour then becomes the variable of its
-name, so that the picture follows the page from light to dark.
-"""
+"""matplotlib's figures as small SVG in a page, text as text: colours of the light theme become variables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """The project's colours as CSS variables, for pages that follow the reader's preference.
 
-Every colour has one name in both themes: what is drawn with names is drawn once and is right in light
-and dark. Names begin with ``--rc-``, so that they meet no others in a notebook.
+Every colour has one name in both themes: what is drawn with names is right in light and dark.
 """
 
 from __future__ import annotations
@@ -49,11 +48,7 @@ def variables(theme: Theme) -> str:
 
 
 def theme_rules(scope: str, theme: str = "auto") -> str:
-    """Return CSS that gives the elements of `scope` their colours.
-
-    `scope`: a selector. `theme`: "auto" follows the reader: what a notebook says of itself, else what the
-    browser prefers. Paper is always white. Raises ParameterError when there is no such theme.
-    """
+    """Return CSS that gives a selector its colours; "auto" follows notebook or browser, paper is white."""
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":
         from robocov_app.render.theme import theme_named
