@@ -20,10 +20,15 @@ from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
 FINEST_CELL, MOST_CELLS = 0.1, 250_000  # side of a cell of the maps, m, larger where a region is very large
-TEAM_NODES, OWN_NODES, CROWD_NODES = 1000, 2500, 350  # of the lattices: for the team, for itself, in a crowd
+TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself
 MAX_PLANNING_GROUP = 8  # a robot plans for itself and up to so many less one that it hears
 STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
 
+_AROUND, _LEAST = 2.0, 1.0  # a group is planned for in a window so many times as far as it is, and that, m
+_MISSED, _IN_RANGE = (
+    5.0,
+    0.8,
+)  # who is not heard for so many seconds where it would be, to so much of the range
 _HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
 _ARRIVED, _TURN = 0.35, 0.2  # metres from a place, or a way-point, at which it counts as reached
 _BRAKING = 0.4  # part of the acceleration that is counted on: less than half, for the lag of the drive
@@ -37,21 +42,28 @@ _STAGGERED = 0.5  # part of the period in which all robots make their first plan
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
-class RestTracker(NamedTuple):
-    """Since when (s) each of some (k,) robots has been at (k, 2) m, to within `STILL_WITHIN`."""
+class Teammates(NamedTuple):
+    """What a robot knows of (k,) others."""
 
-    robots: IntArray
-    places: Array
-    since: Array
+    robots: IntArray  # their numbers, ascending
+    at: Array  # where they are, or are presumed to be, (k, 2) m
+    heard: Array  # when they were last heard, s,
+    away: Array  # and how far away that was, m
+    since: Array  # since when they have been, to within `STILL_WITHIN`, s,
+    places: Array  # at (k, 2) m
 
-    def updated(self, robots: IntArray, places: Array, time: float) -> RestTracker:
-        """Return the tracker after one more look."""
-        at, since = places.copy(), np.full(len(robots), time)
-        _, here, there = np.intersect1d(robots, self.robots, assume_unique=True, return_indices=True)
-        still = np.sqrt(((places[here] - self.places[there]) ** 2).sum(axis=1)) < STILL_WITHIN
+    def updated(self, robots: IntArray, at: Array, place: Array, time: float, gone: BoolArray) -> Teammates:
+        """Return it after one more look at some from a place; of the rest, the `gone` are left out."""
+        kept, new = ~(np.isin(self.robots, robots) | gone), np.full(len(robots), time)
+        seen = Teammates(robots, at, new, np.sqrt(((at - place) ** 2).sum(axis=1)), new, at)
+        both = [np.concatenate([mine, theirs[kept]]) for mine, theirs in zip(seen, self, strict=True)]
+        order = np.argsort(both[0])
+        later = Teammates(*(each[order] for each in both))
+        _, here, there = np.intersect1d(later.robots, self.robots, assume_unique=True, return_indices=True)
+        still = np.sqrt(((later.at[here] - self.places[there]) ** 2).sum(axis=1)) < STILL_WITHIN
         here, there = here[still], there[still]
-        at[here], since[here] = self.places[there], self.since[there]
-        return RestTracker(robots, at, since)
+        later.places[here], later.since[here] = self.places[there], self.since[there]
+        return later
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +72,8 @@ class PlannerState:
 
     known: DiscoveredMap
     due: float  # when it plans next, s
-    tracker: RestTracker
+    others: Teammates
+    met: frozenset[int] = frozenset()  # the robots that it has ever heard, but for those that failed
     since: float = 0.0  # when it began, or the robots that it hears became others, s
     planned: DiscoveredMap | None = None  # the map when the last plan was made,
     ways: GridPlanner | None = None  # and what was computed of it
@@ -101,8 +114,9 @@ class Atlas(Law):
     """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
 
     Twice a second every robot scans, and enters what it sees into its own grid (`DiscoveredMap`). It also
-    watches where the robots that it hears are; nothing but positions is ever told. Once in `period` seconds
-    it looks for places P with a low coverage cost (22) on its own map,
+    watches where the robots that it hears are; nothing but positions is ever told. Who gets out of range is
+    presumed to come to its place in the plan, and forgotten when it is missed there. Once in `period` seconds
+    a robot looks for places P with a low coverage cost (22) on its own map,
 
         J(P) = sum over q of w_q min_j d(q, p_j),
 
@@ -121,10 +135,10 @@ class Atlas(Law):
        stake is more than the part `stake` of J; that doubles for each `patience` seconds of looking.
     4. *The way* is the shortest on its map, braking before walls and other robots (`driving`).
 
-    What a relocation or a goal must save doubles every `settling` seconds until the team changes. Private
+    What a relocation or a goal must save doubles every `settling` seconds until robots join or fail. Private
     maps agree ever more where it matters, and so do the plans; by 1 and by what doubles the team comes to
-    rest also where they do not. Where `MAX_PLANNING_GROUP` robots or more are heard, 1 is left out: each
-    only considers its nearest ones, as they are, and looks for its own place.
+    rest also where they do not. Of more than `MAX_PLANNING_GROUP` robots each plans for itself and its
+    nearest ones, in the part of the map where these are; the others are where they are.
     """
 
     name = "atlas"
@@ -150,7 +164,8 @@ class Atlas(Law):
         low_x, low_y, high_x, high_y = region.bounds
         cell = max(FINEST_CELL, math.sqrt((high_x - low_x) * (high_y - low_y) / MOST_CELLS))
         empty = DiscoveredMap.nothing(Raster(region, cell))
-        nobody = RestTracker(np.empty(0, dtype=np.intp), np.empty((0, 2)), np.empty(0))
+        nowhere, never = np.empty((0, 2)), np.empty(0)
+        nobody = Teammates(np.empty(0, dtype=np.intp), nowhere, never, never, never, nowhere)
         # the robots do not all plan at the same moment
         first = [self.period * _STAGGERED * (i * _GOLDEN % 1.0) for i in range(len(team))]
         states = tuple(PlannerState(empty, due, nobody) for due in first)
@@ -184,72 +199,95 @@ class Atlas(Law):
     ) -> tuple[PlannerState, Array | None]:
         """Return what robot i remembers after its plan, and where to go; None for where it goes already."""
         place, raster, fastest = seen.positions[i], state.known.raster, float(team.max_speed[i])
-        others, at = seen.neighbours.of(i), seen.neighbour_positions(i)
-        tracker = state.tracker.updated(others, at, seen.time)
-        still = seen.time - tracker.since >= STILL_FOR
+        known, met = self._teammates(seen, team, state, i)
+        others, at = known.robots, known.at
+        still = (seen.time - known.since >= STILL_FOR) | (known.heard < seen.time)
         quiet = bool(still.all())
-        crowd = len(others) >= MAX_PLANNING_GROUP
-        reach = math.inf
-        if crowd:
-            away = np.sqrt(((at - place) ** 2).sum(axis=1))
-            near = np.sort(np.argsort(away, kind="stable")[: MAX_PLANNING_GROUP - 1])
-            others, at, reach = others[near], at[near], 1.1 * float(away[near].max())
-        window = Window.around(raster, place, reach, CROWD_NODES if crowd else OWN_NODES)
+        # those that it plans for come first
+        beyond = np.ones(len(at), dtype=bool)
+        beyond[np.argsort(((at - place) ** 2).sum(axis=1), kind="stable")[: MAX_PLANNING_GROUP - 1]] = False
+        order = np.argsort(beyond, kind="stable")
+        others, at, still = others[order], at[order], (still | beyond)[order]
+        window = Window.around(raster, place, math.inf, OWN_NODES)
         spacing = window.stride * raster.cell
         # nobody gets farther than to the next node meanwhile
         period = max(self.period, spacing / fastest)
         first = state.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
         # a team that has changed may have much to do again
-        changed = first or not np.array_equal(state.tracker.robots, tracker.robots)
+        changed = first or met != state.met
         since = seen.time if changed else state.since
         before = state
-        state = replace(state, due=due, tracker=tracker, since=since, quiet=quiet)
+        state = replace(state, due=due, others=known, met=met, since=since, quiet=quiet)
         situation, group = np.vstack([place, at]), np.concatenate([[i], others])
-        ways, same_window = state.ways, state.ways is not None and state.ways.window == window
-        same = same_window and before.idle and before.planned is before.known and before.quiet == quiet
+        same = before.idle and before.planned is before.known and before.quiet == quiet
         if same and before.group is not None and np.array_equal(before.group, group):
             assert before.situation is not None
             if np.abs(situation - before.situation).max() < _HARDLY * spacing:
                 return state, None
         state = replace(state, planned=state.known, situation=situation, group=group)
         blocked = window.cut(state.known.blocked, True)
-        if ways is None or not same_window or not np.array_equal(ways.blocked, blocked):
+        ways = state.ways
+        if ways is None or not np.array_equal(ways.blocked, blocked):
             ways = GridPlanner(raster, window, blocked, float(team.radius[i]) + self.clearance)
-            # nodes of another window have other numbers
-            state = replace(state, ways=ways, team_ways=None, node=state.node if same_window else -1)
+            state = replace(state, ways=ways, team_ways=None)
         demand = CoverageDemand(state.known, window, seen.density)
         settling = 2.0 ** min((seen.time - since) / self.settling, 60.0)
-        if crowd:
-            begin = ways.standing(place) if state.node < 0 else state.node
-        else:
-            together = seen.time - since <= _TOGETHER * seen.region.diameter / fastest
-            # afterwards each decides for itself alone
-            still = still if together else np.ones_like(still)
-            state, places = self._plan_for_all(state, seen, still, settling, together)
-            begin = ways.nearest(places[0])
-            at = np.where(still[:, None], at, places[1:])
+        together = seen.time - since <= _TOGETHER * seen.region.diameter / fastest
+        # afterwards each decides for itself alone
+        still = still if together else np.ones_like(still)
+        state, places = self._plan_for_all(state, seen, still, settling, together)
+        begin = ways.nearest(places[0])
+        at[~still] = places[1:][~still[: len(places) - 1]]
         if begin < 0:
             return replace(state, own=place, idle=False), place
         former = np.full(2, np.nan) if state.own is None else state.own
-        rest, steps = min(1.0, self.rest * settling), 3 if crowd else 6
-        own = own_place(ways, demand.weights, at, begin, former, rest, steps)
+        own = own_place(ways, demand.weights, at, begin, former, min(1.0, self.rest * settling))
         return self._looking(replace(state, own=own.goal, node=own.node), demand, own, place, period)
+
+    def _teammates(
+        self, seen: Observations, team: Team, state: PlannerState, i: int
+    ) -> tuple[Teammates, frozenset[int]]:
+        """Return what robot i knows of the others now, and whom it has met that has not failed.
+
+        Who falls silent and cannot have got out of range has failed. Others are presumed to be where they
+        were going, and are forgotten, not taken for failed, when they are not heard there.
+        """
+        known, hears, place = state.others, float(team.communication_range[i]), seen.positions[i]
+        robots, at = seen.neighbours.of(i), seen.neighbour_positions(i)
+        silence = np.where(np.isin(known.robots, robots), 0.0, seen.time - known.heard)
+        failed = (silence > 0.0) & (known.away + 2.0 * float(team.max_speed[i]) * silence < hears)
+        if state.places is not None:
+            _, here, there = np.intersect1d(known.robots, state.places[:, 0], return_indices=True)
+            known = known._replace(at=known.at.copy())
+            known.at[here] = state.places[there, 1:]
+        away = np.sqrt(((known.at - place) ** 2).sum(axis=1))
+        missed = (silence > _MISSED) & (away < _IN_RANGE * hears)
+        met = (state.met - {*known.robots[failed].tolist()}) | {*robots.tolist()}
+        return known.updated(robots, at, place, seen.time, failed | missed), met
 
     def _plan_for_all(
         self, state: PlannerState, seen: Observations, still: BoolArray, settling: float, together: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
-        known, situation, group, ways = state.known, state.situation, state.group, state.team_ways
-        assert state.ways is not None and situation is not None and group is not None
-        if ways is None:
-            window = Window.around(known.raster, situation[0], math.inf, TEAM_NODES)
+        known, ways = state.known, state.team_ways
+        assert state.ways is not None and state.situation is not None and state.group is not None
+        group, (now, others) = (
+            state.group[:MAX_PLANNING_GROUP],
+            np.split(state.situation, [MAX_PLANNING_GROUP]),
+        )
+        reach, most = math.inf, TEAM_NODES
+        if len(others):
+            away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
+            reach, most = max(_AROUND * away, _LEAST), GROUP_NODES
+        window = Window.around(known.raster, now[0], reach, most)
+        if ways is None or ways.window != window:
             blocked = window.cut(known.blocked, True)
             ways = GridPlanner(known.raster, window, blocked, state.ways.clearance)
         # who is there already does not leave for what may not be there
         weights = CoverageDemand(known, ways.window, seen.density, sure=not together).weights
-        fixed = np.concatenate([[False], still])
-        begin = situation.copy()
+        fixed = np.concatenate([[False], still])[: len(now)]
+        begin = now.copy()
         if state.places is not None:
             robots, places = state.places[:, 0].astype(np.intp), state.places[:, 1:]
             _, here, there = np.intersect1d(group, robots, return_indices=True)
@@ -258,7 +296,7 @@ class Atlas(Law):
         # who decides alone goes nowhere else while others do
         threshold = min(1.0, self.threshold * settling) if together or state.quiet else 1.0
         nearby = min(1.0, self.nearby * settling)
-        places = team_places(ways, weights, situation, begin, fixed, threshold, nearby)
+        places = team_places(ways, weights, now, begin, fixed, others, threshold, nearby)
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(

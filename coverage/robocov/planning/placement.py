@@ -26,6 +26,7 @@ from robocov.planning.discovered import BLOCKS, FREE, UNKNOWN, DiscoveredMap, op
 from robocov.planning.wayfinding import GridPlanner, Window
 
 _FAR = 1e9  # metres that stand for "nobody is there"
+_STEPS = 6  # of nodes that a plan moves an own place by, at most
 _SEEN_ENOUGH = 0.6  # metres around a place from where somebody has looked: it is not gone to again
 
 
@@ -98,16 +99,17 @@ class CoverageDemand:
 
 def team_places(
     ways: GridPlanner, weights: Array, now: Array, begin: Array,
-    fixed: BoolArray, threshold: float, nearby: float,
+    fixed: BoolArray, others: Array, threshold: float, nearby: float,
 ) -> Array:  # fmt: skip
     """Return where the robots of a team should be, (k, 2) m: a low sum of distances, by few relocations.
 
     From `begin` (k, 2) m on, the former plan, Lloyd's iteration in turn with interchange
     (`k_median.improved`). The robots are at `now`; the first one plans. Those that are `fixed`, (k,), never
-    the first, stay where `begin` says; where all others are, who plans then goes to the best place of its own
-    cell. What a relocation must save is the part `threshold` of the cost, one in the own cell the part
-    `nearby`. Who goes to which of the places is such that the sum of the squared ways is least: then the
-    choice stays the same while the robots are on their way, and their ways do not cross.
+    the first, stay where `begin` says, and `others`, (o, 2) m, where they are; where all but the first stay,
+    it goes to the best place of its own cell. What a relocation must save is the part `threshold` of the
+    cost, one in the own cell the part `nearby`. Who goes to which of the places is such that the sum of the
+    squared ways is least: then the choice stays the same while the robots are on their way, and their ways
+    do not cross.
     """
     home = ways.standing(now[0])
     if home < 0:
@@ -126,13 +128,17 @@ def team_places(
         away = ((nodes - begin[k]) ** 2).sum(axis=1)
         away[chosen[chosen >= 0]] = np.inf
         chosen[k] = away.argmin()
-    weighted = np.ascontiguousarray((distance[:, target] * weights[target]).T)
+    # all others are one more source, that stays
+    away = np.minimum(ways.from_places(others), _FAR)
+    weighted = np.ascontiguousarray((np.vstack([distance[:, target], away[target]]) * weights[target]).T)
     # in an order that does not depend on who plans: of two equal plans all take the same
-    order = np.lexsort(begin.T)
-    chosen[order] = improved(weighted, chosen[order], fixed[order], threshold)
+    order, outside = np.lexsort(begin.T), len(sources)
+    team = np.append(chosen[order], outside), np.append(fixed[order], True)
+    chosen[order] = improved(weighted, *team, threshold)[:-1]
     if fixed[1:].all():
-        own = distance[:, sources[chosen]].argmin(axis=1) == 0
-        chosen = moved(weighted, chosen, own, nearby)
+        from_team = np.column_stack([distance[:, sources[chosen]], away[sources]])
+        own = np.append(from_team.argmin(axis=1) == 0, False)
+        chosen = moved(weighted, np.append(chosen, outside), own, nearby)[:-1]
 
     mobile = np.flatnonzero(~fixed)
     entry = [int(((nodes - now[k]) ** 2).sum(axis=1).argmin()) for k in mobile]
@@ -153,11 +159,11 @@ class OwnPlace(NamedTuple):
 
 
 def own_place(
-    ways: GridPlanner, weights: Array, others: Array, begin: int, former: Array, rest: float, steps: int = 6
+    ways: GridPlanner, weights: Array, others: Array, begin: int, former: Array, rest: float
 ) -> OwnPlace:
     """Return a local minimum of the cost by the place of one robot alone, the others being at (k, 2) m.
 
-    From the node `begin` on, by at most `steps` nodes, as long as a neighbouring one is better; then the
+    From the node `begin` on, by at most `_STEPS` nodes, as long as a neighbouring one is better; then the
     minimum of the parabolas, in x and in y, through the costs of the node and those beside it. The former
     goal, (2,) m, nan for none, is kept where the new one is better by less than a part `rest` of what its own
     cell costs.
@@ -179,7 +185,7 @@ def own_place(
         return nodes
 
     node, around = begin, beside(begin)
-    for _ in range(steps):
+    for _ in range(_STEPS):
         best = min((k for k in around if k >= 0), key=costs.__getitem__, default=node)
         if not costs[best] < costs[node]:
             break

@@ -15,11 +15,12 @@ from itertools import count
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray
+from robocov.compiled import kernel
 from robocov.planning.discovered import Raster, dilate
 
 Cell = TypeVar("Cell", bound=np.generic)
@@ -141,6 +142,14 @@ class GridPlanner:
         return csr_array((lengths, (begins, ends)), shape=(number.size, number.size))
 
     @cached_property
+    def _frame(self) -> tuple[float, float, float, int, int, int, int]:
+        """Lower left corner and side of the raster's cells, m; first and last row and column here."""
+        (rows, columns), (high, wide) = self.raster.shape, self.blocked.shape
+        row, column = self.window[:2]
+        last = min(row + high, rows) - 1, min(column + wide, columns) - 1
+        return (*self.raster.origin, self.raster.cell, row, column, *last)
+
+    @cached_property
     def sources(self) -> IntArray:
         """Every k-th node in both directions, as many as a plan for a team may choose among."""
         row, column = np.divmod(np.arange(len(self.nodes)), self.window.columns)
@@ -155,13 +164,6 @@ class GridPlanner:
         """The distances from the sources to all nodes, (c, m) m."""
         return self.table(self.sources)
 
-    def cells(self, points: Array) -> tuple[IntArray, IntArray]:
-        """Return row and column, in the window, of the cells of (..., 2) points, the nearest for others."""
-        row, column = self.raster.cells(points)
-        high, wide = self.blocked.shape
-        row, column = row - self.window.row, column - self.window.column
-        return np.minimum(np.maximum(row, 0), high - 1), np.minimum(np.maximum(column, 0), wide - 1)
-
     def distances(self, node: int) -> Array:
         """Return the distances from a node to all nodes, (m,) m, infinite where there is no way."""
         if node not in self._known:
@@ -170,29 +172,25 @@ class GridPlanner:
 
     def near(self, nodes: Sequence[int], limit: float) -> list[Array]:
         """Return the same for some nodes, infinite beyond a limit, m; it is quicker the lower this is."""
-        asked = [node for node in nodes if node not in self._known]
-        found = dict(self._known)
-        if asked:
-            found.update(zip(asked, dijkstra(self._graph, indices=asked, limit=limit), strict=True))
-        return [found[node] for node in nodes]
+        return [
+            self._known[node] if node in self._known else self._ways([node], [0.0], limit) for node in nodes
+        ]
 
     def table(self, nodes: IntArray) -> Array:
         """Return the distances from some nodes to all, (k, m) m."""
-        return np.asarray(dijkstra(self._graph, indices=nodes))
+        return np.array([self._ways([node], [0.0]) for node in nodes.tolist()]).reshape(-1, len(self.nodes))
 
     def from_places(self, places: Array) -> Array:
         """Return the distances of all nodes, (m,) m, from the nearest of (k, 2) places between them."""
-        graph, size = self._graph, len(self.nodes)
         seen = [self._in_sight(place) for place in places]
-        counts = [len(each) for each in seen]
-        if not sum(counts):
-            return np.full(size, np.inf)
         away = [np.sqrt(((self.nodes[k] - at) ** 2).sum(axis=1)) for k, at in zip(seen, places, strict=True)]
-        begins = np.concatenate([graph.indptr, graph.indptr[-1] + np.cumsum(counts)])
-        parts = np.concatenate([graph.data, *away]), np.concatenate([graph.indices, *seen]), begins
-        joined = csr_array(parts, shape=(size + len(counts),) * 2)
-        new = np.arange(size, size + len(counts))
-        return np.asarray(dijkstra(joined, indices=new, min_only=True))[:size]
+        return self._ways(np.concatenate([[], *seen]), np.concatenate([[], *away]))
+
+    def _ways(self, nodes: ArrayLike, away: ArrayLike, limit: float = math.inf) -> Array:
+        """Return the distances from the nearest of some nodes, each of which is so far away already."""
+        graph, begin, far = self._graph, np.asarray(nodes, dtype=np.intp), np.asarray(away, dtype=np.float64)
+        edges: tuple[IntArray, IntArray, Array] = graph.indptr, graph.indices, graph.data  # type: ignore[assignment]
+        return _distances(*edges, self.spacing, begin, far, limit)
 
     def nearest(self, place: Array) -> int:
         """Return the roomy node nearest to a place; -1 for none."""
@@ -213,12 +211,7 @@ class GridPlanner:
 
     def _closest(self, place: Array, among: BoolArray) -> IntArray:
         """Return some nodes near a place, the nearest first."""
-        away = ((self.nodes - place) ** 2).sum(axis=1)
-        away[~among] = np.inf
-        few = min(_NEAREST, len(away) - 1)
-        near = np.sort(np.argpartition(away, few)[: few + 1])
-        near = near[np.argsort(away[near], kind="stable")]
-        return np.asarray(near[np.isfinite(away[near])][:_NEAREST])
+        return _nearest(place, self.nodes, among, _NEAREST)
 
     def clear(self, place: Array, ends: Array, cells: BoolArray, skip: float = 0.0) -> BoolArray:
         """Return whether straight lines from a place to (k, 2) ends meet none of (h, w) cells.
@@ -226,14 +219,7 @@ class GridPlanner:
         What is closer to the place than `skip` metres does not count: somebody may stand where no route
         leads, but away from there.
         """
-        along = ends - place
-        length = np.sqrt((along**2).sum(axis=1))
-        steps = math.ceil(float(length.max(initial=0.0)) / (_FINE * self.raster.cell)) + 1
-        part = np.linspace(0.0, 1.0, steps + 1)
-        met = cells[self.cells(place + along[:, None, :] * part[:, None])]
-        if skip > 0.0:
-            met &= length[:, None] * part > skip
-        return np.asarray(~met.any(axis=1))
+        return _clear(place, ends, cells, self._frame, skip)
 
     def route(self, place: Array, goal: Array) -> Array:
         """Return the way-points from a place to a goal, (w, 2) m, each in sight of the one before it.
@@ -278,6 +264,91 @@ class GridPlanner:
             kept.append(at)
             k += 1
         return np.array(kept)
+
+
+@kernel
+def _distances(
+    begins: IntArray, ends: IntArray, lengths: Array, least: float, nodes: IntArray, away: Array, limit: float
+) -> Array:
+    """Return the distances of all nodes of a graph, in rows of edges, from the nearest of some.
+
+    Dijkstra's algorithm, but all nodes at once that are at most the length of the `least` edge farther than
+    the nearest one, as no way to one of them leads over another.
+    """
+    distance = np.full(len(begins) - 1, np.inf)
+    front, inside, count = np.empty(len(distance), dtype=np.intp), np.zeros(len(distance), dtype=np.bool_), 0
+    for k in range(len(nodes)):
+        distance[nodes[k]] = min(distance[nodes[k]], away[k])
+        if not inside[nodes[k]]:
+            front[count], inside[nodes[k]], count = nodes[k], True, count + 1
+    settled = np.empty(len(distance), dtype=np.intp)
+    while count:
+        nearest = np.inf
+        for k in range(count):
+            nearest = min(nearest, distance[front[k]])
+        found, left = 0, 0
+        for k in range(count):
+            if distance[front[k]] < nearest + least:
+                settled[found], inside[front[k]], found = front[k], False, found + 1
+            else:
+                front[left], left = front[k], left + 1
+        count = left
+        for k in range(found):
+            for edge in range(begins[settled[k]], begins[settled[k] + 1]):
+                node, far = ends[edge], distance[settled[k]] + lengths[edge]
+                if far < distance[node] and far <= limit:
+                    distance[node] = far
+                    if not inside[node]:
+                        front[count], inside[node], count = node, True, count + 1
+    return distance
+
+
+@kernel
+def _nearest(place: Array, nodes: Array, among: BoolArray, most: int) -> IntArray:
+    """Return the nodes nearest to a place, the nearest first."""
+    found, away, count = np.empty(most, dtype=np.intp), np.empty(most), 0
+    for node in range(len(nodes)):
+        far = (nodes[node, 0] - place[0]) ** 2 + (nodes[node, 1] - place[1]) ** 2
+        if not among[node] or (count == most and far >= away[most - 1]):
+            continue
+        count = min(count + 1, most)
+        k = count - 1
+        while k > 0 and away[k - 1] > far:
+            found[k], away[k] = found[k - 1], away[k - 1]
+            k -= 1
+        found[k], away[k] = node, far
+    return found[:count]
+
+
+@kernel
+def _clear(
+    place: Array,
+    ends: Array,
+    cells: BoolArray,
+    frame: tuple[float, float, float, int, int, int, int],
+    skip: float,
+) -> BoolArray:
+    """Return whether lines from a place to (k, 2) ends meet none of the cells farther away than `skip`."""
+    low_x, low_y, side, row, column, last_row, last_column = frame
+    length = np.empty(len(ends))
+    for k in range(len(ends)):
+        length[k] = math.sqrt((ends[k, 0] - place[0]) ** 2 + (ends[k, 1] - place[1]) ** 2)
+    longest = 0.0
+    for k in range(len(ends)):
+        longest = max(longest, length[k])
+    steps = math.ceil(longest / (_FINE * side)) + 1
+    seen = np.ones(len(ends), dtype=np.bool_)
+    for k in range(len(ends)):
+        for step in range(steps + 1):
+            part = step * (1.0 / steps) if step < steps else 1.0
+            x = place[0] + (ends[k, 0] - place[0]) * part
+            y = place[1] + (ends[k, 1] - place[1]) * part
+            i, j = math.floor((y - low_y) * (1.0 / side)), math.floor((x - low_x) * (1.0 / side))
+            i, j = min(max(i, row), last_row) - row, min(max(j, column), last_column) - column
+            if cells[i, j] and not (skip > 0.0 and length[k] * part <= skip):
+                seen[k] = False
+                break
+    return seen
 
 
 @lru_cache(maxsize=512)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robocov.conditions import Conditions
+from robocov.conditions import Conditions, Failure
 from robocov.controllers import Atlas, AtlasShared, Rapf, atlas, information_of, make_controller
-from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, RestTracker
+from robocov.controllers.atlas import MAX_PLANNING_GROUP, AtlasMemory, Teammates
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, WallObstacle
 from robocov.errors import ParameterError
@@ -195,13 +195,13 @@ def test_what_relocations_and_goals_must_save_doubles_as_time_goes_by(
     asked: list[tuple[float, float, float, float]] = []
     plan, place = atlas.team_places, atlas.own_place
 
-    def planned(ways, weights, situation, begin, fixed, threshold, nearby):
-        asked.append((some.time, threshold, nearby, math.nan))
-        return plan(ways, weights, situation, begin, fixed, threshold, nearby)
+    def planned(*args):
+        asked.append((some.time, *args[-2:], math.nan))
+        return plan(*args)
 
-    def placed(ways, weights, elsewhere, begin, former, rest, steps):
-        asked[-1] = (*asked[-1][:3], rest)
-        return place(ways, weights, elsewhere, begin, former, rest, steps)
+    def placed(*args):
+        asked[-1] = (*asked[-1][:3], args[-1])
+        return place(*args)
 
     monkeypatch.setattr(atlas, "team_places", planned)
     monkeypatch.setattr(atlas, "own_place", placed)
@@ -242,11 +242,74 @@ def test_robots_that_meet_pass_on_the_left() -> None:
 
 
 def test_who_stays_is_noticed() -> None:
-    tracker = RestTracker(np.array([1, 4]), np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.0, 0.5]))
-    later = tracker.updated(np.array([1, 2, 4]), np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]]), 2.0)
-    assert later.since.tolist() == [0.0, 2.0, 2.0]
+    at = np.array([[0.0, 0.0], [1.0, 0.0]])
+    known = Teammates(np.array([1, 4]), at, np.array([1.0, 1.0]), np.ones(2), np.array([0.0, 0.5]), at)
+    seen = np.array([[0.05, 0.0], [3.0, 3.0], [1.2, 0.0]])
+    later = known.updated(np.array([1, 2, 4]), seen, np.array([0.05, 4.0]), 2.0, np.zeros(2, dtype=bool))
+    assert later.since.tolist() == [0.0, 2.0, 2.0] and later.heard.tolist() == [2.0] * 3
+    np.testing.assert_array_equal(later.at, seen)
     # creeping away is noticed as well
     np.testing.assert_array_equal(later.places, [[0.0, 0.0], [3.0, 3.0], [1.2, 0.0]])
+    np.testing.assert_allclose(later.away, np.hypot(*(seen - [0.05, 4.0]).T))
+    nobody, nowhere = np.empty(0, dtype=np.intp), np.empty((0, 2))
+    silent = later.updated(nobody, nowhere, np.zeros(2), 3.0, np.array([False, True, False]))
+    assert silent.robots.tolist() == [1, 4] and silent.heard.tolist() == [2.0] * 2
+
+
+def test_who_is_out_of_range_is_presumed_at_its_place_and_who_falls_silent_in_range_is_forgotten() -> None:
+    team = Team.homogeneous(2, communication_range=5.0)
+    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
+    both = Simulation(hall, Atlas(), [[9.8, 1.5], [10.2, 1.5]], team, dt=0.05)
+    dies = Conditions(failures=(Failure(2, 0.4),))
+    alone = Simulation(hall, Atlas(), both.positions, team, dt=0.05, conditions=dies)
+    for each in (both, alone):
+        while each.time < 40.0:
+            each.step()
+    np.testing.assert_allclose(both.positions, [[5.0, 1.5], [15.0, 1.5]], atol=0.5)
+    others = [state.others for state in both.memory.states]
+    assert [each.robots.tolist() for each in others] == [[1], [0]]
+    assert max(each.heard[0] for each in others) < 10.0, "out of range since then"
+    np.testing.assert_allclose(others[0].at[0], both.positions[1], atol=0.7)
+    assert len(alone.memory.states[0].others.robots) == 0
+    np.testing.assert_allclose(alone.positions[0], [10.0, 1.5], atol=0.5)
+
+
+def test_who_is_not_where_it_was_presumed_to_be_is_forgotten() -> None:
+    """Robot 2 fails out of range, and robot 1 is then set down beside its place."""
+    team = Team.homogeneous(2, communication_range=5.0)
+    hall = Environment("hall", ((0.0, 0.0), (20.0, 0.0), (20.0, 3.0), (0.0, 3.0)))
+    some = Simulation(hall, Atlas(), [[9.8, 1.5], [10.2, 1.5]], team, dt=0.05)
+    while some.time < 20.0:
+        some.step()
+    since = some.memory.states[0].since
+    dies = Conditions(failures=(Failure(2, 20.0),))
+    some = some.changed(positions=np.array([[13.0, 1.5], [15.0, 1.5]]), conditions=dies).remembering(
+        some.memory
+    )
+    some.step()
+    assert some.memory.states[0].others.robots.tolist() == [1], "it may be late"
+    while some.time < 50.0:
+        some.step()
+    state = some.memory.states[0]
+    assert len(state.others.robots) == 0 and state.since == since
+    np.testing.assert_allclose(some.positions[0], [10.0, 1.5], atol=0.7)
+
+
+@pytest.mark.slow
+def test_more_robots_are_not_worse_and_a_short_range_hardly_is() -> None:
+    rooms = load_map("rooms")
+    cost = CoverageCost(rooms, lattice=64)
+
+    def after_a_minute(n: int, hears: float = math.inf, seed: int = 0) -> float:
+        team = Team.homogeneous(n, communication_range=hears)
+        some = Simulation(rooms, Atlas(), rooms.start(None).sample(n, seed=seed, radius=0.1), team)
+        while some.time < 60.0:
+            some.step()
+        return cost(some.positions).mean_distance
+
+    eight = after_a_minute(8)
+    assert after_a_minute(12) < 0.95 * after_a_minute(9) < 0.95 * 1.01 * eight
+    assert np.median([after_a_minute(8, 3.0, seed) for seed in range(3)]) < 1.15 * eight
 
 
 def test_copies_share_what_never_changes() -> None:

@@ -79,14 +79,18 @@ def test_a_team_spreads_over_both_rooms() -> None:
     some = ways(on)
     now = np.array([[1.0, 1.0], [1.5, 1.0], [1.0, 1.5], [1.5, 1.5]])
     nobody = np.zeros(4, dtype=bool)
-    places = team_places(some, CoverageDemand(on, WINDOW).weights, now, now, nobody, 0.01, 0.01)
+    places = team_places(
+        some, CoverageDemand(on, WINDOW).weights, now, now, nobody, np.empty((0, 2)), 0.01, 0.01
+    )
     assert (places[:, 0] > 4.1).any()
     assert cost(on, places) < 0.5 * cost(on, now)
     for by_hand in ([[1.5, 2], [2.5, 1], [5.5, 2], [7, 2]], [[1, 1], [3, 1], [1.5, 3], [6, 2]]):
         assert cost(on, places) < 1.02 * cost(on, np.array(by_hand, dtype=float))
     # the same plan, by whom ever it is made
     order = np.array([2, 0, 3, 1])
-    other = team_places(some, CoverageDemand(on, WINDOW).weights, now[order], now[order], nobody, 0.01, 0.01)
+    other = team_places(
+        some, CoverageDemand(on, WINDOW).weights, now[order], now[order], nobody, np.empty((0, 2)), 0.01, 0.01
+    )
     np.testing.assert_allclose(np.sort(places, axis=0), np.sort(other, axis=0))
 
 
@@ -95,7 +99,9 @@ def test_who_rests_stays_in_the_plan() -> None:
     some = ways(on)
     now = np.array([[1.0, 1.0], [6.3, 1.9], [1.0, 1.5]])
     given = np.array([False, True, False])
-    places = team_places(some, CoverageDemand(on, WINDOW).weights, now, now, given, 0.01, 0.01)
+    places = team_places(
+        some, CoverageDemand(on, WINDOW).weights, now, now, given, np.empty((0, 2)), 0.01, 0.01
+    )
     np.testing.assert_array_equal(places[1], now[1])
     assert (places[[0, 2], 0] < 4.1).sum() >= 1
 

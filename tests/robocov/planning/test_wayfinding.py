@@ -92,7 +92,7 @@ def test_routes_keep_off_walls(seed: int) -> None:
     for begin, end in zip(np.vstack([place, route[:-1]]), route, strict=True):
         part = np.linspace(0.0, 1.0, 400)[:, None]
         points = begin + (end - begin) * part
-        met = dilate(some.blocked, some.clearance / 0.1 - 0.5)[some.cells(points)]
+        met = dilate(some.blocked, some.clearance / 0.1 - 0.5)[RASTER.cells(points)]
         # the first cells may be tight: one may come from anywhere
         assert not met[np.hypot(*(points - place).T) > 2.0 * some.clearance + 0.1].any()
 
