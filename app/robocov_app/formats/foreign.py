@@ -23,8 +23,8 @@ class ForeignMap:
     boundary. `vertices_read`: vertices in the file; of a raster, corners of the outline of its free cells.
     `cell`, m: side of a cell, of rasters; of cells that are no squares the longer one. `specks`, m²: smaller
     obstacles are noise of how such maps are made, unless somebody says otherwise. `cut_corners`: whether
-    corners are cut by a step or two of a grid: simplifying then makes them whole, as
-    `robocov_app.formats.geometry.corners` does. `primitives`: obstacles that the file draws as such, with
+    corners are cut by a step or two of a grid: `robocov_app.formats.geometry.simplify.sharpened` makes them
+    whole. `primitives`: obstacles that the file draws as such, with
     their names: they are not in `free`, and are kept instead of the polygons that they cover where nothing
     speaks against it. `robots`, (n, 2) m: where the file places robots. `repaired`, `dropped`, `notes`: what
     the reader had to put right, what it left out, and what is worth knowing besides (how unknown cells were

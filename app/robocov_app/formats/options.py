@@ -54,7 +54,7 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), (1e-6, 1e4, "m"))
-        _check(self, lengths | {"threshold": (0.0, 1.0, "")})
+        check_options(self, lengths | {"threshold": (0.0, 1.0, "")})
 
     def given(self) -> tuple[str, ...]:
         """Return the names of the options that are not as by default."""
@@ -99,7 +99,7 @@ class WriteOptions:
 
     def __post_init__(self) -> None:
         length = (1e-6, 1e4, "m")
-        _check(self, {"cell": length, "scale": length, "digits": (0, 12, "")})
+        check_options(self, {"cell": length, "scale": length, "digits": (0, 12, "")})
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
             wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
             raise ParameterError(f"origin: {shown(self.origin)}, but {wanted}")
@@ -113,13 +113,14 @@ def _given(options: ReadOptions | WriteOptions) -> tuple[str, ...]:
     return tuple(each.name for each in fields(options) if getattr(options, each.name) != each.default)
 
 
-def _check(options: ReadOptions | WriteOptions, ranges: Mapping[str, tuple[float, float, str]]) -> None:
-    """Raise ParameterError where a value is out of its range, or none of its words."""
+def check_options(options: object, ranges: Mapping[str, tuple[float, float, str]]) -> None:
+    """Raise ParameterError where a field of a dataclass is out of its range, or none of its words."""
     for name, hint in get_type_hints(type(options)).items():
         value = getattr(options, name)
         if value is not None and name in ranges:
             checked(name, value, *ranges[name])
-        words = [word for kind in get_args(hint) if get_origin(kind) is Literal for word in get_args(kind)]
+        kinds = (hint, *get_args(hint))
+        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
         if words and value is not None and value not in words:
             raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(words)} was wanted")
 

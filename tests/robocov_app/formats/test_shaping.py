@@ -13,9 +13,8 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import bounded
 from robocov_app.formats.geometry.passages import roomiest
-from robocov_app.formats.geometry.polygons import rounded
+from robocov_app.formats.geometry.polygons import bounded, rounded
 from robocov_app.formats.geometry.shaping import Shaping, shaped
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
@@ -216,7 +215,7 @@ def test_what_is_refused(parts: tuple[Polygon, ...], shaping: dict[str, Any], wa
 @pytest.mark.parametrize(
     ("options", "wanted"),
     [
-        ({"simplify": -1.0}, r"simplify: -1\.0, but a number from 0 to 10 \(m\)"),
+        ({"simplify": -1.0}, r"simplify: -1\.0, but a number from 0 to 10 m"),
         ({"simplify": math.nan}, "simplify: nan"),
         ({"specks": math.inf}, "specks: inf"),
         ({"margin": 200.0}, "margin: 200"),

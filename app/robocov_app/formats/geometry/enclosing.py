@@ -14,48 +14,8 @@ from robocov.environment import GRID
 from robocov.errors import MapError, counted, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.polygons import filled, polygons, polygons_of, rounded, united
+from robocov_app.formats.geometry.polygons import polygons_of, united
 from robocov_app.formats.geometry.shapes import Line, Outline, Shapes, polygonised
-
-CRUMB = 1e-4
-"""Obstacles and parts that are smaller, in m², come of rounding."""
-
-
-def bounded(
-    free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
-) -> tuple[Polygon, list[Polygon]]:
-    """Return a boundary around `free`, and what is solid in it.
-
-    `free`, m: with coordinates of so many `digits`. `given`, m: a boundary without holes, which may run along
-    the free space as it was before walls moved. None: the outline of the free space, or its convex hull where
-    it is of several parts. `hull`: whether the convex hull of that is wanted. `margin`, m: so much is solid
-    around it. `digits`: decimals of the coordinates.
-
-    Examples
-    --------
-    >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
-    >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
-    >>> boundary.area, [part.area for part in solid]
-    (12.0, [1.0])
-    """
-    parts = list(free.geoms)
-    if given is not None:
-        base = filled(rounded(shapely.union(given, free), digits))
-    elif len(parts) > 1:
-        base = free.convex_hull
-    else:
-        base = Polygon(parts[0].exterior)
-    if hull:
-        base = base.convex_hull
-    if margin > 0.0:
-        base = filled(base.buffer(margin, join_style="mitre", mitre_limit=2.0))
-    if given is None and not hull and margin == 0.0 and len(parts) == 1:
-        return base, [Polygon(hole) for hole in parts[0].interiors]
-    base = filled(rounded(base, digits))
-    if not shapely.covers(base, free):  # by a rounded hair
-        base = filled(shapely.union(base, free))
-    return base, polygons(rounded(shapely.difference(base, free), digits))
-
 
 BOUNDARY = "boundary"
 """A shape of this name, id, class or layer is the boundary."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -54,12 +53,8 @@ def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple
     some = np.linspace(low_y, high_y, _SQUARES)
     squares = max(min(_SQUARES, _SQUARES * _SQUARED_WORK // max(_rays(sides, some), 1)), 16)
     side = max(min(width, height), max(width, height) / squares)
-    centres = (
-        np.stack(
-            np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side)), axis=-1
-        ).reshape(-1, 2)
-        + side / 2
-    )
+    corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
+    centres = np.stack(corners, axis=-1).reshape(-1, 2) + side / 2
     best, place = -math.inf, centres[0]
     while len(centres) and best < enough:
         _, away = walls.query_nearest(shapely.points(centres), return_distance=True, all_matches=False)
@@ -75,28 +70,15 @@ def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple
     return (float(place[0]), float(place[1])), best
 
 
-@dataclass(frozen=True)
-class Moved:
-    """By how much the walls of a free space moved.
-
-    `area`, m²: that was free and is not, or is and was not. `distance`, m: from a vertex of one outline to
-    the other outline, at most.
-    """
-
-    area: float
-    distance: float
-
-
-def moved_walls(before: MultiPolygon, after: MultiPolygon) -> Moved:
-    """Return by how much walls moved from one free space to another."""
+def moved_walls(before: MultiPolygon, after: MultiPolygon) -> tuple[float, float]:
+    """Return what area, m², was free and is not, or is and was not; and how far walls moved, m, at most."""
     distance = 0.0
     for one, other in ((before, after), (after, before)):
         points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
-        _, away = STRtree(shapely.linestrings(sides_of(other))).query_nearest(
-            points, return_distance=True, all_matches=False
-        )
+        walls = STRtree(shapely.linestrings(sides_of(other)))
+        _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
         distance = max(distance, float(away.max()))
-    return Moved(float(shapely.symmetric_difference(before, after).area), distance)
+    return float(shapely.symmetric_difference(before, after).area), distance
 
 
 def _rays(sides: Array, y: Array) -> int:

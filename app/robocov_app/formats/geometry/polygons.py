@@ -26,6 +26,9 @@ MAX_CROSSINGS = 30_000
 """Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
 cross itself millions of times, and to find all of these places takes minutes and gigabytes."""
 
+CRUMB = 1e-4
+"""Obstacles and parts that are smaller, in m², come of rounding."""
+
 _FEW = 12
 """So few edges are compared each with each, which is quicker than a tree of them."""
 
@@ -224,6 +227,42 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
         # simplified walls may cross a boundary that was simplified beside them, which GEOS refuses to round
         plain = shapely.transform(shapely.set_precision(made_valid(geometry), 10.0**-digits), decimals)
     return polygons_of(plain)
+
+
+def bounded(
+    free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
+) -> tuple[Polygon, list[Polygon]]:
+    """Return a boundary around `free`, and what is solid in it.
+
+    `free`, m: with coordinates of so many `digits`. `given`, m: a boundary without holes, which may run along
+    the free space as it was before walls moved. None: the outline of the free space, or its convex hull where
+    it is of several parts. `hull`: whether the convex hull of that is wanted. `margin`, m: so much is solid
+    around it. `digits`: decimals of the coordinates.
+
+    Examples
+    --------
+    >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
+    >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
+    >>> boundary.area, [part.area for part in solid]
+    (12.0, [1.0])
+    """
+    parts = list(free.geoms)
+    if given is not None:
+        base = filled(rounded(shapely.union(given, free), digits))
+    elif len(parts) > 1:
+        base = free.convex_hull
+    else:
+        base = Polygon(parts[0].exterior)
+    if hull:
+        base = base.convex_hull
+    if margin > 0.0:
+        base = filled(base.buffer(margin, join_style="mitre", mitre_limit=2.0))
+    if given is None and not hull and margin == 0.0 and len(parts) == 1:
+        return base, [Polygon(hole) for hole in parts[0].interiors]
+    base = filled(rounded(base, digits))
+    if not shapely.covers(base, free):  # by a rounded hair
+        base = filled(shapely.union(base, free))
+    return base, polygons(rounded(shapely.difference(base, free), digits))
 
 
 def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:

@@ -55,6 +55,10 @@ _RIGHT, _SQUARE = 1e-5, 0.2
 """Lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
 nowhere in particular."""
 
+_SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
+"""In tolerances: what counts as a short edge, and how far from the corner its run may be; and the
+sine of the angle below which two walls count as parallel."""
+
 _LONGEST = 1024
 """Most vertices between two that must stay: the algorithm's depth may grow with their number."""
 
@@ -383,18 +387,19 @@ def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Ring
     foot = np.where(stairs[:, None], foot, points)
     along = np.where(stairs[:, None], along, chord)
 
-    meeting, square = _meeting(foot[before], along[before], foot, along)
+    meeting, sine = _meeting(foot[before], along[before], foot, along)
     # lines that hardly turn have no good meeting: half-way between them
     flat = (_foot(points, foot[before], along[before]) + _foot(points, foot, along)) / 2
-    move = np.where(square[:, None], meeting, flat) - points
+    move = np.where(np.abs(sine)[:, None] > _SQUARE, meeting, flat) - points
     move[~(stairs | stairs[before])] = 0.0
     move[np.hypot(*move.T) > 2 * allowed] = 0.0
 
     # neither end of the side may be one that stays
     both = np.minimum(allowed, allowed[after])
     long = length > 4 * both
-    corner, square = _meeting(foot[before], along[before], foot[after], along[after])
-    cut = square & ~stairs & (both > 0.0) & (length <= 2 * both) & long[before] & long[after]
+    corner, sine = _meeting(foot[before], along[before], foot[after], along[after])
+    cut = np.abs(sine) > _SQUARE
+    cut &= ~stairs & (both > 0.0) & (length <= 2 * both) & long[before] & long[after]
     for end in (points, points[after]):
         cut &= np.hypot(*(corner - end).T) <= 2 * both
     move[cut] = corner[cut] - points[cut]
@@ -496,12 +501,11 @@ def _extremes(rings: Rings) -> BoolArray:
     return stays
 
 
-def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, BoolArray]:
-    """Return where the lines through a along u and through b along v meet, and whether they clearly do."""
+def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
+    """Return where the lines through a along u and through b along v meet, and u cross v."""
     cross = _cross(u, v)
-    square = np.abs(cross) > _SQUARE
-    part = _cross(b - a, v) / np.where(square, cross, 1.0)
-    return a + part[:, None] * u, square
+    part = _cross(b - a, v) / np.where(np.abs(cross) < 1e-200, 1.0, cross)
+    return a + part[:, None] * u, cross
 
 
 def _foot(p: Array, a: Array, u: Array) -> Array:
@@ -515,3 +519,38 @@ def _cross(a: Array, b: Array) -> Array:
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("kd,kd->k", a, b))
+
+
+def sharpened(plan: Polygon, tolerance: float) -> Polygon:
+    """Return `plan`, m, with its cut corners made whole, or as it is where that would break it.
+
+    A run of edges of at most 1.5 `tolerance`, m, becomes the point where the long edges before and after it
+    meet when they are drawn on, if all of the run is within 2 `tolerance` of that point: unlike a plain
+    simplification, it keeps the directions of the walls.
+
+    Examples
+    --------
+    >>> cut = Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)])
+    >>> sharpened(cut, 0.02).area
+    12.0
+    """
+    rings = [_sharpened(np.asarray(ring.coords)[:-1], tolerance) for ring in (plan.exterior, *plan.interiors)]
+    sharp = Polygon(rings[0], rings[1:])
+    return sharp if sharp.is_valid else plan
+
+
+def _sharpened(ring: Array, tolerance: float) -> Array:
+    """Return the (k, 2) ring with its cut corners made whole."""
+    side = np.roll(ring, -1, axis=0) - ring
+    length = np.hypot(*side.T)
+    long = np.flatnonzero(length > _SHORT * tolerance)
+    if len(long) < 3:
+        return ring
+    following = np.roll(long, -1)
+    corner, sine = _meeting(ring[long], side[long], ring[following], side[following])
+    turns = np.abs(sine) > _PARALLEL * length[long] * length[following]
+    runs = np.split(np.roll(ring, -long[0] - 1, axis=0), long[1:] - long[0])
+    for k in np.flatnonzero(turns & (np.array([len(run) for run in runs]) > 1)):
+        if np.hypot(*(runs[k] - corner[k]).T).max() <= _NEAR * tolerance:
+            runs[k] = corner[k : k + 1]
+    return np.concatenate(runs)
