@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
+from functools import cache
 from typing import Any
-from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -15,149 +17,111 @@ from robocov_app.render.theme import LIGHT
 from robocov_app.report.theme_css import hex_code, named_colours
 
 _STYLE: Any = {"svg.hashsalt": "robocov", "svg.fonttype": "none", "savefig.bbox": None}
-
 _METADATA: dict[str, str | None] = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
 _SPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
-
+_NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
 _MANY = 8  # so many equal round marks are drawn as one dotted line
 
-_NUMBER = re.compile(r"-?\d*\.?\d+(?:e[-+]?\d+)?")
-
-_PLOTTED = (
-    *("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd"),
-    *(f"other-{k}" for k in range(len(LIGHT.others))),
-)
+_PLOTTED = ("background", "ink", "faint", "grid", "rapf", "rpf", "lloyd")
 
 
 def inline_svg(figure: Figure, key: str, sentence: str) -> str:
     """Return a figure in light colours as SVG; ids begin with `key`, `sentence` tells what it shows."""
-    figure.patch.set_visible(False)
-    for axes in figure.axes:
-        axes.patch.set_visible(False)
+    for patch in (figure.patch, *(axes.patch for axes in figure.axes)):
+        patch.set_visible(False)
     text = io.StringIO()
     with plain_style(), matplotlib.rc_context(_STYLE):
         figure.savefig(text, format="svg", metadata=_METADATA, dpi=figure.dpi)
-    source = ElementTree.fromstring(text.getvalue())
-    names: dict[str, str] = {}
-    definitions = ElementTree.Element("defs")
-    body = ElementTree.Element("g", {"stroke-linejoin": "round"})
-    _copied(source, body, definitions, names, key)
-    root = ElementTree.Element(
-        "svg",
-        {
-            "class": "plot",
-            "viewBox": " ".join(_short(number, 1) for number in source.get("viewBox", "").split()),
-            "role": "img",
-            "aria-label": sentence,
-        },
-    )
-    if len(definitions):
-        root.append(definitions)
-    root.append(body)
-    return ElementTree.tostring(root, encoding="unicode", short_empty_elements=True)
+    source = fromstring(text.getvalue())
+    box = " ".join(_short(number, 1) for number in source.get("viewBox", "").split())
+    root = Element("svg", {"class": "plot", "viewBox": box, "role": "img", "aria-label": sentence})
+    body = Element("g", {"stroke-linejoin": "round"})
+    copy = _Copy(key)
+    copy.drawn(source, body)
+    root.extend([copy.definitions, body] if len(copy.definitions) else [body])
+    return tostring(root, encoding="unicode", short_empty_elements=True)
 
 
-def _copied(
-    source: ElementTree.Element,
-    target: ElementTree.Element,
-    definitions: ElementTree.Element,
-    names: dict[str, str],
-    key: str,
-) -> None:
-    """Copy what is drawn, without the groups and ids that nothing needs."""
-    uses = [child for child in source if child.tag == f"{_SPACE}use"]
-    if len(uses) >= _MANY and (dots := _dotted(uses, definitions, names)) is not None:
-        target.append(dots)
-        uses = []
-    for child in source:
-        tag = child.tag.removeprefix(_SPACE)
-        if tag == "defs":
-            for shape in child:
-                _define(shape, definitions, names, key)
-        elif tag == "use":
-            if uses:
-                target.append(_element(child, names))
-        elif tag == "g":
-            clip = child.get("clip-path")
-            inner = target
-            if clip is not None:
-                inner = ElementTree.SubElement(target, "g", {"clip-path": _renamed(clip, names, key)})
-            _copied(child, inner, definitions, names, key)
-        elif tag in ("path", "text", "rect", "image"):
-            element = _element(child, names)
-            if "clip-path" in child.attrib:
-                element.set("clip-path", _renamed(child.attrib["clip-path"], names, key))
-            target.append(element)
+class _Copy:
+    """A copy of what is drawn, without the groups and ids that nothing needs, and with short names."""
 
+    def __init__(self, key: str) -> None:
+        self.definitions = Element("defs")
+        self._key = key
+        self._names: dict[str, str] = {}
 
-def _define(
-    shape: ElementTree.Element, definitions: ElementTree.Element, names: dict[str, str], key: str
-) -> None:
-    """Keep a marker or a clip path under a short name."""
-    if "id" not in shape.attrib:
-        return
-    element = _element(shape, names)
-    for child in shape:
-        element.append(_element(child, names))
-    name = names.setdefault(shape.attrib["id"], f"{key}-{len(names)}")
-    element.set("id", name)
-    element.attrib.pop("style", None)  # uses have their own
-    definitions.append(element)
+    def drawn(self, source: Element, target: Element) -> None:
+        uses = [child for child in source if child.tag == f"{_SPACE}use"]
+        dots = self._dotted(uses) if len(uses) >= _MANY else None
+        if dots is not None:
+            target.append(dots)
+        for child in source:
+            tag, clip = child.tag.removeprefix(_SPACE), child.get("clip-path")
+            if tag == "defs":
+                for shape in child:
+                    self._define(shape)
+            elif tag == "g":
+                into = {} if clip is None else {"clip-path": self._renamed(clip)}
+                self.drawn(child, SubElement(target, "g", into) if into else target)
+            elif tag in ("path", "text", "rect", "image") or (tag == "use" and dots is None):
+                target.append(self._element(child))
 
+    def _define(self, shape: Element) -> None:
+        """Keep a marker or a clip path under a short name."""
+        if "id" in shape.attrib:
+            element = self._element(shape)
+            element.extend([self._element(child) for child in shape])
+            element.set("id", self._name(shape.attrib["id"]))
+            element.attrib.pop("style", None)  # uses have their own
+            self.definitions.append(element)
 
-def _renamed(reference: str, names: dict[str, str], key: str) -> str:
-    """Return ``url(#name)`` with the name that is used here."""
-    old = reference.removeprefix("url(#").removesuffix(")")
-    return f"url(#{names.setdefault(old, f'{key}-{len(names)}')})"
+    def _name(self, old: str) -> str:
+        return self._names.setdefault(old, f"{self._key}-{len(self._names)}")
 
+    def _renamed(self, reference: str) -> str:
+        """Return ``url(#name)`` with the name that is used here."""
+        return f"url(#{self._name(reference.removeprefix('url(#').removesuffix(')'))})"
 
-def _element(source: ElementTree.Element, names: dict[str, str]) -> ElementTree.Element:
-    """Return an element with short numbers and the page's colours, without children."""
-    element = ElementTree.Element(source.tag.removeprefix(_SPACE))
-    element.text = source.text if element.tag == "text" else None
-    for name, value in source.attrib.items():
-        if name == "d":
-            element.set("d", _short_path(value))
-        elif name == _LINK:
-            element.set("href", f"#{names[value.removeprefix('#')]}")
-        elif name == "style":
-            element.set("style", _coloured(value))
-        elif name in ("x", "y", "width", "height"):
-            element.set(name, _short(value, 1))
-        elif name == "transform" and not value.startswith("rotate(-0 "):
-            element.set(name, value)
-    return element
+    def _element(self, source: Element) -> Element:
+        """Return an element with short numbers and the page's colours, without children."""
+        element = Element(source.tag.removeprefix(_SPACE))
+        element.text = source.text if element.tag == "text" else None
+        for name, value in source.attrib.items():
+            if name == "d":  # numbers of two decimals: no user sees the difference
+                words = [_short(word, 2) if _NUMBER.fullmatch(word) else word for word in value.split()]
+                element.set("d", re.sub(r" ?([A-Za-z]) ?", r"\1", " ".join(words)))
+            elif name == _LINK:
+                element.set("href", f"#{self._names[value.removeprefix('#')]}")
+            elif name == "style":
+                element.set("style", _coloured(value))
+            elif name in ("x", "y", "width", "height"):
+                element.set(name, _short(value, 1))
+            elif name == "transform" and not value.startswith("rotate(-0 "):
+                element.set(name, value)
+        if "clip-path" in source.attrib:
+            element.set("clip-path", self._renamed(source.attrib["clip-path"]))
+        return element
 
-
-def _dotted(
-    uses: list[ElementTree.Element], definitions: ElementTree.Element, names: dict[str, str]
-) -> ElementTree.Element | None:
-    """Return many equal round marks as one path: dots of a round pen. None where they are not that."""
-    first = uses[0]
-    if any(use.get(_LINK) != first.get(_LINK) or use.get("style") != first.get("style") for use in uses):
-        return None
-    name = names[first.get(_LINK, "").removeprefix("#")]
-    shape = next(each for each in definitions if each.get("id") == name)
-    begin = re.match(r"M0 (\d*\.?\d+)C", shape.get("d", ""))
-    if begin is None:
-        return None
-    look = dict(part.split(": ") for part in first.get("style", "").split("; "))
-    places = "".join(f"M{_short(use.get('x', '0'), 1)} {_short(use.get('y', '0'), 1)}h0" for use in uses)
-    opacity = look.get("opacity", look.get("fill-opacity", "1"))
-    style = (
-        f"fill: none; stroke: {look['fill']}; stroke-linecap: round; "
-        f"stroke-width: {2 * float(begin[1]):g}; opacity: {opacity}"
-    )
-    return ElementTree.Element("path", {"d": places, "style": _coloured(style)})
-
-
-def _short_path(d: str) -> str:
-    """Return a path with numbers of two decimals, that no user sees the difference of."""
-    words = [_short(word, 2) if _NUMBER.fullmatch(word) else word for word in d.split()]
-    text = " ".join(words)
-    return re.sub(r" ?([A-Za-z]) ?", r"\1", text)
+    def _dotted(self, uses: Sequence[Element]) -> Element | None:
+        """Return many equal round marks as one path: dots of a round pen. None where they are not that."""
+        first = uses[0]
+        if any(use.get(_LINK) != first.get(_LINK) or use.get("style") != first.get("style") for use in uses):
+            return None
+        name = self._names[first.get(_LINK, "").removeprefix("#")]
+        shape = next(each for each in self.definitions if each.get("id") == name)
+        begin = re.match(r"M0 (\d*\.?\d+)C", shape.get("d", ""))
+        if begin is None:
+            return None
+        look = dict(part.split(": ") for part in first.get("style", "").split("; "))
+        places = "".join(f"M{_short(use.get('x', '0'), 1)} {_short(use.get('y', '0'), 1)}h0" for use in uses)
+        opacity = look.get("opacity", look.get("fill-opacity", "1"))
+        style = (
+            f"fill: none; stroke: {look['fill']}; stroke-linecap: round; "
+            f"stroke-width: {2 * float(begin[1]):g}; opacity: {opacity}"
+        )
+        return Element("path", {"d": places, "style": _coloured(style)})
 
 
 def _short(number: str, decimals: int) -> str:
@@ -171,9 +135,9 @@ def _coloured(style: str) -> str:
     return re.sub(r"#[0-9a-f]{6}", lambda match: _variables()[match[0]], text)
 
 
+@cache
 def _variables() -> dict[str, str]:
-    """Return what stands for each colour of the light theme that plots use."""
+    """Return what stands for each colour of the light theme that plots use, its first name."""
     colours = named_colours(LIGHT)
-    names = [*_PLOTTED, *(name for name in colours if name.startswith("heat-"))]
-    # the first name of a colour holds
+    names = [*_PLOTTED, *(name for name in colours if name.startswith(("other-", "heat-")))]
     return {hex_code(colours[name]): f"var(--rc-{name})" for name in reversed(names)}
