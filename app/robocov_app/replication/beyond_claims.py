@@ -19,16 +19,7 @@ import numpy as np
 from robocov.arrays import Array, IntArray
 from robocov.controllers import controller_kind, information_of
 from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by
-from robocov_app.replication.claims import (
-    CLEARLY_BELOW,
-    NEARLY_SAME,
-    SAME_COST,
-    half_text,
-    lost_text,
-    median_text,
-    pair_claim,
-    share_of,
-)
+from robocov_app.replication import claims
 from robocov_app.replication.contenders import OURS, OWN, PAPER, TARGETS, TEAMS, Contender, strongest
 from robocov_app.replication.outcomes import Outcomes
 from robocov_app.replication.plan import Plan
@@ -109,6 +100,18 @@ def beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
     )
 
 
+def _first_criteria(fine: Outcomes, key: str) -> tuple[Criterion, Criterion, Criterion]:
+    """Return the goals of gap, contacts and rest, with what was measured in these scenarios."""
+    gap = bootstrap(fine.of(key, "gap"), clusters=fine.maps)
+    touched = claims.share_of(fine.of(key, "contacts") > 0, fine)
+    rest = claims.share_of(np.isfinite(fine.of(key, "settled")), fine)
+    return (
+        Criterion("median of J/J_ref - 1", gap, high=LEAST_GAP, unit="%"),
+        Criterion("runs with a contact", touched, high=0.0, unit="%"),
+        Criterion("runs that come to rest", rest, AT_REST, unit="%"),
+    )
+
+
 def goals(
     outcomes: Outcomes,
     ours: Contender,
@@ -121,29 +124,22 @@ def goals(
     fine = outcomes.measured("gap", key)
     found: list[Goal] = []
 
-    def add(name: str, text: str, measure: str, interval: Interval, explanation: str, **wanted: Any) -> None:
-        criterion = Criterion(measure, interval, **wanted)
-        value = interval.estimate
-        head = Claim(f"goal-{name}", GOALS, text)
-        claim = (
-            replace(head, criteria=(criterion,), explanation=explanation, maps=1, least_maps=1)
-            if name in ("step", "real-time")
-            else head.judged((criterion,), explanation, fine, 1)
-        )
+    def add(name: str, text: str, criterion: Criterion, explanation: str, *, timed: bool = False) -> None:
+        value, head = criterion.interval.estimate, Claim(f"goal-{name}", GOALS, text)
+        claim = head.judged((criterion,), explanation, fine, 1)
+        if timed:
+            claim = replace(claim, runs=0, maps=1, least_maps=1)
         found.append(Goal(claim, None if math.isnan(value) else criterion.low <= value <= criterion.high))
 
     if fine.scenarios:
-        gap, maps = fine.of(key, "gap"), fine.maps
-        text = (
-            f"{label}'s cost is within {amount(LEAST_GAP, '%')} of the centralised reference in the median."
-        )
-        median = bootstrap(gap, clusters=maps)
-        add("gap", text, "median of J/J_ref - 1", median, half_text(gap), high=LEAST_GAP, unit="%")
+        near, untouched, resting = _first_criteria(fine, key)
+        gap, settled, maps = fine.of(key, "gap"), fine.of(key, "settled"), fine.maps
+        reference = f"within {amount(LEAST_GAP, '%')} of the centralised reference in the median"
+        add("gap", f"{label}'s cost is {reference}.", near, claims.half_text(gap))
 
         text = f"On every map {label}'s median is within {amount(MAP_GAP, '%')} of the reference."
-        words = _highest_text(fine.median_by_map(key), MAP_GAP)
-        worst = worst_median(gap, maps)
-        add("every-map", text, "highest median of a map", worst, words, high=MAP_GAP, unit="%")
+        criterion = Criterion("highest median of a map", worst_median(gap, maps), high=MAP_GAP, unit="%")
+        add("every-map", text, criterion, _highest_text(fine.median_by_map(key), MAP_GAP))
 
         for other in strongest(contenders):
             pairs = outcomes.compared(key, other.key)
@@ -154,52 +150,41 @@ def goals(
                 words = _highest_text({name: mine[name] / theirs[name] for name in mine}, NEVER_WORSE)
                 worst = worst_ratio(pairs.a, pairs.b, pairs.fine.maps)
                 measure = f"highest ratio of a map's medians to {other.label}"
-                add(f"not-worse-{other.key}", text, measure, worst, words, high=NEVER_WORSE)
+                add(f"not-worse-{other.key}", text, Criterion(measure, worst, high=NEVER_WORSE), words)
 
-        touched, settled = fine.of(key, "contacts") > 0, fine.of(key, "settled")
+        touched, rest = fine.of(key, "contacts") > 0, np.isfinite(settled)
         words = f"{touched.sum()} of {len(touched)} runs."
-        text, measure = f"{label} touches nothing.", "runs with a contact"
-        add("contacts", text, measure, share_of(touched, fine), words, high=0.0, unit="%")
+        add("contacts", f"{label} touches nothing.", untouched, words)
 
-        rest = np.isfinite(settled)
         text = f"{label} comes to rest in at least {amount(AT_REST, '%')} of the runs."
-        words = f"{(~rest).sum()} of {len(rest)} runs do not."
-        add("rest", text, "runs that come to rest", share_of(rest, fine), words, low=AT_REST, unit="%")
+        add("rest", text, resting, f"{(~rest).sum()} of {len(rest)} runs do not.")
 
         text = f"{label} is at rest within {amount(REST_TIME, 's')} in the median."
         times = bootstrap(np.where(rest, settled, plan.duration), clusters=maps)
-        words = "Runs that do not come to rest count as the longest."
-        add("time", text, "median time until rest", times, words, high=REST_TIME, unit="s")
+        criterion = Criterion("median time until rest", times, high=REST_TIME, unit="s")
+        add("time", text, criterion, "Runs that do not come to rest count as the longest.")
 
     large, huge = (steps.get(robots) for robots in (plan.beyond.large, plan.beyond.huge))
     if large is not None and math.isfinite((ratio := large.ratio_interval(ours.controller)).estimate):
         most = f"at most {STEP_RATIO:g} times as long as RAPF's with {large.robots} robots"
         words = "Timed in turn, over whole seconds of simulated time: plans and scans count by their share."
-        add(
-            "step",
-            f"A step of {label} takes {most}.",
-            "time of a step by RAPF's",
-            ratio,
-            words,
-            high=STEP_RATIO,
-        )
+        criterion = Criterion("time of a step by RAPF's", ratio, high=STEP_RATIO)
+        add("step", f"A step of {label} takes {most}.", criterion, words, timed=True)
     if huge is not None and math.isfinite((taken := huge.interval(ours.controller)).estimate):
         part = Interval(*(value / huge.dt for value in (taken.estimate, taken.low, taken.high)))
-        text, measure = (
+        text, words = (
             f"{label} runs in real time with {huge.robots} robots.",
-            "computing time by simulated time",
+            "the physics of the world included",
         )
-        add("real-time", text, measure, part, "One process; the physics of the world included.", high=1.0)
+        criterion = Criterion("computing time by simulated time", part, high=1.0)
+        add("real-time", text, criterion, f"One process; {words}.", timed=True)
     return found
 
 
 def _highest_text(values: Mapping[str, float], bound: float) -> str:
     """Return in words on which map a value is the highest, and how many are above a bound."""
-    highest, above = (
-        max(values, key=lambda name: values[name]),
-        sum(value > bound for value in values.values()),
-    )
-    return f"Highest on {highest}; above it on {above} of {len(values)} maps."
+    above = sum(value > bound for value in values.values())
+    return f"Highest on {max(values, key=values.__getitem__)}; above it on {above} of {len(values)} maps."
 
 
 def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> Claim | None:
@@ -208,12 +193,7 @@ def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
     fine = outcomes.measured("gap", key)
     if not fine.scenarios:
         return None
-    gap, rest = bootstrap(fine.of(key, "gap"), clusters=fine.maps), np.isfinite(fine.of(key, "settled"))
-    criteria = [
-        Criterion("median of J/J_ref - 1", gap, high=LEAST_GAP, unit="%"),
-        Criterion("runs with a contact", share_of(fine.of(key, "contacts") > 0, fine), high=0.0, unit="%"),
-        Criterion("runs that come to rest", share_of(rest, fine), AT_REST, unit="%"),
-    ]
+    criteria = [*_first_criteria(fine, key)]
     for other in strongest(contenders):
         pairs = outcomes.compared(key, other.key)
         if pairs is not None:
@@ -241,7 +221,7 @@ def rival_claims(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
         head = Claim(f"beyond-{ours.key}-{other.key}", RIVALS, text)
         ratio = f"median of J({ours.label}) / J({other.label}) at the end"
         wins, pairs = f"runs in which {ours.label}'s is the lower one", outcomes.compared(ours.key, other.key)
-        found.append(pair_claim(head, pairs, ratio, wins, lambda pairs: lost_text(pairs, "It")))
+        found.append(claims.pair_claim(head, pairs, ratio, wins, lambda pairs: claims.lost_text(pairs, "It")))
     return found
 
 
@@ -261,7 +241,7 @@ def gap_closed(outcomes: Outcomes, ours: Contender, other: Contender) -> Claim:
     if math.isnan(closed(np.arange(len(own)))):
         return replace(head, explanation=f"{other.label} leaves no gap that could be closed.")
     found = bootstrap_by(closed, fine.maps)
-    medians = f"{median_text(own, '%')} and {median_text(theirs, '%')}"
+    medians = f"{claims.median_text(own, '%')} and {claims.median_text(theirs, '%')}"
     explanation = f"Medians of J/J_ref - 1 in the same runs: {medians}."
     criterion = Criterion("part of the median gap that is closed", found, CLOSED, unit="%")
     return head.judged((criterion,), explanation, fine, 2)
@@ -278,7 +258,10 @@ def targets_claim(outcomes: Outcomes) -> Claim:
     pairs = [each for each in compared if each is not None]
     if not pairs:
         return head
-    measure, bounds = "median of J({}) / J(centroid) at the end", (1.0 - SAME_COST, 1.0 + SAME_COST)
+    measure, bounds = (
+        "median of J({}) / J(centroid) at the end",
+        (1.0 - claims.SAME_COST, 1.0 + claims.SAME_COST),
+    )
     criteria = [Criterion(measure.format(each.first), each.ratio, *bounds) for each in pairs]
     words = "; ".join(
         f"{each.first} lower in {amount(each.wins.estimate, '%')} of the runs" for each in pairs
@@ -290,7 +273,7 @@ def targets_claim(outcomes: Outcomes) -> Claim:
 def density_claim(outcomes: Outcomes) -> Claim:
     """Test whether it helps RAPF to know which places count more."""
     text = "Where some places count more, RAPF that knows which ends at a clearly lower weighed cost."
-    return pair_claim(
+    return claims.pair_claim(
         Claim("density", EXTENSIONS, text),
         outcomes.compared("known", "ignored"),
         "median ratio of the mean distance by φ",
@@ -299,7 +282,7 @@ def density_claim(outcomes: Outcomes) -> Claim:
             "Both are judged by the same φ: two Gaussians of 1 m on every map, 20 high over a floor of 1, "
             "drawn by chance in the free space."
         ),
-        below=CLEARLY_BELOW,
+        below=claims.CLEARLY_BELOW,
     )
 
 
@@ -308,14 +291,14 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
     by_distance, by_time = (law for law in TEAMS if law.controller == controller)
     label = by_time.label.partition(",")[0]
     text = f"In a mixed team {label} is at places sooner, in the mean, with cells by time than by distance."
-    return pair_claim(
+    return claims.pair_claim(
         Claim(f"teams-{controller}", EXTENSIONS, text),
         outcomes.compared(by_time.key, by_distance.key, "time"),
         "median ratio of the mean time, by time to by distance",
         "runs in which it is the lower one",
         lambda pairs: (
-            f"Median of the mean time until the first robot is there: {median_text(pairs.b, 's')} with "
-            f"cells by distance, {median_text(pairs.a, 's')} by time. "
+            f"Median of the mean time until the first robot is there: {claims.median_text(pairs.b, 's')} "
+            f"with cells by distance, {claims.median_text(pairs.a, 's')} by time. "
             f"Two robots each of at most 1, 0.5 and 0.25 m/s."
         ),
     )
@@ -323,7 +306,9 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
 
 def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
     """Test whether RAPF bears messages that are lost or late, from what came of it on so many maps."""
-    text = f"RAPF ends within {amount(NEARLY_SAME, '%')} of its cost where messages get lost or are late."
+    text = (
+        f"RAPF ends within {amount(claims.NEARLY_SAME, '%')} of its cost where messages get lost or are late."
+    )
     head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
     borne = [
@@ -339,7 +324,7 @@ def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
     highest, axis = amount(worst.ratio.estimate), worst.axis.replace("_", " ")
     return replace(
         head,
-        criteria=tuple(Criterion(words, each.ratio, high=1.0 + NEARLY_SAME) for words, each in borne),
+        criteria=tuple(Criterion(words, each.ratio, high=1.0 + claims.NEARLY_SAME) for words, each in borne),
         runs=sum(2 * each.runs for _, each in borne),
         maps=maps,
         explanation=f"The highest of all medians is {highest}, with {axis} {value}.",

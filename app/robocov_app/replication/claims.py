@@ -14,14 +14,7 @@ from numpy.typing import ArrayLike
 from robocov.arrays import Array
 from robocov_app.figures.statistics import Interval, bootstrap, spread
 from robocov_app.replication.contenders import LABELS, potential_text
-from robocov_app.replication.outcomes import (
-    EARLY,
-    FIRST_MINUTE,
-    Comparison,
-    GainOutcomes,
-    Outcomes,
-    spread_of_placements,
-)
+from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.plan import CONVEX_KINDS
 from robocov_app.replication.verdicts import Claim, Criterion, amount, described
 
@@ -250,7 +243,7 @@ def starts_placement(outcomes: Outcomes) -> Claim:
     text = "RAPF's final placement varies little with where the robots start, RPF's strongly."
     head = Claim("starts-placement", 4, text, "VI-B, figures 6 and 8")
     fine = outcomes.measured("final", "rapf-shared", "rpf-shared")
-    rapf, rpf = (_placement_spreads(fine, law) for law in ("rapf-shared", "rpf-shared"))
+    rapf, rpf = (fine.placement_spreads(law) for law in ("rapf-shared", "rpf-shared"))
     maps = [name for name in rapf if name in rpf]
     if not maps:
         return head
@@ -423,17 +416,6 @@ def _variation_by_start(outcomes: Outcomes, law: str) -> tuple[Array, list[str]]
         groups.setdefault((name, seed), []).append(final)
     several = {key: finals for key, finals in groups.items() if len(finals) > 1}
     return np.array([spread(finals) for finals in several.values()]), [name for name, _ in several]
-
-
-def _placement_spreads(outcomes: Outcomes, law: str) -> dict[str, float]:
-    """Return for each map how far ends from different starts are apart, by the side of a robot's share."""
-    maps, found = np.array(outcomes.maps), {}
-    for name in dict.fromkeys(outcomes.maps) if law in outcomes.placements else ():
-        rows = np.flatnonzero(maps == name)
-        apart = spread_of_placements(outcomes.placements[law][rows], [outcomes.starts[k] for k in rows])
-        if np.isfinite(apart) and name in outcomes.shares:
-            found[name] = apart / outcomes.shares[name]
-    return found
 
 
 def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:

@@ -106,6 +106,16 @@ class Outcomes:
         values, names = here.of(contender, measure), np.array(here.maps)
         return {name: float(np.median(values[names == name])) for name in dict.fromkeys(here.maps)}
 
+    def placement_spreads(self, contender: str) -> dict[str, float]:
+        """Return by map the median matched distance of ends from different starts, by a robot's share."""
+        found: dict[str, list[float]] = {}
+        ends = zip(self.scenarios, self.placements.get(contender, ()), strict=False)
+        for (one, first), (other, second) in combinations(ends, 2):
+            apart = one.map == other.map and one.start != other.start
+            if apart and np.isfinite(first).all() and np.isfinite(second).all():
+                found.setdefault(one.map, []).append(matched_distance(first, second))
+        return {name: float(np.median(apart)) / self.shares[name] for name, apart in found.items()}
+
     def compared(self, first: str, second: str, measure: str = "final") -> Comparison | None:
         """Return how `first` compares with `second`; None where they never met."""
         fine = self.measured(measure, first, second)
@@ -268,17 +278,6 @@ def matched_distance(first: Array, second: Array) -> float:
 
     apart = np.hypot(*(first[:, None] - second[None]).transpose(2, 0, 1))
     return float(apart[linear_sum_assignment(apart)].mean())
-
-
-def spread_of_placements(placements: Array, starts: Sequence[str]) -> float:
-    """Return the median matched distance of finite ends (m, n, 2) from different starts; nan without any."""
-    fine = np.flatnonzero(np.isfinite(placements).all(axis=(1, 2))).tolist()
-    pairs = [
-        matched_distance(placements[i], placements[k])
-        for i, k in combinations(fine, 2)
-        if starts[i] != starts[k]
-    ]
-    return float(np.median(pairs)) if pairs else float("nan")
 
 
 def _rows(folder: Path, scenarios: Iterable[Scenario]) -> Iterator[tuple[int, dict[str, Any]]]:

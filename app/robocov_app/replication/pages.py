@@ -24,17 +24,9 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import beyond_claims, claims, contenders, step_times, studies
+from robocov_app.replication import beyond_claims, claims, contenders, evidence, step_times, studies
 from robocov_app.replication.contenders import LABELS, OURS
-from robocov_app.replication.evidence import (
-    ASSETS,
-    Evidence,
-    account_of,
-    evidence,
-    law_rows,
-    ranked_rows,
-    worst_text,
-)
+from robocov_app.replication.evidence import ASSETS, Evidence
 from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
 from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
@@ -181,12 +173,12 @@ def paper_page(
         for scenario, record in results.worst:
             stuck = outcomes.of("rapf-shared", "stuck")[outcomes.scenarios.index(scenario)]
             rest = f"{stuck:.0f} of {len(record.team)} robots rest away from their goals"
-            words = worst_text(outcomes, scenario, "rapf-shared", others)
+            words = evidence.worst_text(outcomes, scenario, "rapf-shared", others)
             failures.append((scenario, _picture(record), f"{words}; {rest}."))
         context |= {
             "best": best,
             "maps_in_all": len({*outcomes.maps}) + len({*results.convex.maps}) + len(plan.tuning),
-            "laws": law_rows(outcomes, [best[key] for key in LABELS if key in best]),
+            "laws": evidence.law_rows(outcomes, [best[key] for key in LABELS if key in best]),
             "maps": {
                 name: {law: gaps[name] for law, gaps in medians.items() if name in gaps}
                 for name in dict.fromkeys(outcomes.maps)
@@ -199,8 +191,8 @@ def paper_page(
 
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
     """Return ``beyond.html``."""
-    found, rows = beyond_claims.beyond_claims(results), ranked_rows(results)
-    each, tuned = evidence(results, rows), bool(results.plan.beyond.tuning)
+    found, rows = beyond_claims.beyond_claims(results), evidence.ranked_rows(results)
+    each, tuned = evidence.evidence(results, rows), bool(results.plan.beyond.tuning)
     beside = ("rapf-best", "rapf-default", "lloyd")
     others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
@@ -213,7 +205,11 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": [
-            (scenario, _picture(record), f"{worst_text(results.outcomes, scenario, OURS[0], others)}.")
+            (
+                scenario,
+                _picture(record),
+                f"{evidence.worst_text(results.outcomes, scenario, OURS[0], others)}.",
+            )
             for scenario, record in results.worst
         ],
         "images": images,
@@ -238,7 +234,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
         "amount": amount,
         "described": described,
         "counts": verdict_counts,
-        "account_of": account_of,
+        "account_of": evidence.account_of,
         "t": claims,
         "rules": beyond_claims,
         "contender": contenders,

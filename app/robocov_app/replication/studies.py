@@ -33,15 +33,7 @@ from robocov.errors import StartError
 from robocov.generator import generated_map
 from robocov.mapfile import load_map
 from robocov_app.replication import contenders as laws
-from robocov_app.replication.contenders import (
-    GRIDS,
-    LLOYD,
-    OWN,
-    RAPF_DEFAULT,
-    RAPF_SHARED,
-    RPF_SHARED,
-    Contender,
-)
+from robocov_app.replication.contenders import Contender
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, KINDS, ROBOTS, TEAM, Plan
 from robocov_app.sweep import study as sweep_study
 from robocov_app.sweep.study import Study, StudyMap
@@ -56,9 +48,9 @@ _POINTS, _LEAST_AREA, _LEAST_WIDTH = 9, 40.0, 5.0
 
 # which runs the figures show: (map, starts, contenders); "paper" is the same on both maps, "other" figure 8's
 FIGURES = {
-    "figures-convex": ("pentagon", ("corner",), (RAPF_SHARED, LLOYD)),
-    "figures-a": ("blocks-a", ("paper",), (RAPF_SHARED, RPF_SHARED)),
-    "figures-b": ("blocks-b", ("paper", "other"), (RAPF_SHARED, RPF_SHARED)),
+    "figures-convex": ("pentagon", ("corner",), (laws.RAPF_SHARED, laws.LLOYD)),
+    "figures-a": ("blocks-a", ("paper",), (laws.RAPF_SHARED, laws.RPF_SHARED)),
+    "figures-b": ("blocks-b", ("paper", "other"), (laws.RAPF_SHARED, laws.RPF_SHARED)),
 }
 
 DENSITY_MAP, DENSITY_START = "hospital", "reception"  # of the picture of a density
@@ -239,7 +231,7 @@ def baseline_gains_study(plan: Plan) -> Study | None:
     """Return the grids of the baselines' gains on some maps of the tuning; None where there are none."""
     if not plan.beyond.tuning:
         return None
-    sets = [laws.with_gains(name, gains) for name, each in GRIDS.items() for gains in each]
+    sets = [laws.with_gains(name, gains) for name, each in laws.GRIDS.items() for gains in each]
     on = generated_maps(plan.beyond.tuning)
     return contest(plan, on, sets, plan.tuning_starts, (plan.tuning_seed,)).study
 
@@ -255,11 +247,11 @@ def beyond_contests(
     found = {
         name: contest(plan, baseline_maps(plan), part, beyond.starts, beyond.seeds_of(part[0].controller))
         for name, part in (
-            {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in OWN}
+            {"rivals": laws.baselines(best)} | {f"ours-{each.key}": (each,) for each in laws.OWN}
         ).items()
     }
     if beyond.unseen:
-        sides = OWN[0], *laws.strongest(papers)
+        sides = laws.OWN[0], *laws.strongest(papers)
         found["unseen"] = contest(plan, generated_maps(beyond.unseen), sides, beyond.starts, beyond.seeds)
     found["targets"] = contest(plan, on, laws.TARGETS, starts, (0,))
     known = load_map(DENSITY_MAP)
@@ -267,8 +259,8 @@ def beyond_contests(
         ("", density_maps(plan), known),
         ("-ignored", on, replace(known, density=None)),
     ):
-        found[f"density{suffix}"] = contest(plan, weighed, (RAPF_DEFAULT,), starts, (0,))
-        picture = (StudyMap(DENSITY_MAP, shown),), (RAPF_DEFAULT,), (DENSITY_START,), (0,)
+        found[f"density{suffix}"] = contest(plan, weighed, (laws.RAPF_DEFAULT,), starts, (0,))
+        picture = (StudyMap(DENSITY_MAP, shown),), (laws.RAPF_DEFAULT,), (DENSITY_START,), (0,)
         found[f"density-picture{suffix}"] = contest(plan, *picture, record_hz=5.0)
     return found | {"teams": contest(plan, on, laws.TEAMS, starts, (0,), group=GROUPS)}
 
@@ -303,8 +295,8 @@ def conditions_studies(plan: Plan) -> dict[str, Study]:
 def probes(plan: Plan, *, beyond: bool) -> list[Study]:
     """Return runs by which the time of others is estimated, one of each controller; short ones `beyond`."""
     on, short = "blocks-a", replace(plan, duration=min(plan.beyond.probe, plan.duration))
-    papers = (RAPF_SHARED, RPF_SHARED, LLOYD)
-    others = (*laws.baselines({}), *OWN) if beyond else ()
+    papers = (laws.RAPF_SHARED, laws.RPF_SHARED, laws.LLOYD)
+    others = (*laws.baselines({}), *laws.OWN) if beyond else ()
     shorts = [contest(short, (bundled(on),), (each,), ("corner",), (0,)).study for each in others]
     return [contest(plan, (StudyMap(on, load_map(on)),), papers, ("paper",), (0,)).study, *shorts]
 

@@ -15,7 +15,6 @@ from robocov_app.replication.outcomes import (
     Outcomes,
     Scenario,
     matched_distance,
-    spread_of_placements,
 )
 from robocov_app.replication.verdicts import Claim, Criterion, amount, verdict_counts
 
@@ -342,8 +341,15 @@ class TestMatchedDistance:
 
     def test_only_pairs_of_different_starts_count(self):
         ends = np.array([[[0.0, 0.0]], [[9.0, 0.0]], [[1.0, 0.0]], [[np.nan, 0.0]]])
-        assert spread_of_placements(ends, ["a", "a", "b", "b"]) == pytest.approx(4.5)
-        assert np.isnan(spread_of_placements(ends[:2], ["a", "a"]))
+        starts = (("m", "a"), ("m", "a"), ("m", "b"), ("m", "b"), ("n", "a"), ("o", "b"))
+        found = Outcomes(
+            tuple(Scenario(name, start, k) for k, (name, start) in enumerate(starts)),
+            {},
+            {"lloyd": np.concatenate([ends, ends[:2]])},
+            dict.fromkeys("mno", 3.0),
+        )
+        assert found.placement_spreads("lloyd") == {"m": pytest.approx(1.5)}
+        assert found.placement_spreads("rapf") == {}
 
 
 def test_how_many_claims_hold_is_told_in_words():

@@ -23,7 +23,7 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.replication import beyond_claims, claims, pages, results, step_times, studies
+from robocov_app.replication import beyond_claims, claims, contenders, pages, results, step_times, studies
 from robocov_app.replication import plan as planned
 from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
@@ -43,7 +43,7 @@ FIRST = results.partition_record()
 def small_parts():
     """Try two sets of each baseline's gains; time few steps."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(studies, "GRIDS", {name: (grid[0], grid[-1]) for name, grid in GRIDS.items()})
+        patch.setattr(contenders, "GRIDS", {name: (grid[0], grid[-1]) for name, grid in GRIDS.items()})
         patch.setattr(step_times, "BLOCK", 3)
         yield
 
