@@ -17,7 +17,6 @@ from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.editor import Editor
-from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.window import display
@@ -56,7 +55,7 @@ def opened_editor(
     with display(headless=True):
         if document is None:
             document = Document(sketch if sketch is not None else sheet(), drafts)
-        editor = Editor(document, readings or measurement_worker(direct=True), OwnPasteboard(), folder)
+        editor = Editor(document, readings or measurement_worker(direct=True), folder)
         editor.theme = theme
         hands = Hands(EditorWindow(editor, size, scale, drafts, patient=True))
         hands.settle()

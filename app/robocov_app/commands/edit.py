@@ -42,9 +42,9 @@ class Arguments(WindowOptions):
 
 def command(options: Arguments) -> int:
     """Open the editor, or save a picture of it."""
-    from robocov_app.editor.ui.launch import EditorLauncher
+    from robocov_app.editor.ui.launch import editor_window
 
-    opening = EditorLauncher(
+    opening = editor_window(
         None if options.map is None else map_path(options.map),
         options.folder,
         background=options.background,
@@ -53,7 +53,7 @@ def command(options: Arguments) -> int:
         scale=options.scale,
         headless=options.screenshot is not None,
     )
-    with opening.window() as window:
+    with opening as window:
         if options.screenshot is None:
             window.run()
             return 0

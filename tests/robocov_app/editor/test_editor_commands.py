@@ -13,6 +13,7 @@ from robocov_app.editor.edits import create
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.ui.commands import GROUPS, TYPED, offered, typed_commands
+from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import Choice
 
 LOW = PolygonObstacle(((1, 1), (4, 1), (4, 4), (1, 4)))
@@ -149,15 +150,15 @@ def test_copies_go_through_the_clipboard_also_to_another_window(hands: Hands, tm
     assert len(hands.shapes) == 7
     hands.key("ctrl+x")
     assert len(hands.shapes) == 5
-    text = hands.editor.pasteboard.get()
+    text = clipboard.get()
     with opened_editor(tmp_path) as other:
-        other.editor.pasteboard.put(text)
+        clipboard.put(text)
         other.key("ctrl+shift+v")
         assert len(other.shapes) == 2
-        other.editor.pasteboard.put("no map at all")
+        clipboard.put("no map at all")
         other.key("ctrl+v")
         assert other.editor.trouble and len(other.shapes) == 2
-        other.editor.pasteboard.put("")
+        clipboard.put("")
         other.key("ctrl+v")
         assert "empty" in other.said
 

@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pygame
@@ -21,7 +22,8 @@ from robocov_app.editor.model.autosave import recoverable
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.import_dialog import ImportDialog
-from robocov_app.editor.ui.launch import EditorLauncher, offer
+from robocov_app.editor.ui.launch import editor_window, offer
+from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER
@@ -229,39 +231,39 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def opening(folder: Path, path: Path | None = None, **more: object) -> EditorLauncher:
-    return EditorLauncher(path, folder, size=(900, 600), scale=1.0, **more)
+def opening(folder: Path, path: Path | None = None, **more: object) -> AbstractContextManager[EditorWindow]:
+    return editor_window(path, folder, size=(900, 600), scale=1.0, **more)
 
 
 def test_settings_are_remembered(places: Path) -> None:
-    with opening(places).window() as window:
+    with opening(places) as window:
         window.editor.theme = "dark"
-        window.editor.attempt(lambda: run_typed(window.editor, "grid 0.25"))
+        window.editor.attempt(lambda: run_typed(window.editor, "grid", "0.25"))
         window.editor.snaps.discard("edges")
         window.panel.show_tab("snap")
         window.documents.remember(places / "x.json")
         window.documents.leaving = True
-    with opening(places).window() as window:
+    with opening(places) as window:
         editor = window.editor
         assert (editor.theme, editor.grid, window.panel.tab) == ("dark", 0.25, "snap")
         assert "edges" not in editor.snaps and editor.recent == [str(places / "x.json")]
 
 
 def test_what_options_ask_for_is_not_remembered(places: Path) -> None:
-    with opening(places, theme="dark").window() as window:
+    with opening(places, theme="dark") as window:
         assert window.editor.theme == "dark"
         window.documents.leaving = True
-    with opening(places).window() as window:
+    with opening(places) as window:
         assert window.editor.theme == "light"
         window.documents.leaving = True
 
 
 def test_a_picture_given_at_the_start_is_shown_whatever_was_hidden_before(places: Path) -> None:
     Image.new("RGB", (40, 30)).save(places / "plan.png")
-    with opening(places).window() as window:
+    with opening(places) as window:
         window.editor.shown.discard("picture")
         window.documents.leaving = True
-    with opening(places, background=places / "plan.png").window() as window:
+    with opening(places, background=places / "plan.png") as window:
         assert "picture" in window.editor.shown and window.editor.sketch.background is not None
 
 
@@ -279,12 +281,12 @@ def test_work_that_was_left_behind_is_offered_and_recovered(places: Path) -> Non
     lost.keep()
     lost.flush()
     lost.close(discard=False)
-    with opening(places).window() as window:
+    with opening(places) as window:
         assert isinstance(window.editor.asked, Question) and "Recover" in window.editor.asked.title
         Hands(window).key("r")
         assert len(window.editor.sketch.obstacles) == 1 and window.editor.document.unsaved
     # the window went without a decision: it is offered again
-    with opening(places).window() as window:
+    with opening(places) as window:
         assert window.editor.asked is not None
         Hands(window).key("l")
         offer(window, recoverable(places / "drafts"))
@@ -299,10 +301,10 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
     document.flush()
     with (
         pytest.raises(InputError, match="another editor has it open"),
-        opening(places, places / "plan.json").window(),
+        opening(places, places / "plan.json"),
     ):
         pass
-    with opening(places).window() as window:
+    with opening(places) as window:
         window.editor.attempt(lambda: window.documents.open(places / "plan.json"))
         assert window.editor.trouble and "another editor" in window.editor.message
         window.documents.leaving = True
@@ -310,7 +312,7 @@ def test_a_file_that_another_editor_has_open_is_not_opened_twice(places: Path) -
 
 
 def test_a_new_name_is_a_new_map(places: Path) -> None:
-    with opening(places, places / "fresh.json").window() as window:
+    with opening(places, places / "fresh.json") as window:
         assert window.editor.document.title == "fresh.json" and not window.editor.document.unsaved
         window.editor.attempt(window.documents.save)
         window.documents.leaving = True
@@ -363,7 +365,7 @@ def test_a_broken_file_is_told_before_a_window_opens(places: Path, capsys) -> No
 def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> None:
     plan = {"id": "flat", "bbox": {"min": [0, 0], "max": [4, 3]}, "verts": [[0, 0], [4, 0], [4, 3], [0, 3]]}
     (places / "flat.json").write_text(json.dumps({**plan, "room_num": 1, "room_category": {}}))
-    with opening(places, places / "flat.json").window() as window:
+    with opening(places, places / "flat.json") as window:
         asked = window.editor.asked
         assert isinstance(asked, ImportDialog) and asked.path.name == "flat.json"
         asked.accepted = True
@@ -378,7 +380,7 @@ def test_a_map_of_another_format_asks_how_it_is_to_be_imported(places: Path) -> 
 def test_a_file_of_no_map_is_named_for_what_it_is(places: Path) -> None:
     (places / "plan.shp").write_bytes(b"\0\0'\x0a" + bytes(96))
     wanted = pytest.raises(MapError, match="a shapefile, which cannot be imported: ogr2ogr")
-    with wanted, opening(places, places / "plan.shp").window():
+    with wanted, opening(places, places / "plan.shp"):
         pass
 
 

@@ -14,7 +14,6 @@ from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.panel import TABS
-from robocov_app.editor.ui.pasteboard import OwnPasteboard
 from robocov_app.editor.ui.status import facts
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import help as help_page
@@ -338,11 +337,7 @@ def test_the_title_of_the_window_tells_what_is_unsaved(hands: Hands) -> None:
     assert pygame.display.get_caption()[0] == "● Untitled · robocov edit"
 
 
-def test_clipboards_keep_texts() -> None:
-    own = OwnPasteboard()
-    assert own.get() == ""
-    own.put("text")
-    assert own.get() == "text"
+def test_the_clipboard_keeps_texts_also_without_a_display() -> None:
     pygame.display.quit()
     clipboard.put("text")
     assert clipboard.get() == "text"

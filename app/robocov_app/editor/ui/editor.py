@@ -2,77 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
 
+from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.model.validation import in_words
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.model.validation import Problem, in_words
 from robocov_app.editor.tools.handles import Handle, handled, handles
+from robocov_app.editor.tools.select import SelectTool
 from robocov_app.editor.tools.snap_targets import Snapper, vertex_count
 from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
+from robocov_app.editor.tools.tool import Tool
 from robocov_app.editor.tools.toolbox import toolbox
-from robocov_app.editor.ui.settings import SHOWN, SNAPS, snapping_for
+from robocov_app.editor.ui.settings import SHOWN, SNAPS
 from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
+from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.worker import Worker
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
-
-    from robocov.environment import Point
-    from robocov_app.editor.model.document import Document
-    from robocov_app.editor.model.measurement import Measurement
-    from robocov_app.editor.model.selection import Change
-    from robocov_app.editor.model.sketch import Owner, Sketch
-    from robocov_app.editor.model.validation import Problem
-    from robocov_app.editor.tools.select import SelectTool
-    from robocov_app.editor.tools.tool import Tool
-    from robocov_app.toolkit.worker import Worker
-
-SAID_FOR = 5.0
-"""Seconds for which a message stays."""
-
-TROUBLE_FOR = 8.0
-"""The same for what went wrong."""
-
-SNAPS_WITHIN = 0.6
-"""Part of a finger's width within which points snap: a line that is far off is not to beat the grid."""
-
-FEW = 1500
-"""Vertices up to which a map is measured while something is dragged."""
-
-GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
-"""Spacings of the grid to choose from, m."""
-
-
-class Pasteboard(Protocol):
-    """The system's clipboard."""
-
-    def put(self, text: str) -> None:
-        """Put a text there."""
-
-    def get(self) -> str:
-        """Return the text that is there, empty if none is."""
+SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong
+SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
+FEW = 1500  # vertices up to which a map is measured while something is dragged
+GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spacings to choose from
 
 
 class Editor:
-    """What the user does, and what of it is shown.
+    """What the user does, and what of it is shown."""
 
-    `version`: grows whenever panel and sheet have to look again at what there is. `message`: what was said
-    last, empty when it is old. `pixel`, m: what a pixel at scale 1 is on the sheet. `cursor`, (x, y) or None
-    m: where the mouse is. `moves_since`, s: since when obstacles that move are shown moving. `dialogs`: what
-    is waiting for an answer. `problem`: the one that is shown with its words.
-    """
-
-    def __init__(
-        self, document: Document, readings: Worker[Measurement], pasteboard: Pasteboard, folder: Path
-    ) -> None:
-        self.document, self.readings, self.pasteboard, self.folder = document, readings, pasteboard, folder
+    def __init__(self, document: Document, readings: Worker[Measurement], folder: Path) -> None:
+        self.document, self.readings, self.folder = document, readings, folder
         self.tools = toolbox()
         self.tool: Tool = self.tools["select"]
-        self.version = 0
+        self.version = 0  # grows whenever panel and sheet have to look again at what there is
         self.theme = "light"
         self.panel = True
         self.shown = {name for name in SHOWN if name != "robots"}
@@ -83,18 +50,18 @@ class Editor:
         self.start: str | None = None
         self.recent: list[str] = []
         self.measurement: Measurement | None = None
-        self.problem: Problem | None = None
-        self.dialogs = Dialogs()
-        self.message = ""
+        self.problem: Problem | None = None  # the one that is shown with its words
+        self.dialogs = Dialogs()  # with what waits for an answer
+        self.message = ""  # what was said last, empty when it is old
         self.trouble = False
-        self.pixel = 0.01
-        self.cursor: Point | None = None
+        self.pixel = 0.01  # m; what a pixel at scale 1 is on the sheet
+        self.cursor: Point | None = None  # where the mouse is, m
         self.typed = ""
         self.now = 0.0
-        self.moves_since: float | None = None
+        self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
         self._said = 0.0
         self.snapper = Snapper()
-        self._grips: tuple[object, tuple[Handle, ...]] = (None, ())
+        self._handles: Latest[tuple[Handle, ...]] = Latest()
         self._about: tuple[object, float] | None = None
 
     # what there is
@@ -134,15 +101,8 @@ class Editor:
     @property
     def handles(self) -> tuple[Handle, ...]:
         """What of the selection can be taken hold of."""
-        key = (self.sketch, self.selection, self.pixel)
-        before = self._grips[0]
-        if (
-            not isinstance(before, tuple)
-            or any(a is not b for a, b in zip(before[:2], key[:2], strict=True))
-            or (before[2] != key[2])
-        ):
-            self._grips = key, handles(self.sketch, self.selection, self.pixel)
-        return self._grips[1]
+        sketch, look = self.sketch, (self.selection, self.pixel)
+        return self._handles.of(sketch, look, lambda: handles(sketch, *look))
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -158,17 +118,15 @@ class Editor:
     def start_name(self) -> str | None:
         """The start at which the team is shown: the selected one, the chosen one, or the first."""
         names = self.start_names
-        selected = sorted(self.selection.starts)
-        for name in (*selected, self.start):
-            if name in names:
-                return name
-        return names[0] if names else None
+        wanted = (*sorted(self.selection.starts), self.start, *names)
+        return next((name for name in wanted if name in names), None)
 
     # snapping
 
     def snapping(self, reach: float) -> Snapping:
         """Return what to snap to, for a finger that is so many metres wide."""
-        return snapping_for(SNAPS_WITHIN * reach, self.grid, self.snap_angle, self.snaps)
+        kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name][1])
+        return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
 
     def snap(self, raw: Point, reach: float) -> Snap:
         """Return where a place means for the tool that is chosen."""
@@ -348,6 +306,10 @@ class Editor:
             raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
         self.version += 1
+
+    def add_robots(self, by: int) -> None:
+        """Show a team of more or fewer robots."""
+        self.set_robots(min(max(self.robots + by, 1), 1000))
 
     def set_wall_width(self, width: float) -> None:
         """Draw walls of another width, m."""

@@ -2,36 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from types import UnionType
+from typing import Any, NamedTuple
 
-from robocov.environment import CircleObstacle, DiscStart, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, Point, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import properties, transform, vertices
-from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.edits import properties, transform
 from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import place_of
-from robocov_app.editor.ui.commands import run_typed, whole
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.environment import Point
-    from robocov_app.editor.model.background import Background
-    from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.commands import Edit, move, run_typed, whole
+from robocov_app.editor.ui.editor import Editor
 
 
-@dataclass(frozen=True)
-class Field:
-    """A field of the panel.
+class Field(NamedTuple):
+    """A field of the panel."""
 
-    `text`: returns what it shows. `take`: takes what was typed; raises a MapError where that means nothing.
-    """
-
-    text: Callable[[Editor], str]
-    take: Callable[[Editor, str], object]
+    text: Callable[[Editor], str]  # what it shows
+    take: Callable[[Editor, str], object]  # takes what was typed; MapError where that means nothing
     tip: str = ""
+
+    def shown(self, editor: Editor) -> str:
+        """Return what the field shows; nothing where there is no such value."""
+        try:
+            return self.text(editor)
+        except (MapError, LookupError):
+            return ""
 
 
 def number(value: float) -> str:
@@ -46,69 +46,63 @@ def number(value: float) -> str:
 
 def coordinate(text: str, now: float) -> float:
     """Return a typed coordinate, m: a number with a unit or without, or a step as ``+0.5``."""
+    text = text.strip()
+    if text.startswith(("+", "@")):
+        return now + length_of(text.lstrip("+@"))
     # two coordinates are read where only one is typed, so that signs and units mean the same
-    return (
-        point_of(f"{text.strip()} 0", last=(now, 0.0))[0]
-        if not text.strip().startswith(("+", "@"))
-        else (now + length_of(text.strip().lstrip("+@")))
-    )
+    return point_of(f"{text} 0", last=(now, 0.0))[0]
+
+
+def _selected_things(editor: Editor) -> list[Any]:
+    """Return the shapes and starts that are selected, as they are shown."""
+    sketch, selection = editor.preview
+    keys = [key for key in selection.items if key in sketch.places]
+    return [sketch.item(key).shape for key in keys] + [
+        spec for name, spec in sketch.starts if name in selection.starts
+    ]
 
 
 def _corner(editor: Editor) -> Point:
     """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
     sketch, selection = editor.preview
     if len(selection.vertices) == 1:
-        (vertex,) = selection.vertices
-        return place_of(sketch, vertex)
-    center = _center(editor)
-    if center is not None:
-        return center
+        return place_of(sketch, *selection.vertices)
+    if not selection.vertices and len(selection.owners) == 1:
+        for thing in _selected_things(editor):
+            if isinstance(thing, CircleObstacle | DiscStart):
+                return thing.center
+    x, y, _, _ = _bounds(editor)
+    return x, y
+
+
+def _bounds(editor: Editor) -> tuple[float, float, float, float]:
+    sketch, selection = editor.preview
     bounds = bounds_of(sketch, whole(selection))
     if bounds is None:
         raise MapError("nothing is selected")
-    return bounds[0], bounds[1]
+    return bounds
 
 
-def _center(editor: Editor) -> Point | None:
-    sketch, selection = editor.preview
-    if selection.vertices or len(selection.owners) != 1:
-        return None
-    (owner,) = selection.owners
-    if isinstance(owner, str):
-        spec = dict(sketch.starts).get(owner)
-        return spec.center if isinstance(spec, DiscStart) else None
-    if owner not in sketch.places:
-        return None
-    shape = sketch.item(owner).shape
-    return shape.center if isinstance(shape, CircleObstacle) else None
-
-
-def _put(editor: Editor, axis: int, text: str) -> None:
+def _put(editor: Editor, text: str, axis: int) -> None:
     """Put what is selected at a typed coordinate."""
-    now = _corner(editor)
-    by = coordinate(text, now[axis]) - now[axis]
-    selection = editor.selection
+    now = _corner(editor)[axis]
+    by = coordinate(text, now) - now
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
-    act = vertices.moved if selection.vertices else transform.moved
-    editor.change(act(editor.sketch, selection, dx, dy))
+    editor.change(move(editor, dx, dy, editor.selection))
 
 
 def _size(editor: Editor, axis: int) -> str:
-    sketch, selection = editor.preview
-    bounds = bounds_of(sketch, whole(selection))
-    return "" if bounds is None else number(bounds[axis + 2] - bounds[axis])
+    bounds = _bounds(editor)
+    return number(bounds[axis + 2] - bounds[axis])
 
 
-def _resize(editor: Editor, axis: int, text: str) -> None:
+def _resize(editor: Editor, text: str, axis: int) -> None:
     """Give what is selected a typed width or height; the other stays, but of circles."""
-    selection = whole(editor.selection)
-    bounds = bounds_of(editor.sketch, selection)
-    if bounds is None:
-        raise MapError("nothing is selected")
-    now = bounds[2] - bounds[0], bounds[3] - bounds[1]
-    to = length_of(text, now=now[axis])
-    wide, high = (to, now[1]) if axis == 0 else (now[0], to)
-    editor.change(transform.resized(editor.sketch, selection, wide or None, high or None))
+    low_x, low_y, high_x, high_y = _bounds(editor)
+    sides = [high_x - low_x, high_y - low_y]
+    sides[axis] = length_of(text, now=sides[axis])
+    wide, high = (side or None for side in sides)
+    editor.change(transform.resized(editor.sketch, whole(editor.selection), wide, high))
 
 
 def _shown_name(editor: Editor) -> str:
@@ -116,9 +110,7 @@ def _shown_name(editor: Editor) -> str:
     if len(owners) != 1:
         return ""
     (owner,) = owners
-    if isinstance(owner, str):
-        return owner
-    return editor.sketch.item(owner).shape.name or "" if owner in editor.sketch.places else ""
+    return owner if isinstance(owner, str) else editor.sketch.item(owner).shape.name or ""
 
 
 def _rename(editor: Editor, text: str) -> None:
@@ -128,7 +120,7 @@ def _rename(editor: Editor, text: str) -> None:
 
 
 def _shown_note(editor: Editor) -> str:
-    notes = {editor.sketch.item(key).note for key in editor.selection.items if key in editor.sketch.places}
+    notes = {editor.sketch.item(key).note for key in editor.selection.items}
     return notes.pop() if len(notes) == 1 else ""
 
 
@@ -136,36 +128,15 @@ def _note(editor: Editor, text: str) -> None:
     editor.change(properties.noted(editor.sketch, whole(editor.selection), text.strip()))
 
 
-def _wall_width(editor: Editor) -> str:
-    shapes = [editor.sketch.item(key).shape for key in editor.selection.items if key in editor.sketch.places]
-    widths = {shape.width for shape in shapes if isinstance(shape, WallObstacle)}
-    return number(widths.pop()) if len(widths) == 1 else ""
+def _measure(editor: Editor, name: str, kinds: UnionType | type) -> str:
+    """Return the width or radius that all selected things of these kinds have."""
+    found = {getattr(thing, name) for thing in _selected_things(editor) if isinstance(thing, kinds)}
+    return number(found.pop()) if len(found) == 1 else ""
 
 
-def _set_width(editor: Editor, text: str) -> None:
-    now = _wall_width(editor)
-    width = length_of(text, now=float(now) if now else None)
-    editor.change(properties.widened(editor.sketch, whole(editor.selection), width))
-
-
-def _radius(editor: Editor) -> str:
-    sketch, selection = editor.preview
-    for owner in selection.owners:
-        if isinstance(owner, str):
-            spec = dict(sketch.starts).get(owner)
-            if isinstance(spec, DiscStart):
-                return number(spec.radius)
-        elif owner in sketch.places:
-            shape = sketch.item(owner).shape
-            if isinstance(shape, CircleObstacle):
-                return number(shape.radius)
-    return ""
-
-
-def _set_radius(editor: Editor, text: str) -> None:
-    now = _radius(editor)
-    radius = length_of(text, now=float(now) if now else None)
-    editor.change(properties.sized(editor.sketch, whole(editor.selection), radius))
+def _set_measure(editor: Editor, text: str, edit: Edit, now: Callable[[Editor], str]) -> None:
+    length = length_of(text, now=float(now(editor)) if now(editor) else None)
+    editor.change(edit(editor.sketch, whole(editor.selection), length))
 
 
 def _picture(editor: Editor) -> Background:
@@ -175,100 +146,73 @@ def _picture(editor: Editor) -> Background:
 
 
 def _set_scale(editor: Editor, text: str) -> None:
-    laid = _picture(editor)
-    scale = length_of(text, now=laid.scale)
+    scale = length_of(text, now=_picture(editor).scale)
     if not scale > 0.0:
         raise MapError("a pixel must be larger than 0 m")
-    editor.change(underlaid(editor.sketch, replace(laid, scale=scale)))
-
-
-def _set_turn(editor: Editor, text: str) -> None:
-    editor.change(underlaid(editor.sketch, replace(_picture(editor), turn=angle_of(text))))
+    _lay(editor, scale=scale)
 
 
 def _set_opacity(editor: Editor, text: str) -> None:
-    laid = _picture(editor)
     part = min(max(float(text), 0.0), 1.0)
-    editor.change(underlaid(editor.sketch, replace(laid, opacity=round(part, 2))), drag="opacity")
+    _lay(editor, drag="opacity", opacity=round(part, 2))
 
 
-def _on_picture(editor: Editor, words: Callable[[Background], str]) -> str:
-    return words(editor.sketch.background) if editor.sketch.background is not None else ""
+def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
+    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
+    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
 
 
-def _or_empty(text: Callable[[Editor], str]) -> Callable[[Editor], str]:
-    def shown(editor: Editor) -> str:
-        try:
-            return text(editor)
-        except (MapError, LookupError):
-            return ""
+def _typed(text: Callable[[Editor], str], word: str, tip: str) -> Field:
+    """Return a field that takes what can also be typed after a command."""
+    return Field(text, lambda editor, given: run_typed(editor, word, given), tip)
 
-    return shown
 
+def _titled(name: str, tip: str) -> Field:
+    def take(editor: Editor, text: str) -> None:
+        editor.change(properties.titled(editor.sketch, **{name: text.strip()}))
+
+    return Field(lambda editor: str(getattr(editor.sketch, name)), take, tip)
+
+
+_wall_width = partial(_measure, name="width", kinds=WallObstacle)
+_radius = partial(_measure, name="radius", kinds=CircleObstacle | DiscStart)
+_set_width = partial(_set_measure, edit=properties.widened, now=_wall_width)
+_set_radius = partial(_set_measure, edit=properties.sized, now=_radius)
+_MOVES = "{}; +0.5 moves by half a metre"
 
 FIELDS: dict[str, Field] = {
-    "title": Field(
-        lambda editor: editor.sketch.name,
-        lambda editor, text: editor.change(properties.titled(editor.sketch, name=text.strip())),
-        "The map's name, for people",
-    ),
-    "description": Field(
-        lambda editor: editor.sketch.description,
-        lambda editor, text: editor.change(properties.titled(editor.sketch, description=text.strip())),
-        "A sentence about the map",
-    ),
-    "radius": Field(
+    "title": _titled("name", "The map's name, for people"),
+    "description": _titled("description", "A sentence about the map"),
+    "radius": _typed(
         lambda editor: number(editor.radius),
-        lambda editor, text: run_typed(editor, f"radius {text}"),
+        "radius",
         "Radius of a robot: what is too narrow for it is hatched",
     ),
-    "robots": Field(
+    "robots": _typed(
         lambda editor: str(editor.robots),
-        lambda editor, text: run_typed(editor, f"robots {text}"),
+        "robots",
         "Robots of the team that is shown at a start, and tried with F5",
     ),
-    "grid": Field(
-        lambda editor: number(editor.grid),
-        lambda editor, text: run_typed(editor, f"grid {text}"),
-        "Distance of the grid's lines; arrows move by it",
+    "grid": _typed(
+        lambda editor: number(editor.grid), "grid", "Distance of the grid's lines; arrows move by it"
     ),
-    "angle": Field(
-        lambda editor: number(editor.snap_angle),
-        lambda editor, text: run_typed(editor, f"angle {text}"),
-        "Lines snap to multiples of this",
-    ),
-    "name": Field(_or_empty(_shown_name), _rename, "What people call it"),
-    "note": Field(_or_empty(_shown_note), _note, "Whatever is worth remembering of it"),
+    "angle": _typed(lambda editor: number(editor.snap_angle), "angle", "Lines snap to multiples of this"),
+    "name": Field(_shown_name, _rename, "What people call it"),
+    "note": Field(_shown_note, _note, "Whatever is worth remembering of it"),
     "x": Field(
-        _or_empty(lambda editor: number(_corner(editor)[0])),
-        lambda editor, text: _put(editor, 0, text),
-        "From the left; +0.5 moves by half a metre",
+        lambda editor: number(_corner(editor)[0]), partial(_put, axis=0), _MOVES.format("From the left")
     ),
-    "y": Field(
-        _or_empty(lambda editor: number(_corner(editor)[1])),
-        lambda editor, text: _put(editor, 1, text),
-        "From below; +0.5 moves by half a metre",
-    ),
-    "wide": Field(
-        _or_empty(lambda editor: _size(editor, 0)),
-        lambda editor, text: _resize(editor, 0, text),
-        "Also *2, 50% or +0.3",
-    ),
-    "high": Field(
-        _or_empty(lambda editor: _size(editor, 1)),
-        lambda editor, text: _resize(editor, 1, text),
-        "Also *2, 50% or +0.3",
-    ),
-    "width": Field(_or_empty(_wall_width), _set_width, "How thick the wall is"),
-    "size:radius": Field(_or_empty(_radius), _set_radius, "Its radius"),
-    "picture:scale": Field(
-        lambda editor: _on_picture(editor, lambda laid: f"{laid.scale:.6g}"), _set_scale, "Side of a pixel"
-    ),
+    "y": Field(lambda editor: number(_corner(editor)[1]), partial(_put, axis=1), _MOVES.format("From below")),
+    "wide": Field(partial(_size, axis=0), partial(_resize, axis=0), "Also *2, 50% or +0.3"),
+    "high": Field(partial(_size, axis=1), partial(_resize, axis=1), "Also *2, 50% or +0.3"),
+    "width": Field(_wall_width, _set_width, "How thick the wall is"),
+    "size:radius": Field(_radius, _set_radius, "Its radius"),
+    "picture:scale": Field(lambda editor: f"{_picture(editor).scale:.6g}", _set_scale, "Side of a pixel"),
     "picture:turn": Field(
-        lambda editor: _on_picture(editor, lambda laid: number(laid.turn)), _set_turn, "Counter-clockwise"
+        lambda editor: number(_picture(editor).turn),
+        lambda editor, text: _lay(editor, turn=angle_of(text)),
+        "Counter-clockwise",
     ),
-    "picture:opacity": Field(
-        lambda editor: _on_picture(editor, lambda laid: number(laid.opacity)), _set_opacity, ""
-    ),
+    "picture:opacity": Field(lambda editor: number(_picture(editor).opacity), _set_opacity),
 }
 """All fields by name."""

@@ -201,7 +201,7 @@ class Panel:
         """Show a field between its word and its unit, each in a cell of its own."""
         editor, field = self.editor, FIELDS[name]
         ui.label(word, key=f"word:{name}", tip=field.tip)
-        given = ui.text_entry(name, field.text(editor), tip=field.tip)
+        given = ui.text_entry(name, field.shown(editor), tip=field.tip)
         if unit:
             ui.label(unit, key=f"unit:{name}", style="unit")
         if given is not None:

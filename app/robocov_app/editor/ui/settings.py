@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.tools.snapping import Snapping
 
 if TYPE_CHECKING:
     from robocov_app.editor.tools.snapping import Kind
@@ -35,6 +34,13 @@ SHOWN: dict[str, str] = {
 }
 """What can be shown, or not, with its title."""
 
+ATTRIBUTES = {
+    **{name: name for name in ("grid", "radius", "robots")},
+    "angle": "snap_angle",
+    "wall": "wall_width",
+}
+"""Settings that are as an attribute of the editor, with its name."""
+
 MOST_RECENT = 10
 
 
@@ -56,17 +62,3 @@ class EditorSettings(BaseModel):
     robots: int = Field(default=6, ge=1, le=1000)
     wall: float = Field(default=0.1, ge=0.001, le=100.0)
     recent: tuple[str, ...] = ()
-
-
-def kinds_of(chosen: set[str]) -> frozenset[Kind]:
-    """Return the kinds of `Snapping` for what people chose.
-
-    >>> sorted(kinds_of({"grid", "edges"}))
-    ['edge', 'grid']
-    """
-    return frozenset(kind for name in chosen if name in SNAPS for kind in SNAPS[name][1])
-
-
-def snapping_for(reach: float, grid: float, angle: float, chosen: set[str]) -> Snapping:
-    """Return what to snap to within a reach, m."""
-    return Snapping(reach, grid, angle, kinds_of(chosen))
