@@ -58,7 +58,7 @@ def editor(theme: str, name: str) -> None:
         editor.change(rectangle_drawn(editor.sketch, (15.6, 7.0), (17.9, 7.6)))
         window.panel.show_tab("object")
         window.frame(0.5)
-        to = window.arena.to_pixel
+        to = window.canvas.to_pixel
         hand = [(16.6, 7.3), (16.8, 7.0), (17.8, 5.0), (18.03, 4.33)]
         points = [tuple(map(round, to(point))) for point in hand]
         pygame.event.post(pygame.Event(pygame.MOUSEBUTTONDOWN, pos=points[0], button=1))
