@@ -141,82 +141,36 @@ class StudyMap:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What a sweep runs: every combination of what is given.
+    """What a sweep runs: every combination of what is given, from the same starts for every controller.
 
-    For the same map, team and seed every controller begins in the same places.
-
-    Attributes
-    ----------
-    maps : tuple of StudyMap
-    controllers : tuple of str
-        By name, or ``mine.py:MyController``.
-    gains : dict of controller to Gains
-        What is tried of each controller: dicts of name to value, list of values or `Range`, or a list of
-        dicts of name to value; see `Gains.of`. Without an entry, the defaults.
-    robots : tuple of int
-    starts : tuple of str
-        Names of starts; none: the first of each map; ``("*",)``: all of each map.
-    seeds : tuple of int
-    duration : float, s
-    dt : float, s
-        Control period.
-    radius, max_speed, max_acceleration, viscosity, sensing_range, communication_range
-        Of the team, m, m/s, m/s², N s/m, m, m: a value, or several of which each is tried. None (or
-        inf) is a range without limit.
-    group : sequence of dict
-        Robots that differ, as in a team file: each group with its ``count`` and its own values, the rest as
-        above. None: all are equal.
-    conditions : dict of name to value or list of values
-        What goes wrong, as `Conditions` has it, and ``fail`` and ``join`` as texts like ``3@20 5@40``: of
-        lists each is tried.
-    lattice : int
-        The coverage cost is evaluated on a lattice of so many sites along a side.
-    cost_hz : float, Hz
-        How often it is evaluated; 0: at the first moment and the last.
-    record_hz : float, Hz
-        How many moments of each run are kept; 0: the first and the last.
-    metrics : bool
-        Whether the table holds the metrics of the end of each run as well; see `robocov.metrics.run_metrics`.
-    sampling : Sampling or None
-        How ranges of gains are sampled.
-    folder : Path
-        Where relative paths of controllers begin.
-    sources : dict of controller to Source
-        The files of controllers that are none of the project's, and their authors' modules that they import;
-        read when the study is made.
-    teams : tuple of dict
-        Every combination of the parameters of a team, and of the conditions that are given.
-
-    Raises
-    ------
-    ParameterError, StartError
-        On a value that cannot be used; the message begins with its place, as in ``gains.rapf.k_rep[1]``.
+    What has the type `Swept` is a value, in SI units, or several of which each is tried. Raises
+    ParameterError or StartError, whose message begins with the place, as in ``gains.rapf.k_rep[1]``.
     """
 
     maps: tuple[StudyMap, ...]
     controllers: tuple[str, ...]
-    gains: Mapping[str, Wanted] = field(default_factory=dict)
+    gains: Mapping[str, Wanted] = field(default_factory=dict)  # what is tried of each controller
     robots: Sequence[int] = (6,)
-    starts: Sequence[str] = ()
+    starts: Sequence[str] = ()  # none: the first of each map; ("*",): all of each map
     seeds: Sequence[int] = (0,)
-    duration: float = 60.0
-    dt: float = DEFAULT_DT
+    duration: float = 60.0  # s
+    dt: float = DEFAULT_DT  # control period, s
     radius: Swept = DEFAULT_RADIUS
     max_speed: Swept = 1.0
     max_acceleration: Swept = 2.0
     viscosity: Swept = 2.0
     sensing_range: Swept = 3.0
-    communication_range: Swept = None
-    conditions: Mapping[str, Any] = field(default_factory=dict)
-    group: Sequence[Mapping[str, Any]] = ()
+    communication_range: Swept = None  # without limit
+    conditions: Mapping[str, Any] = field(default_factory=dict)  # of lists each is tried
+    group: Sequence[Mapping[str, Any]] = ()  # robots that differ, as in a team file
     lattice: int = 64
-    cost_hz: float = 2.0
-    record_hz: float = 5.0
-    metrics: bool = False
+    cost_hz: float = 2.0  # how often the cost is evaluated; 0: at the first moment and the last
+    record_hz: float = 5.0  # how many moments are kept of each run; 0: the first and the last
+    metrics: bool = False  # whether the table holds `robocov.metrics.run_metrics` of the end as well
     sampling: Sampling | None = None
-    folder: Path = Path()
-    sources: Mapping[str, Source] = field(init=False)
-    teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)
+    folder: Path = Path()  # where relative paths of controllers begin
+    sources: Mapping[str, Source] = field(init=False)  # of the users' controllers, as they are now
+    teams: tuple[Mapping[str, TeamValue], ...] = field(init=False)  # combinations of team and conditions
 
     def __post_init__(self) -> None:
         for name in ("maps", "controllers", "robots", "starts", "seeds"):

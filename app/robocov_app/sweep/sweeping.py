@@ -139,10 +139,8 @@ _ERRORS = 3  # different errors of runs that are told
 class Totals:
     """What became of the runs of a study.
 
-    `failed` counts earlier ones too, `reused` those that were there already. `errors`: why the first runs
-    failed that did so for different reasons, by run. `versions`: how many runs of the table were made with
-    which. `table_replaced`: whether the table holds these runs; one that was there stays where this one would
-    be shorter.
+    `failed` counts earlier ones too. `errors`: the first different ones, by run. `versions`: how many runs
+    were made with which. `table_replaced`: false where the table would have become shorter.
     """
 
     done: int
@@ -169,38 +167,11 @@ def sweep(
 ) -> Totals:
     """Do all runs of a study that are not done yet, and write its table.
 
-    Whatever ends it, the same call goes on where it was, and ends with the same table, byte for byte. Runs
-    whose files were damaged are done again, and so are those that other versions of robocov, numpy, scipy,
-    shapely or pymunk have done.
-
-    Parameters
-    ----------
-    study : Study
-    folder : path
-        For ``study.json``, ``results.csv``, ``results.parquet`` and ``runs/``. What an earlier sweep has
-        done there is used as far as it belongs to the study.
-    workers : int or None
-        Processes on this machine; by default one a processor.
-    scheduler : str or None
-        Address of a Dask scheduler whose workers do the runs instead.
-    retry_failed : bool
-        Do runs again that have failed.
-    keep_versions : bool
-        Use runs that other versions have done.
-    quiet : bool
-        Tell nothing.
-    title : str
-        What it is called when progress is told.
-    stop : Interruption or None
-        Asked between two runs; by default Ctrl-C is noted here.
-
-    Raises
-    ------
-    InputError
-        When the folder holds something else, or the scheduler cannot be reached.
-    OutputError
-        When something cannot be written, another sweep is at work in the folder, workers end again and
-        again, or those of a cluster have other versions. What is done is kept.
+    Whatever ends it, the same call goes on where it was, and ends with the same table, byte for byte.
+    `scheduler`: the address of a Dask scheduler whose workers do the runs, in place of `workers` processes
+    (one a processor). `keep_versions`: use runs of other versions, which are done again else. Raises
+    InputError when the folder holds something else, OutputError when workers end again and again or something
+    cannot be written; what is done is kept.
     """
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise ParameterError(
@@ -269,10 +240,7 @@ def worked_off(
     stop: Interruption,
     keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
-    """Have tasks done, and keep what comes back; yield whenever the count may have changed.
-
-    The next task is asked for when somebody can do it, and an executor when there is a task.
-    """
+    """Have tasks done, and keep what comes back; yield whenever the count may have changed."""
     with ExitStack() as stack:
         executor: Executor | None = None
         left = iter(tasks)
@@ -335,11 +303,7 @@ class _Rows:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What a sweep would take, by one `run` of it: seconds for all that are left, bytes for all.
-
-    `axes` says how many values there are of each thing that the study varies; `notes`, what is done again and
-    why.
-    """
+    """What a sweep would take, by one `run` of it: seconds for all that are left, bytes for all."""
 
     runs: int
     left: int
