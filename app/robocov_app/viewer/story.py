@@ -176,12 +176,7 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 
 
 def save_story(
-    document: Document,
-    node: Node,
-    end: int,
-    result: ResultFolder,
-    options: RunOptions,
-    stop: Interruption,
+    document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
 ) -> dict[str, Any]:
     """Write a branch into a folder: numbers and pictures of its parts, all costs, a film."""
     root = document.path(node)[0]

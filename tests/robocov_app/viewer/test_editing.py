@@ -109,13 +109,7 @@ class TestStarts:
 
     @pytest.mark.parametrize(
         ("center", "gone"),
-        [
-            ((1, 1), "a"),
-            ((7, 7), "ab"),
-            ((7, 1), "the hall"),
-            ((1, 7), "a.b"),
-            ((4, 4.4), "given"),
-        ],
+        [((1, 1), "a"), ((7, 7), "ab"), ((7, 1), "the hall"), ((1, 7), "a.b"), ((4, 4.4), "given")],
     )
     def test_what_covers_a_start_takes_that_one_away(self, center, gone):
         covered = with_obstacle(self.YARD, CircleObstacle(center, 0.8))

@@ -93,8 +93,7 @@ def test_what_is_sensed_is_noted_now_and_then():
     pane = lane_of(steps=1)
     assert len(pane.sensed) == 3
     np.testing.assert_array_equal(
-        pane.sensed.until(0.0)[0],
-        begun(THEN, PLACES, DT).snapshot.seen.obstacle_points,
+        pane.sensed.until(0.0)[0], begun(THEN, PLACES, DT).snapshot.seen.obstacle_points
     )
     slow = lane_of(steps=SENSED_EVERY)
     assert slow.sensed.until(1.0)[1].tolist() == [1, 2, 3]

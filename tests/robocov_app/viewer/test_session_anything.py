@@ -9,17 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
-from touched_run import (
-    HALL,
-    LLOYD,
-    RAPF,
-    RPF,
-    all_told,
-    begun,
-    robots_of,
-    stepped,
-    too_deep,
-)
+from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, stepped, too_deep
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError

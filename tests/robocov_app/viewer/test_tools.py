@@ -9,16 +9,7 @@ from touched_run import HALL, LLOYD, RAPF, all_told, begun, robots_of, stepped, 
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.tools import (
-    WALL_WIDTH,
-    Circle,
-    Hand,
-    Polygon,
-    Ruler,
-    Tool,
-    Wall,
-    toolbox,
-)
+from robocov_app.viewer.tools import WALL_WIDTH, Circle, Hand, Polygon, Ruler, Tool, Wall, toolbox
 
 REACH = 0.1
 """Metres that a finger is wide."""

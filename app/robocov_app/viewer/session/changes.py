@@ -23,15 +23,7 @@ from robocov.world.relocation import nearest_free
 from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import painted, with_obstacles
 from robocov_app.viewer.session.pane import Continuation, Pane
-from robocov_app.viewer.session.scenario import (
-    MOST_ROBOTS,
-    Law,
-    Limits,
-    Position,
-    Scenario,
-    read_as,
-    refused,
-)
+from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Position, Scenario, read_as, refused
 
 Robot: TypeAlias = Annotated[int, Field(strict=True, ge=1, le=1_000_000, description="Number of a robot")]
 _Pane: TypeAlias = Annotated[int, Field(strict=True, ge=0, le=100, description="Number of a pane")]

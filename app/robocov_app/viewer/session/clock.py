@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Simulated seconds per second; infinite for as fast as it goes."""
@@ -24,34 +21,22 @@ _PATIENT = 16.0
 
 
 def speed_words(speed: float) -> str:
-    """Return a speed as people write it.
-
-    >>> [speed_words(s) for s in SPEEDS[2:4]], speed_words(math.inf)
-    (['0.5×', '1×'], 'max')
-    """
+    """Return a speed as people write it: ``0.5×``, ``max``."""
     return "max" if math.isinf(speed) else f"{speed:g}×"
 
 
 def speed_index(speed: float) -> int:
-    """Return the number of the nearest of `SPEEDS`.
-
-    >>> speed_index(1.1), speed_index(math.inf)
-    (3, 8)
-    """
-
-    def order(each: float) -> float:
-        return math.log(each) if math.isfinite(each) else 10.0
-
-    return min(range(len(SPEEDS)), key=lambda k: abs(order(SPEEDS[k]) - order(speed)))
+    """Return the number of the nearest of `SPEEDS`, by their ratios."""
+    logs = [math.log(min(each, 1e4)) for each in (*SPEEDS, speed)]
+    return min(range(len(SPEEDS)), key=lambda k: abs(logs[k] - logs[-1]))
 
 
 @dataclass
 class Clock:
-    """Turns seconds that have passed into steps.
+    """Turns seconds that have passed into steps of `dt` seconds, at a speed.
 
-    `dt`, s: control period. `speed`: simulated seconds per second. `budget`, s: so long the steps of one
-    frame may take, infinite to make them all whatever they take. `behind`: whether the last frame's steps
-    were more than its budget.
+    `budget`, s: so long the steps of one frame may take, infinite to make them all whatever they take.
+    `behind`: whether the last frame's steps were more than its budget.
     """
 
     dt: float
@@ -71,21 +56,18 @@ class Clock:
         if math.isfinite(speed):
             self._due += min(seconds, LONGEST_FRAME) * speed
             wanted = math.floor(self._due / self.dt + 1e-9)
+        due, self._due = self._due, 0.0
         began, made = perf_counter(), 0
         self.behind = False
         while made < wanted:
             made += 1
-            try:
-                go_on = step()
-            except BaseException:
-                self._due = 0.0
-                raise
-            if not go_on:
-                self._due = 0.0
+            if not step():
                 return made
             if perf_counter() - began > self.budget:
                 self.behind = math.isfinite(wanted) and made < wanted
                 break
-        if math.isfinite(wanted):
-            self._due = 0.0 if self.behind else max(self._due - made * self.dt, 0.0)
+        if math.isfinite(wanted) and not self.behind:
+            self._due = max(due - made * self.dt, 0.0)
+        elif not math.isfinite(wanted):
+            self._due = due
         return made

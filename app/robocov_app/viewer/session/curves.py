@@ -19,10 +19,7 @@ MOST_SAMPLES = 3000
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened.
-
-    `time` in s. `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ``limits`` or ``hand``.
-    """
+    """Something that happened at a time, s; `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ..."""
 
     time: float
     kind: str
@@ -51,7 +48,7 @@ class Curve:
 
     @property
     def last_time(self) -> float:
-        """The time of the newest sample, s; minus infinity if there is none."""
+        """The time of the newest sample, s; -inf if there is none."""
         return self._time[-1] if self._time else -np.inf
 
     def add(self, time: float, value: float) -> None:
@@ -93,10 +90,7 @@ class Curve:
                 self.add(time, value)
 
     def at(self, time: float) -> float:
-        """Return the value at a time, between samples on the straight line; nan before the first.
-
-        After the last sample it is that one's.
-        """
+        """Return the value at a time, between samples on the straight line; nan before the first."""
         if not self._time or time < self._time[0] - 1e-6:
             return float("nan")
         return float(np.interp(time, self._time, self._value))
@@ -104,10 +98,9 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """The rest of a curve that was left when the run was resumed from an earlier moment.
+    """The rest of a curve, of "distance" or "time", that was left when the run was resumed from before.
 
-    `law`: name of the controller. `words`: what was different then. `time`: (k,) s. `value`: (k,) m or s.
-    `of`: what the value is: "distance" or "time". `node`: of the document, at whose end the branch ends.
+    `law`: name of the controller. `words`: what was different then. `node`: at whose end the branch ends.
     """
 
     law: str
@@ -132,14 +125,9 @@ TIME = Plotted("time", "Mean time until the first robot is there", "mean time", 
 
 
 def speeds_of(session: Session, pane: Pane) -> Array | None:
-    """Return how fast each robot that is shown can go, (n,) m/s; None where all are equally fast.
-
-    Robots that have failed are remembered: who is left may be equally fast, and the curve goes on.
-    """
+    """Return how fast each robot that is shown can go, (n,) m/s; None where all, failed too, are alike."""
     there = session.setup(pane)
-    if "max_speed" not in there.limits.different:
-        return None
-    return there.limits.team(there.numbers).max_speed
+    return there.team.max_speed if "max_speed" in there.limits.different else None
 
 
 def chosen(session: Session, wanted: Plotted) -> Plotted:
@@ -148,10 +136,7 @@ def chosen(session: Session, wanted: Plotted) -> Plotted:
 
 
 def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
-    """Return the newest time not after now for which the costs of all panes are known, and these by number.
-
-    They come in one after the other; a pane without any yet is left out.
-    """
+    """Return the newest time not after now at which the costs of all panes with any are known, and these."""
     curves = {pane.number: curve for pane in session.panes if len(curve := pane.curves[what.name])}
     time = min([session.time, *(curve.last_time for curve in curves.values())])
     values = {number: curve.at(time) for number, curve in curves.items()}

@@ -49,9 +49,8 @@ class Happening(NamedTuple):
 class Lockstep:
     """Panes that begin as a scenario says; StartError, ParameterError when they cannot.
 
-    `scenario`: what the run began with; controllers, gains, limits and the map as they were last chosen.
-    `step`: control steps since the beginning. `hand`, (number, (x, y) m) or None: the robot that is dragged,
-    and where to.
+    `scenario`: with controllers, gains, limits and map as they were last chosen. `step`: since the beginning.
+    `hand`: number of the robot that is dragged, and where to, m.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -103,17 +102,17 @@ class Lockstep:
         return list(self._come_and_go())
 
     def apply(self, change: Change) -> None:
-        """Carry a change out; when that cannot be, an error says why, and nothing has changed.
-
-        Raises StartError, ParameterError, MapError.
-        """
+        """Carry a change out, or nothing of it; StartError, ParameterError, MapError say why it cannot be."""
         match change:
             case Drag(robot, to):
                 self.hand = robot, to
             case Release():
                 self.hand = None
             case RemovePane(number):
-                self._remove(number)
+                if len(self.panes) == 1:
+                    raise ParameterError("the last pane stays")
+                self.panes = [pane for pane in self.panes if pane.number != number]
+                self._note_laws()
             case EditObstacles() | Paint() | SetDensity():
                 environment = change.on(self.scenario.environment)
                 self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
@@ -121,7 +120,7 @@ class Lockstep:
             case SetController(_, law):
                 law.made()
                 self._change_all(change.of)
-                self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
+                self._note_laws()
             case SetLimits(limits):
                 limits.team(1)
                 self._change_all(change.of)
@@ -133,29 +132,19 @@ class Lockstep:
                 if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
                     self.hand = None
 
-    def pane(self, number: int) -> Pane:
-        """Return the pane with a number."""
-        return next(pane for pane in self.panes if pane.number == number)
-
     def _works(self, robot: int) -> bool:
         return robot in self.panes[0].numbers
 
-    def _remove(self, number: int) -> None:
-        if len(self.panes) == 1:
-            raise ParameterError("the last pane stays")
-        self.panes = [pane for pane in self.panes if pane.number != number]
+    def _note_laws(self) -> None:
         self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
 
     def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
         """Let every pane go on as is wanted; if one cannot, none does."""
         wants = [(pane, wanted(pane)) for pane in self.panes]
-        changes = [
-            (pane, want, pane.changed(want))
-            for pane, want in wants
-            if want.positions is not None or want.setup is not pane.setup
-        ]
-        for pane, want, simulation in changes:
-            pane.take(want.setup, simulation)
+        wants = [(pane, w) for pane, w in wants if w.positions is not None or w.setup is not pane.setup]
+        changed = [(pane, want.setup, pane.changed(want)) for pane, want in wants]
+        for pane, setup, simulation in changed:
+            pane.take(setup, simulation)
 
     def _pull(self, pane: Pane) -> Array | None:
         """Return the pull of the hand on the robots of a pane, N."""

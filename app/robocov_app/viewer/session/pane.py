@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from functools import partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,12 +19,10 @@ from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import PaneSetup, State, Trail
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from robocov.arrays import Array
-    from robocov.environment import Environment
     from robocov.observation import Decision
-    from robocov.robots import Team
     from robocov_app.viewer.session.scenario import ControllerChoice
 
 SENSED_EVERY = 3
@@ -38,11 +38,7 @@ class Continuation(NamedTuple):
 
 
 class Pane:
-    """A team under one controller, which can be touched.
-
-    A robot that failed stands where it is and says nothing: the others do not hear it any more, but their
-    range sensors see it, as they see any obstacle.
-    """
+    """A team under one controller, which can be touched. Robots that failed are obstacles to the others."""
 
     def __init__(self, number: int, setup: PaneSetup, simulation: Simulation) -> None:
         self.number, self.setup, self.simulation = number, setup, simulation
@@ -74,10 +70,7 @@ class Pane:
         return self.numbers.index(number) if number in self.numbers else None
 
     def decide(self) -> Decision:
-        """Let the controller decide on the present, which the next step carries out.
-
-        Raises ParameterError when it fails.
-        """
+        """Let the controller decide on the present, as the next step will; ParameterError when it fails."""
         return self.simulation.snapshot.decision
 
     def step(self, pushes: Array | None = None) -> None:
@@ -99,8 +92,8 @@ class Pane:
     def changed(self, wanted: Continuation) -> Simulation:
         """Return the simulation that goes on from here as wanted; the pane stays as it is.
 
-        Robots that do not fit any more are pushed out of what is in the way. Raises StartError when there is
-        no room for a robot; ParameterError when the controller or the team does not take a value.
+        Robots that do not fit are pushed out of what is in the way. StartError when there is no room for one;
+        ParameterError when the controller or the team does not take a value.
         """
         old, setup = self.simulation, wanted.setup
         environment, team = setup.solid, setup.team
@@ -109,19 +102,15 @@ class Pane:
         controller = None if goes_on else setup.law.made()
         if self._only_weighed(wanted):
             return old.with_density(environment)
-        changed = _fitted(
-            lambda positions, velocities: old.changed(
-                environment=environment,
-                controller=controller,
-                team=team,
-                positions=positions,
-                velocities=velocities,
-            ),
-            environment.at(old.time),
-            team,
-            old.positions if wanted.positions is None else wanted.positions,
-            old.velocities if wanted.velocities is None else wanted.velocities,
-        )
+        make = partial(old.changed, environment=environment, controller=controller, team=team)
+        positions = old.positions if wanted.positions is None else wanted.positions
+        velocities = old.velocities if wanted.velocities is None else wanted.velocities
+        try:
+            changed = make(positions=positions, velocities=velocities)
+        except StartError:  # who does not fit comes to rest where it does
+            placed = relocated(environment.at(old.time), positions, team)
+            moved = np.hypot(*(placed - positions).T) > 1e-3
+            changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
         if old.inbox is not None and setup.numbers != self.numbers:
             # who stays keeps the messages of who stays
             rows = [-1 if self.row(number) is None else self.row(number) for number in setup.numbers]
@@ -130,12 +119,9 @@ class Pane:
 
     def _only_weighed(self, wanted: Continuation) -> bool:
         """Return whether nothing is wanted to be otherwise but the density, as when it is painted."""
-        now, then = self.setup, wanted.setup
-        alike = all(
-            getattr(now, name) == getattr(then, name) for name in ("law", "limits", "numbers", "failed")
-        )
-        placed = wanted.positions is not None or wanted.velocities is not None
-        return alike and not placed and then.environment.same_place(now.environment)
+        known = attrgetter("law", "limits", "numbers", "failed")
+        alike = wanted.positions is None and known(self.setup) == known(wanted.setup)
+        return alike and wanted.setup.environment.same_place(self.setup.environment)
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:
         """Go on with what `changed` returned."""
@@ -160,29 +146,20 @@ class Pane:
 
 
 def _spec(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None) -> RunSpec:
-    law = setup.law
+    law, conditions = setup.law, setup.conditions
     return RunSpec(
-        setup.solid,
-        law.name,
-        law.gains,
-        team=setup.team,
-        positions=positions,
-        velocities=velocities,
-        dt=dt,
-        conditions=setup.conditions,
-    )
+        setup.solid, law.name, law.gains,
+        team=setup.team, positions=positions, velocities=velocities, dt=dt, conditions=conditions,
+    )  # fmt: skip
 
 
 def begun(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None) -> Simulation:
-    """Return a simulation that begins in these circumstances; StartError, ParameterError as `Simulation`."""
+    """Return a simulation that begins so; StartError, ParameterError as `Simulation`."""
     return _spec(setup, positions, dt, velocities).simulation(setup.law.made())
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
-    """Return the simulation that goes on from a state, bit for bit as the one whose state it was.
-
-    Raises ParameterError when the controller cannot be had any more.
-    """
+    """Return the simulation that goes on from a state; ParameterError when its controller is gone."""
     setup = state.setup
     spec = _spec(setup, state.positions, dt, state.velocities)
     simulation = spec.simulation(setup.law.made(), steps=step, resumed=True)
@@ -190,22 +167,3 @@ def resumed(state: State, dt: float, step: int) -> Simulation:
         memory = simulation.memory if state.memory is None else state.memory
         simulation = simulation.remembering(memory, state.inbox)
     return simulation
-
-
-def _fitted(
-    make: Callable[[Array, Array], Simulation],
-    environment: Environment,
-    team: Team,
-    positions: Array,
-    velocities: Array,
-) -> Simulation:
-    """Return what `make` makes of (n, 2) m and m/s; robots that do not fit come to rest where they do.
-
-    Raises StartError when there is no room for a robot.
-    """
-    try:
-        return make(positions, velocities)
-    except StartError:
-        placed = relocated(environment, positions, team)
-        moved = np.hypot(*(placed - positions).T) > 1e-3
-        return make(placed, np.where(moved[:, None], 0.0, velocities))
