@@ -172,12 +172,10 @@ def goals(
         add("step", f"A step of {label} takes {most}.", criterion, words, timed=True)
     if huge is not None and math.isfinite((taken := huge.interval(ours.controller)).estimate):
         part = Interval(*(value / huge.dt for value in (taken.estimate, taken.low, taken.high)))
-        text, words = (
-            f"{label} runs in real time with {huge.robots} robots.",
-            "the physics of the world included",
-        )
+        words = "One process; the physics of the world included."
+        text = f"{label} runs in real time with {huge.robots} robots."
         criterion = Criterion("computing time by simulated time", part, high=1.0)
-        add("real-time", text, criterion, f"One process; {words}.", timed=True)
+        add("real-time", text, criterion, words, timed=True)
     return found
 
 
@@ -258,14 +256,9 @@ def targets_claim(outcomes: Outcomes) -> Claim:
     pairs = [each for each in compared if each is not None]
     if not pairs:
         return head
-    measure, bounds = (
-        "median of J({}) / J(centroid) at the end",
-        (1.0 - claims.SAME_COST, 1.0 + claims.SAME_COST),
-    )
-    criteria = [Criterion(measure.format(each.first), each.ratio, *bounds) for each in pairs]
-    words = "; ".join(
-        f"{each.first} lower in {amount(each.wins.estimate, '%')} of the runs" for each in pairs
-    )
+    measure, same = "median of J({}) / J(centroid) at the end", claims.SAME_COST
+    criteria = [Criterion(measure.format(each.first), each.ratio, 1.0 - same, 1.0 + same) for each in pairs]
+    words = "; ".join(f"{one.first} lower in {amount(one.wins.estimate, '%')} of the runs" for one in pairs)
     runs = sum(2 * len(each.fine.scenarios) for each in pairs)
     return replace(head.judged(criteria, f"{capitalised(words)}.", pairs[-1].fine, 1), runs=runs)
 
@@ -306,9 +299,8 @@ def teams_claim(outcomes: Outcomes, controller: str) -> Claim:
 
 def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
     """Test whether RAPF bears messages that are lost or late, from what came of it on so many maps."""
-    text = (
-        f"RAPF ends within {amount(claims.NEARLY_SAME, '%')} of its cost where messages get lost or are late."
-    )
+    near = amount(claims.NEARLY_SAME, "%")
+    text = f"RAPF ends within {near} of its cost where messages get lost or are late."
     head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
     borne = [

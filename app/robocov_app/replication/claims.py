@@ -392,10 +392,8 @@ def median_text(values: Array, unit: str = "") -> str:
 
 
 def _by_start(pairs: Comparison) -> str:
-    starts = np.array(pairs.fine.starts)
-    return ", ".join(
-        f"{start} {median_text(pairs.ratios[starts == start])}" for start in dict.fromkeys(pairs.fine.starts)
-    )
+    starts, kinds = np.array(pairs.fine.starts), dict.fromkeys(pairs.fine.starts)
+    return ", ".join(f"{kind} {median_text(pairs.ratios[starts == kind])}" for kind in kinds)
 
 
 def _other_gains(outcomes: Outcomes) -> str:

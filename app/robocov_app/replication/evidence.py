@@ -85,9 +85,8 @@ def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow
         fine = outcomes.measured("gap", each.key)
         if not fine.scenarios:
             continue
-        gap, settled, touched, stuck = (
-            fine.of(each.key, name) for name in ("gap", "settled", "contacts", "stuck")
-        )
+        names = "gap", "settled", "contacts", "stuck"
+        gap, settled, touched, stuck = (fine.of(each.key, name) for name in names)
         low, high = np.quantile(gap, [0.25, 0.75]).tolist()
         rest = settled[np.isfinite(settled)]
         rows.append(

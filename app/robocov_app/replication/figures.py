@@ -137,10 +137,8 @@ def side_by_side(
 def cost_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
     """Draw the cost of runs against time (figures 3, 5, 7)."""
     with plain_style():
-        curves = [
-            (shown.record.label, shown.record.controller, shown.history.time, shown.history.mean_distance)
-            for shown in runs
-        ]
+        both = [(run.record, run.history) for run in runs]
+        curves = [(run.label, run.controller, cost.time, cost.mean_distance) for run, cost in both]
         page = Page((WIDE, 1050), theme, DOTS)
         edge = 34 * page.scale
         longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)

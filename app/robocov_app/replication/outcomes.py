@@ -253,12 +253,8 @@ def read_gain_outcomes(
 
 def scenarios_of(study: Study) -> tuple[Scenario, ...]:
     """Return the scenarios of a sweep, in the order of its table."""
-    return tuple(
-        Scenario(each.name, start, seed)
-        for each in study.maps
-        for start in study.starts_on(each)
-        for seed in study.seeds
-    )
+    begins = [(each.name, start) for each in study.maps for start in study.starts_on(each)]
+    return tuple(Scenario(*begin, seed) for begin in begins for seed in study.seeds)
 
 
 def mean_until(history: CostHistory, until: float) -> float:

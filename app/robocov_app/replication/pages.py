@@ -82,10 +82,10 @@ def save_paper_figures(
         figures = {f"figure-{number}": partial(draw_figure, number, runs, first, theme) for number in FIGURES}
         return figures if results is None else {**figures, **paper_plots(results, theme)}
 
-    words = {
-        f"figure-{number}": f"{shows} {describe_figure(number, runs, first)}"
-        for number, (_, shows) in FIGURES.items()
+    shown = {
+        number: f"{shows} {describe_figure(number, runs, first)}" for number, (_, shows) in FIGURES.items()
     }
+    words = {f"figure-{number}": text for number, text in shown.items()}
     return _save_figures(folder, drawn, words, quiet=quiet)
 
 
@@ -222,36 +222,17 @@ def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
 def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     import jinja2
 
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(ASSETS),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=_unbroken,
-    )
+    loader, undefined = jinja2.FileSystemLoader(ASSETS), jinja2.StrictUndefined
+    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=undefined, finalize=_unbroken)
     environment.filters |= {"span": span, "g": "{:g}".format, "amount": amount, "unbroken": _unbroken_markup}
-    environment.globals |= {
-        "bar": interval_bar,
-        "amount": amount,
-        "described": described,
-        "counts": verdict_counts,
-        "account_of": evidence.account_of,
-        "t": claims,
-        "rules": beyond_claims,
-        "contender": contenders,
-        "studies": studies,
-        "timing": step_times,
-        "units": UNITS,
-        "team": TEAM,
-        "robots": ROBOTS,
-        "page": PAGE,
-        "beyond_page": BEYOND_PAGE,
-        "version": __version__,
-    }
+    known = environment.globals.update
+    known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
+    known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
+    known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
+    known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)
-    return environment.get_template(template).render(
-        style=style, plan=plan, quick=plan.name == "quick", **context
-    )
+    return environment.get_template(template).render(style=style, **context)
 
 
 def span(numbers: Sequence[int]) -> str:

@@ -116,11 +116,9 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
     """Return how every figure beyond the paper is drawn."""
     theme, outcomes, teams = theme_named(theme), results.outcomes, results.teams
     laws = [row.contender for row in ranked_rows(results)]
-    duels = [
-        (law.label, outcomes.compared(OWN[0].key, law.key), law.controller)
-        for law in laws
-        if law.key != OWN[0].key
-    ]
+    ours = OWN[0].key
+    others = [law for law in laws if law.key != ours]
+    duels = [(law.label, outcomes.compared(ours, law.key), law.controller) for law in others]
     targets = [(law.label, results.targets.compared(law.key, TARGETS[0].key), "rapf") for law in TARGETS[1:]]
     times = [
         (law.label, teams.compared(law.key, other.key, "time"), law.controller)
@@ -182,9 +180,8 @@ def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
 
     styles = [style_of(sample.controller) for sample in samples]
     label = "J/J_ref − 1 at the end (%)"
-    figure = plot_final_costs(
-        [("", samples)], theme=theme, size=(WIDE, None), scale=DOTS, label=label, styles=styles
-    )
+    size = (WIDE, None)
+    figure = plot_final_costs([("", samples)], theme=theme, size=size, scale=DOTS, label=label, styles=styles)
     (axes,) = figure.axes
     values = np.concatenate([sample.values for sample in samples])
     low, high = min(float(values.min()), 0.0), float(values.max())
@@ -285,11 +282,8 @@ def _pairs_plot(
     rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme
 ) -> Callable[[], Figure] | None:
     """Return how pairs are drawn: words, comparison, and the controller that the style is of."""
-    pairs = [
-        Pairs(words, controller, each.ratios, each.ratio)
-        for words, each, controller in rows
-        if each is not None
-    ]
+    known = [(words, each, controller) for words, each, controller in rows if each is not None]
+    pairs = [Pairs(words, controller, each.ratios, each.ratio) for words, each, controller in known]
 
     def draw() -> Figure:
         styles = [style_of(each.controller) for each in pairs]

@@ -347,21 +347,13 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     figures = run_figures(folder, plan, options)
     gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
     papers = paper_contenders(best_gains(gains))
-    contests = {
-        "convex": studies.convex_contest(plan, papers),
-        "claims": studies.claims_contest(plan, papers),
-    }
-    known |= references_of(
-        [each for of in contests.values() for each in of.study.maps], folder, plan, options
-    )
-    outcomes = {
-        name: read_outcomes(run_study(each.study, folder, name, options), each, known)
-        for name, each in contests.items()
-    }
-    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", *contests))
-    worst = worst_runs(contests["claims"].study, outcomes["claims"], RAPF_SHARED, WORST)
-    both = outcomes["convex"], outcomes["claims"]
-    return PaperResults(plan, figures, gains, *both, papers, known, worst, runs, failed)
+    convex, claims = studies.convex_contest(plan, papers), studies.claims_contest(plan, papers)
+    known |= references_of((*convex.study.maps, *claims.study.maps), folder, plan, options)
+    in_convex = read_outcomes(run_study(convex.study, folder, "convex", options), convex, known)
+    outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
+    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
+    worst = worst_runs(claims.study, outcomes, RAPF_SHARED, WORST)
+    return PaperResults(plan, figures, gains, in_convex, outcomes, papers, known, worst, runs, failed)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -417,9 +409,8 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
 def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
     """Return what was reached on the maps and from the kinds of starts that baselines have as well."""
     names = {each.name for each in studies.baseline_maps(plan)}
-    return outcomes.where(
-        [each.map in names and each.start in plan.beyond.starts for each in outcomes.scenarios]
-    )
+    starts = plan.beyond.starts
+    return outcomes.where([each.map in names and each.start in starts for each in outcomes.scenarios])
 
 
 def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:

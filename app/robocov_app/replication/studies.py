@@ -122,10 +122,9 @@ def convex_region(seed: int) -> StudyMap:
 def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
     """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
     start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
-    centres = start.sample(HOT_SPOTS, seed=seed, radius=0.3)
-    peaks = tuple(
-        Gaussian((round(float(x), 2), round(float(y), 2)), weight=20.0, sigma=1.0) for x, y in centres
-    )
+
+    at = [(round(float(x), 2), round(float(y), 2)) for x, y in start.sample(HOT_SPOTS, seed=seed, radius=0.3)]
+    peaks = tuple(Gaussian(place, weight=20.0, sigma=1.0) for place in at)
     return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
 
 

@@ -58,9 +58,7 @@ def variants(result: Result) -> list[Group]:
     for controller in {controller for controller, _ in found}:
         sets = [gains for name, gains in found if name == controller]
         suffixes |= {(controller, gains): text for gains, text in zip(sets, _suffixes(sets), strict=True)}
-    return [
-        Group(f"{entries[0].label}{suffixes[key]}", *key, tuple(entries)) for key, entries in found.items()
-    ]
+    return [Group(f"{runs[0].label}{suffixes[key]}", *key, tuple(runs)) for key, runs in found.items()]
 
 
 def labels(result: Result) -> dict[Entry, str]:

@@ -172,9 +172,8 @@ def run_sentence(record: Record, history: CostHistory | None) -> str:
     """Return what a picture of a run shows, in words."""
     robots, span = counted(len(record.team), "robot"), record.time[-1] - record.time[0]
     start = f" from start {record.start}" if record.start else ""
-    words = [
-        f"{record.label} on map {record.environment.name}: trajectories of {robots}{start} over {span:.4g} s."
-    ]
+    begin = f"{record.label} on map {record.environment.name}: trajectories of"
+    words = [f"{begin} {robots}{start} over {span:.4g} s."]
     if record.conditions is not None and (changes := changes_sentence(record)):
         words.append(changes)
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():

@@ -81,22 +81,16 @@ def summary_tables(result: Result) -> list[Table]:
 
     def table(caption: str, columns: Sequence[Column], parts: Sequence[Group], *notes: str) -> Table:
         rows = [
-            (part.label, str(len(part.entries)), *(text(part.entries) for _, text in columns))
-            for part in parts
+            (each.label, str(len(each.entries)), *(of(each.entries) for _, of in columns)) for each in parts
         ]
         return Table(caption, ("Controller", "Runs", *(head for head, _ in columns)), rows, notes=notes)
 
     tables = []
     if len(every) > 1:
         scales = grouped.medians(result)
-        # metres of different maps have no common median
-        parted: Column = (
-            "Mean distance / median",
-            lambda own: _quartiles(grouped.relative(own, scales).tolist(), 3),
-        )
-        note = (
-            "Mean distance / median: divided by the median over all runs on the same map with the same team."
-        )
+        name = "Mean distance / median"  # metres of different maps have no common median
+        parted: Column = name, lambda own: _quartiles(grouped.relative(own, scales).tolist(), 3)
+        note = f"{name}: divided by the median over all runs on the same map with the same team."
         tables.append(table("All maps and teams together", [parted, *gap, settled, *others], groups, note))
     for setting in every if len(every) <= MOST_SETTINGS else ():
         caption = setting_label(result, setting) if len(every) > 1 else "Final figures"
@@ -138,15 +132,22 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
     def spread(name: str, decimals: int, nothing: str = NOTHING) -> Callable[[Sequence[Entry]], str]:
         return lambda entries: _quartiles(_values(entries, name), decimals, nothing)
 
+    def count(name: str, several: Callable[[list[float]], str]) -> Callable[[Sequence[Entry]], str]:
+        def text(entries: Sequence[Entry]) -> str:
+            values = _values(entries, name)
+            return NOTHING if not values else f"{values[0]:.0f}" if len(entries) == 1 else several(values)
+
+        return text
+
     timed = any(entry.has("mean_time_s") for entry in result.fine)
     return [
         ("Mean distance, m", spread("mean_distance_m", 3)),
         ("Over the run, m", spread("mean_distance_over_run_m", 3)),
         ("Settled at, s", spread("settled_at_s", 1, unsettled)),
-        ("Contacts", _contacts),
+        ("Contacts", count("contacts", lambda own: f"{sum(each > 0 for each in own)} of {len(own)}")),
         ("Clearance, m", _clearance),
         ("Path, m", spread("path_length_m", 2)),
-        ("Stuck robots", _stuck),
+        ("Stuck robots", count("stuck_robots", lambda own: f"{np.mean(own):.2g} per run")),
         *([("Mean time, s", spread("mean_time_s", 3))] if timed else []),
     ]
 
@@ -172,9 +173,8 @@ def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
         for own in each.maps:
             count, lower = len(own.a), (own.a < own.b).sum()
             means = [f"{np.mean(values):.3f}" for values in (own.a, own.b)]
-            rows.append(
-                (own.name, str(count), *means, ratio_text(own.ratio), own.verdict, f"{lower} of {count}")
-            )
+            ratio = ratio_text(own.ratio)
+            rows.append((own.name, str(count), *means, ratio, own.verdict, f"{lower} of {count}"))
         if len(rows) > 1:
             tables.append(Table(each.label, head, rows, frozenset({5})))
     return tables
@@ -214,27 +214,11 @@ def _settled(entries: Sequence[Entry]) -> str:
     return f"{count} of {len(entries)}" if len(entries) > 1 else "yes" if count else "no"
 
 
-def _contacts(entries: Sequence[Entry]) -> str:
-    values = _values(entries, "contacts")
-    if not values:
-        return NOTHING
-    return (
-        f"{values[0]:.0f}" if len(entries) == 1 else f"{sum(value > 0 for value in values)} of {len(values)}"
-    )
-
-
 def _clearance(entries: Sequence[Entry]) -> str:
     """Return the least gap, its minus as wide as a digit; none before nothing but zeros."""
     values = _values(entries, "min_clearance_m")
     number = f"{min(values):.3f}" if values else NOTHING
     return number.replace("-", "\u2212" if number.strip("-0.") else "")
-
-
-def _stuck(entries: Sequence[Entry]) -> str:
-    values = _values(entries, "stuck_robots")
-    if not values:
-        return NOTHING
-    return f"{values[0]:.0f}" if len(entries) == 1 else f"{np.mean(values):.2g} per run"
 
 
 def _ranges_text(group: Group, result: Result) -> str:
