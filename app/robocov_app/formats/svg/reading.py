@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
+import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.errors import MapError, one_line
+from robocov_app.formats.files import MAX_VERTICES, require_shapes
 from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.curves import TOLERANCE, arc
 from robocov_app.formats.geometry.enclosing import foreign_map
-from robocov_app.formats.geometry.shapes import Shapes
+from robocov_app.formats.geometry.polygons import Rule
+from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.options import Importer, ReadOptions
-from robocov_app.formats.svg.drawing import SvgDrawing, view_box
-from robocov_app.formats.svg.path import PIXEL, affine, composed, fitted, length, numbers
-from robocov_app.formats.xml_tree import Element, read_svg_tree
+from robocov_app.formats.svg import path as paths
+from robocov_app.formats.svg.path import affine, composed, length, moved, numbers, stretch
+from robocov_app.formats.svg.style import INHERITED, Style, StyleSheet, inherited, is_hidden, is_painted
+from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_svg_tree
 
 _ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
 _SMALLEST = 1.0
 """A drawing smaller than this, in metres, at its own scale is a picture of something larger."""
+
+_GROUPS = ("g", "a", "switch", "svg", "use")
+_SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
+_PICTURES = ("text", "image", "foreignObject", "video", "iframe", "canvas")
+_CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
+_JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
+_EVEN = 1.0 + 1e-6
+"""Where lengths grow by more different factors in different directions, a stroke has no one width."""
 
 
 def is_svg(path: Path, head: bytes) -> bool:
@@ -45,74 +62,354 @@ def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     """
     root, where = read_svg_tree(path)
     shapes = Shapes(where, options)
-    drawing = SvgDrawing(root, where, shapes)
+    drawing = _Drawing(root, shapes)
     try:
         matrix, width, height = _page(root, options.scale)
     except ValueError as error:
         root.refuse(where, str(error))
     drawing.draw(matrix, width, height)
     if options.scale is None:
-        _require_size(shapes, where)
-    scale = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
-    name, description = _title(root, path)
+        _require_size(shapes)
+    texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     return foreign_map(
         shapes,
         format=IMPORTER.name,
-        name=name,
-        description=description,
+        name=texts.get("title", "")[:80] or one_line(path.stem)[:60] or "map",
+        description=texts.get("desc", "")[:1000] or "Imported from SVG.",
         solid=True,
-        notes=[scale, *drawing.notes()],
+        notes=[
+            "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m",
+            *drawing.notes(),
+        ],
     )
 
 
 def _page(root: Element, scale: float | None) -> tuple[Array, float, float]:
     """Return the matrix from the root's units to metres, and the size of its viewport in these units."""
-    given = root.attributes
-    box = view_box(given)
-    size = []
-    for name, whole in (("width", box[2] if box else 300.0), ("height", box[3] if box else 150.0)):
-        text = given.get(name, "100%").strip()
-        size.append(length("100%" if text == "auto" else text, whole))
-    width, height = size
-    if box is None:
-        box = (0.0, 0.0, width, height)
+    given, box = root.attributes, _view_box(root.attributes)
+    whole = {"width": box[2] if box else 300.0, "height": box[3] if box else 150.0}
+    texts = {name: given.get(name, "100%").strip() for name in whole}
+    width, height = (length("100%" if texts[k] == "auto" else texts[k], whole[k]) for k in whole)
+    box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"{width:g} x {height:g} px, but a size was wanted")
     if scale is None:
-        inside = fitted(box, width, height, given.get("preserveAspectRatio", ""))
-        fit = composed(affine(PIXEL, d=PIXEL), inside)
-        bottom = PIXEL * height
+        inside = paths.fitted(box, width, height, given.get("preserveAspectRatio", ""))
+        fit, bottom = composed(affine(paths.PIXEL, d=paths.PIXEL), inside), paths.PIXEL * height
     else:
-        fit = composed(affine(scale, d=scale), affine(e=-box[0], f=-box[1]))
-        bottom = scale * box[3]
+        fit, bottom = composed(affine(scale, d=scale), affine(e=-box[0], f=-box[1])), scale * box[3]
     origin = numbers(given.get("data-origin", "0 0"))
     if len(origin) != 2:
         raise ValueError(f"data-origin {given['data-origin'][:30]!r}, but two numbers were wanted")
     return composed(affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
 
 
-def _require_size(shapes: Shapes, where: str) -> None:
+def _require_size(shapes: Shapes) -> None:
     """Refuse a plan that is as small as the paper it is on, before a robot finds no room in it."""
-    everything = [
-        *(o.area for o in shapes.outlines),
-        *(shapely.linestrings(line.points) for line in shapes.lines),
-    ]
-    if not everything:
-        return
-    x, y, right, top = shapely.total_bounds(everything)
+    everything: list[BaseGeometry] = [outline.area for outline in shapes.outlines]
+    everything += [shapely.linestrings(line.points) for line in shapes.lines]
+    x, y, right, top = shapely.total_bounds(everything) if everything else (0.0, 0.0, np.inf, np.inf)
     if max(right - x, top - y) < _SMALLEST:
         raise MapError(
-            f"{where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but at least {_SMALLEST:g} m was "
-            f"wanted: --scale METRES says what a unit is, as in --scale 0.01"
+            f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but at least "
+            f"{_SMALLEST:g} m was wanted: --scale METRES says what a unit is, as in --scale 0.01"
         )
 
 
-def _title(root: Element, path: Path) -> tuple[str, str]:
-    texts = {
-        child.tag: one_line(" ".join(child.text.split())) for child in root.children if child.text.strip()
-    }
-    name = texts.get("title", "")[:80] or one_line(path.stem)[:60] or "map"
-    return name, texts.get("desc", "")[:1000] or "Imported from SVG."
+def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None:
+    """Return the ``viewBox`` among attributes, None where there is none of positive size."""
+    if "viewBox" not in given:
+        return None
+    values = numbers(given["viewBox"])
+    if len(values) != 4:
+        raise ValueError(f"viewBox {given['viewBox'][:30]!r}, but four numbers were wanted")
+    x, y, width, height = values
+    return (x, y, width, height) if width > 0.0 and height > 0.0 else None
+
+
+def _labels(element: Element) -> list[str]:
+    given = element.attributes
+    names = (given.get("id", ""), given.get("label", ""), *given.get("class", "").split())
+    return [name.strip() for name in names if name.strip()]
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where an element stands, and what it has from the groups around it.
+
+    `matrix`, (3, 3): from its units to metres. `labels`: of the groups, the innermost first. `width`,
+    `height`: of the innermost viewport, in its units.
+    """
+
+    matrix: Array
+    style: Style
+    labels: tuple[str, ...]
+    width: float
+    height: float
+    depth: int = 0
+
+    @property
+    def diagonal(self) -> float:
+        """What a percentage of a length in no direction is of (SVG 2, section 8.9)."""
+        return math.hypot(self.width, self.height) / math.sqrt(2.0)
+
+    def shifted(self, x: float, y: float) -> _Place:
+        return replace(self, matrix=composed(self.matrix, affine(e=x, f=y)))
+
+    def lengths(self, element: Element, *names: str) -> list[float]:
+        """Return lengths along x or y; what is missing is 0."""
+        found = []
+        for name in names:
+            text = element.attributes.get(name, "0").strip()
+            whole = self.width if name[0] in "xw" or name in ("cx", "rx") else self.height
+            found.append(0.0 if text == "auto" else length(text, whole))
+        return found
+
+
+class _Drawing:
+    """Goes through the elements as they are drawn and adds them to the shapes.
+
+    Groups, uses and nested pictures are carried out; a MapError says what cannot be understood.
+    """
+
+    def __init__(self, root: Element, shapes: Shapes) -> None:
+        self.root = root
+        self.shapes = shapes
+        self.where = shapes.where
+        self.sheet = StyleSheet(self.where)
+        self.named: dict[str, Element] = {}
+        self.draws = paths.MOST_DRAWS
+        self.dashed = self.clipped = 0
+        for element in root.everything():
+            if name := element.attributes.get("id"):
+                self.named.setdefault(name, element)
+            if element.tag == "style":
+                self.sheet.add(element.text)
+
+    def draw(self, matrix: Array, width: float, height: float) -> None:
+        """Add all that is drawn, by the matrix and viewport of `_page`."""
+        self._require_few()
+        style = inherited(INHERITED, self.sheet.of(self.root))
+        labels = tuple(dict.fromkeys(_labels(self.root)))
+        for child in self.root.children:
+            self._draw(child, _Place(matrix, style, labels, width, height))
+
+    def notes(self) -> list[str]:
+        """Return what is worth knowing of how things were taken."""
+        told = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
+        strange = "style rules of other kinds than tag, .class and #id not applied"
+        for count, words in (
+            (self.dashed, "dashed strokes taken as whole"),
+            (self.clipped, "clip paths and masks not applied"),
+            (self.sheet.strange, strange),
+        ):
+            told += [f"{count} {words}"] if count else []
+        return told
+
+    def _require_few(self) -> None:
+        """Count what will be drawn, uses and all, without drawing it: a few kB may stand for billions."""
+        counted: dict[Element, tuple[int, int]] = {}
+        inside: set[Element] = set()
+
+        def count(element: Element, depth: int) -> tuple[int, int]:
+            if element in inside:
+                element.refuse(self.where, "is used within itself, but an end was wanted")
+            if depth > DEEPEST:
+                element.refuse(self.where, f"uses nested deeper than {DEEPEST}, but less was wanted")
+            if element not in counted:
+                inside.add(element)
+                target = self._target(element)
+                elements, shapes = 1, int(element.tag in _SHAPES)
+                for each in [*element.children, *([] if target is None else [target])]:
+                    more = count(each, depth + 1)
+                    elements, shapes = elements + more[0], shapes + more[1]
+                counted[element] = elements, shapes
+                inside.discard(element)
+            return counted[element]
+
+        elements, shapes = count(self.root, 0)
+        if elements > MOST_ELEMENTS:
+            few = f"but at most {MOST_ELEMENTS} were wanted"
+            raise MapError(f"{self.where}: {elements:.3g} elements to be drawn, uses and all, {few}")
+        require_shapes(shapes, self.where)
+
+    def _target(self, element: Element) -> Element | None:
+        """Return what a ``use`` uses, if it is in this file."""
+        if element.tag != "use":
+            return None
+        return self.named.get(element.attributes.get("href", "").strip().removeprefix("#"))
+
+    def _draw(self, element: Element, outer: _Place) -> None:
+        """Add an element, with all in it."""
+        if element.tag in _PICTURES:
+            self.shapes.leave_out(element.tag)
+        if element.tag not in _GROUPS and element.tag not in _SHAPES:
+            return
+        if outer.depth > DEEPEST:
+            element.refuse(self.where, f"nested deeper than {DEEPEST}, but less was wanted")
+        own = self.sheet.of(element)
+        if is_hidden(own):
+            self.shapes.leave_out("hidden element")
+            return
+        self.clipped += any(own.get(name, "none") != "none" for name in ("clip-path", "mask"))
+        try:
+            place = replace(
+                outer,
+                matrix=composed(outer.matrix, paths.transform(own.get("transform", ""))),
+                style=inherited(outer.style, own),
+                labels=tuple(dict.fromkeys([*_labels(element), *outer.labels])),
+                depth=outer.depth + 1,
+            )
+            if element.tag in _SHAPES:
+                self._shape(element, place)
+                return
+            children, place = self._inside(element, place)
+        except ValueError as error:
+            element.refuse(self.where, str(error))
+        for child in children:
+            self._draw(child, place)
+
+    def _inside(self, element: Element, place: _Place) -> tuple[list[Element], _Place]:
+        """Return what is drawn in a group, a use or a nested picture, and where."""
+        given = element.attributes
+        if element.tag in ("use", "svg"):
+            place = place.shifted(*place.lengths(element, "x", "y"))
+        if element.tag == "use":
+            target = self._target(element)
+            if target is None:
+                self.shapes.leave_out("use", "of what is not in the file")
+                return [], place
+            if target.tag not in ("symbol", "svg"):
+                return [target], place
+            labels = tuple(dict.fromkeys([*place.labels, *_labels(target)]))
+            place = replace(place, style=inherited(place.style, self.sheet.of(target)), labels=labels)
+            size = {name: text for name, text in given.items() if name in ("width", "height")}
+            element, given = target, target.attributes | size
+        elif element.tag != "svg":
+            return element.children, place
+        width = length(given.get("width", "100%").replace("auto", "100%"), place.width)
+        height = length(given.get("height", "100%").replace("auto", "100%"), place.height)
+        box = _view_box(given)
+        if box is None:
+            return element.children, replace(place, width=width, height=height)
+        fit = paths.fitted(box, width, height, given.get("preserveAspectRatio", ""))
+        matrix = composed(place.matrix, fit)
+        return element.children, replace(place, matrix=matrix, width=box[2], height=box[3])
+
+    def _shape(self, element: Element, place: _Place) -> None:
+        """Add a shape: as an area where it is filled, else as walls where it is stroked."""
+        style, at = place.style, f"line {element.line}"
+        visible = style["visibility"].lower() not in ("hidden", "collapse")
+        if visible and not self.shapes.wants(place.labels):
+            return
+        filled = is_painted(style, "fill") and element.tag != "line"
+        stroked = is_painted(style, "stroke")
+        if not (visible and (filled or stroked)):
+            self.shapes.leave_out("hidden element")
+            return
+        if filled and element.tag == "circle" and self._disc(element, place, at):
+            return
+        parts = self._points(element, place)
+        rings = [moved(place.matrix, points) for points, _ in parts]
+        rule: Rule = "evenodd" if style["fill-rule"].lower() == "evenodd" else "nonzero"
+        if filled and rings and self.shapes.add_outline(rings, place.labels, rule=rule, at=at):
+            return
+        if stroked:
+            self._strokes(parts, place, at)
+        else:
+            self.shapes.leave_out("shape", "without an area")
+
+    def _strokes(self, parts: list[tuple[Array, bool]], place: _Place, at: str) -> None:
+        """Add subpaths in the units of `place` as walls."""
+        style, given = place.style, self.shapes.options.thickness
+        least, most = stretch(place.matrix)
+        own = length(style["stroke-width"], place.diagonal)
+        width = own * math.sqrt(least * most) if given is None else given
+        if not width > 0.0:
+            self.shapes.leave_out("stroke", "without a width")
+            return
+        self.dashed += style["stroke-dasharray"].lower() != "none"
+        limit = numbers(style["stroke-miterlimit"])
+        for points, closed in parts:
+            path = np.concatenate([points, points[:1]]) if closed else points
+            line = Line(
+                moved(place.matrix, path),
+                width,
+                place.labels,
+                cap=_CAPS.get(style["stroke-linecap"].lower(), "flat"),
+                join=_JOINS.get(style["stroke-linejoin"].lower(), "mitre"),
+                mitre_limit=limit[0] if limit and limit[0] >= 1.0 else 4.0,
+                stretched=(path, own, place.matrix) if given is None and most > _EVEN * least else None,
+            )
+            self.shapes.add_line(line, at=at)
+
+    def _disc(self, element: Element, place: _Place, at: str) -> bool:
+        """Add a filled circle that is one in metres as well; return whether it is."""
+        least, most = stretch(place.matrix)
+        centre, radius = place.lengths(element, "cx", "cy"), _radius(element, place)
+        if most - least > 1e-9 * most or not radius * most > 0.0:
+            return False
+        (centre,) = moved(place.matrix, np.array([centre]))
+        self.shapes.add_circle(centre, radius * most, place.labels, at=at)
+        return True
+
+    def _points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
+        """Return the subpaths of a shape, in its own units, and whether they are closed."""
+        most = stretch(place.matrix)[1]
+        tolerance = TOLERANCE / most if most > 0.0 else np.inf
+        given = element.attributes
+        match element.tag:
+            case "path":
+                data = given.get("d", "")
+                if data.strip() == "none":
+                    return []
+                parts, draws = paths.subpaths(data, tolerance, MAX_VERTICES, self.draws)
+                self.draws -= draws
+                return parts
+            case "polyline" | "polygon":
+                values = numbers(given.get("points", ""))
+                points = np.array(values[: len(values) // 2 * 2]).reshape(-1, 2)
+                return [(points, element.tag == "polygon")] if len(points) > 1 else []
+            case "line":
+                ends = place.lengths(element, "x1", "y1", "x2", "y2")
+                return [(np.array(ends).reshape(2, 2), False)]
+            case "rect":
+                ring = _rectangle(element, place, tolerance)
+                return [] if ring is None else [(ring, True)]
+            case "circle":
+                radii = [_radius(element, place)] * 2
+            case _:
+                radii = place.lengths(element, "rx", "ry")
+                radii = [radii["rx" not in given], radii["ry" in given]]
+        if min(radii) <= 0.0:
+            return []
+        centre, (u, v) = np.array(place.lengths(element, "cx", "cy")), np.diag(radii)
+        return [(arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
+
+
+def _radius(element: Element, place: _Place) -> float:
+    return length(element.attributes.get("r", "0"), place.diagonal)
+
+
+def _rectangle(element: Element, place: _Place, tolerance: float) -> Array | None:
+    """Return the ring of a rectangle, whose corners may be round; None where it has no size."""
+    x, y, width, height, *radii = place.lengths(element, "x", "y", "width", "height", "rx", "ry")
+    if width <= 0.0 or height <= 0.0:
+        return None
+    given = [element.attributes.get(name, "auto").strip() != "auto" for name in ("rx", "ry")]
+    rx = min(radii[not given[0]], width / 2)
+    ry = min(radii[given[1]], height / 2)
+    corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
+    if rx <= 0.0 or ry <= 0.0:
+        return corners
+    u, v = np.diag([rx, ry])
+    inward = np.array([[rx, ry], [-rx, ry], [-rx, -ry], [rx, -ry]])
+    parts = []
+    for k, centre in enumerate(corners + inward):
+        begin = np.pi + k * np.pi / 2
+        first = centre + u * np.cos(begin) + v * np.sin(begin)
+        parts += [first[None], arc(centre, u, v, begin, np.pi / 2, tolerance)]
+    return np.concatenate(parts)
 
 
 IMPORTER = Importer(
