@@ -103,3 +103,5 @@ def test_sheets_that_take_for_ever_are_refused() -> None:
             rules.of(element())
     sheet("@" * 500_000)
     sheet("@media{" * 100_000)
+    sheet("/* " * 300_000)
+    sheet("/*" * 300_000 + "*/")

@@ -19,16 +19,9 @@ _LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
 
 _LARGEST = 1e30
-PIXELS = {
-    "": 1.0,
-    "px": 1.0,
-    "in": 96.0,
-    "cm": 96 / 2.54,
-    "mm": 96 / 25.4,
-    "q": 96 / 101.6,
-    "pt": 4 / 3,
-    "pc": 16.0,
-}
+_PIXELS = {
+    "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
+}  # fmt: skip
 """User units in a unit of length (CSS Values 4, section 6.2)."""
 
 PIXEL = 0.0254 / 96
@@ -68,10 +61,10 @@ def length(text: str, whole: float | None = None) -> float:
     """
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""
-    if match is None or not (unit in PIXELS or (unit == "%" and whole is not None)):
+    if match is None or not (unit in _PIXELS or (unit == "%" and whole is not None)):
         raise ValueError(f"{text[:30]!r}, but a length in px, mm, cm, in, pt, pc or % was wanted")
     value = number(match[1])
-    return value * whole / 100.0 if unit == "%" and whole is not None else value * PIXELS[unit]
+    return value * whole / 100.0 if unit == "%" and whole is not None else value * _PIXELS[unit]
 
 
 def affine(
@@ -192,67 +185,23 @@ def subpaths(
     at = 0
     while match := _COMMAND.match(text, at):
         command, at = match[1], match.end()
-        if not pen.begun and command not in "Mm":
+        if not pen.draws and command not in "Mm":
             raise ValueError(f"character {at}: {command}, but M was wanted first")
         if command in "Zz":
             pen.close()
             continue
-        at = _draw(pen, text, at, command, most, draws)
+        values, at = pen.arguments(text, at, command, most, draws)
+        if command in "MmLl":
+            pen.draw(command, values[:2])
+            if len(values) > 2:  # lines through all that follow
+                pen.polyline(values[2:], relative=command.islower())
+        else:
+            count = _ARGUMENTS[command.upper()]
+            for k in range(0, len(values), count):
+                pen.draw(command, values[k : k + count])
     if text[at : at + 1].strip(" \t\r\n\f,") or text[at:].strip(" \t\r\n\f,"):
         raise ValueError(f"character {at + 1}: {text[at : at + 12].strip()!r}, but a command was wanted")
     return pen.finished(tolerance, most), pen.draws
-
-
-def _draw(pen: _Pen, text: str, at: int, command: str, most: int, draws: int) -> int:
-    """Carry out a command, again for as long as numbers follow; return where they end."""
-    if command in "MmLl":
-        return _polyline(pen, text, at, command, most)
-    first = True
-    while True:
-        values, after = _values(text, at, command)
-        if not values and not first:
-            return at
-        if len(values) < _ARGUMENTS[command.upper()]:
-            raise _lack(text, after)
-        at, first = after, False
-        pen.draw(command, values)
-        if pen.draws > draws:
-            raise ValueError(f"character {at}: more than {draws} commands, but fewer were wanted")
-        if pen.count > most:
-            raise ValueError(f"character {at}: more than {most} points, but fewer were wanted")
-
-
-def _polyline(pen: _Pen, text: str, at: int, command: str, most: int) -> int:
-    """Draw lines through all points that follow; after M, to all but the first. Return where they end."""
-    values: list[float] = []
-    while match := NUMBER.match(text, at):
-        values.append(number(match[1]))
-        at = match.end()
-        if pen.count + len(values) // 2 > most:
-            raise ValueError(f"character {at}: more than {most} points, but fewer were wanted")
-    if not values or len(values) % 2:
-        raise _lack(text, at)
-    pen.draw(command, values[:2])
-    if len(values) > 2:
-        pen.polyline(values[2:], relative=command.islower())
-    return at
-
-
-def _lack(text: str, at: int) -> ValueError:
-    found = text[at : at + 12].strip() or "the end"
-    return ValueError(f"character {at + 1}: {found!r}, but a number was wanted")
-
-
-def _values(text: str, at: int, command: str) -> tuple[list[float], int]:
-    """Return the next numbers that a command takes, as far as there are any, and where they end."""
-    values: list[float] = []
-    for k in range(_ARGUMENTS[command.upper()]):
-        match = (_FLAG if command in "Aa" and k in (3, 4) else NUMBER).match(text, at)
-        if match is None:
-            break
-        values.append(number(match[1]))
-        at = match.end()
-    return values, at
 
 
 class _Pen:
@@ -263,45 +212,56 @@ class _Pen:
     """
 
     def __init__(self) -> None:
-        self.begun = False
         self.draws = 0
+        self.vertices: list[Point] = []
         self.at: Point = (0.0, 0.0)
         self.start: Point = (0.0, 0.0)
         self.handle: Point = (0.0, 0.0)
         self.last = ""
-        self._open = False
-        self._vertices: list[Point] = []
         self._begins: list[int] = []
         self._closed: list[bool] = []
         self._beziers: list[tuple[float, ...]] = []
         self._arcs: list[tuple[float, ...]] = []
 
-    @property
-    def count(self) -> int:
-        """Vertices so far."""
-        return len(self._vertices)
+    def arguments(self, text: str, at: int, command: str, most: int, draws: int) -> tuple[list[float], int]:
+        """Return the numbers that follow a command, for one or more times, and where they end."""
+        values: list[float] = []
+        kind = command.upper()
+        count, flags = _ARGUMENTS[kind], (3, 4) if kind == "A" else ()
+        points, commands = most - len(self.vertices), draws - self.draws
+        room = count * (points if kind in "ML" else min(points, commands))
+        while match := (_FLAG if len(values) % count in flags else NUMBER).match(text, at):
+            values.append(number(match[1]))
+            at = match.end()
+            if len(values) > room:
+                many = f"{most} points" if room == count * points else f"{draws} commands"
+                raise ValueError(f"character {at}: more than {many}, but fewer were wanted")
+        if not values or len(values) % count:
+            found = text[at : at + 12].strip() or "the end"
+            raise ValueError(f"character {at + 1}: {found!r}, but a number was wanted")
+        return values, at
 
     def draw(self, command: str, v: list[float]) -> None:
         """Draw what a command says."""
         kind = command.upper()
         x, y = self.at if command.islower() else (0.0, 0.0)
-        self.begun = True
         self.draws += 1
         if kind == "M":
             self.at = self.start = (x + v[0], y + v[1])
-            self._begin()
-        else:
-            if not self._open:  # after a Z the next subpath begins where the last did
-                self._begin()
-            if kind == "L":
+        if kind == "M" or self.last == "Z":  # after a Z the next subpath begins where the last did
+            self._begins.append(len(self.vertices))
+            self._closed.append(False)
+            self.vertices.append(self.at)
+        match kind:
+            case "L":
                 self._line(x + v[0], y + v[1])
-            elif kind == "H":
+            case "H":
                 self._line(x + v[0], self.at[1])
-            elif kind == "V":
+            case "V":
                 self._line(self.at[0], y + v[0])
-            elif kind == "A":
+            case "A":
                 self._arc(v, (x + v[5], y + v[6]))
-            else:
+            case "C" | "S" | "Q" | "T":
                 self._curve(kind, [(x + a, y + b) for a, b in zip(v[::2], v[1::2], strict=True)])
         self.last = kind
 
@@ -310,21 +270,19 @@ class _Pen:
         points = np.array(values).reshape(-1, 2)
         if relative:
             points = np.cumsum(points, axis=0) + self.at
-        self._vertices += map(tuple, points.tolist())
-        self.at = self._vertices[-1]
+        self.vertices += map(tuple, points.tolist())
+        self.at = self.vertices[-1]
         self.last = "L"
 
     def close(self) -> None:
         """Close the subpath."""
-        if self._open:
-            self._closed[-1] = True
-        self._open = False
+        self._closed[-1] = True
         self.at = self.start
         self.last = "Z"
 
     def finished(self, tolerance: float, most: int) -> list[tuple[Array, bool]]:
         """Return all subpaths, curves flattened."""
-        vertices = np.array(self._vertices).reshape(-1, 2)
+        vertices = np.array(self.vertices).reshape(-1, 2)
         count = np.ones(len(vertices), dtype=np.intp)
         curves = []
         for kept, flatten in ((self._beziers, _as_beziers), (self._arcs, _as_arcs)):
@@ -338,19 +296,12 @@ class _Pen:
         for index, points in curves:
             all_points[ranges(end[index] - count[index], count[index])] = points
         all_points[end - 1] = vertices
-        begins = (end - count)[self._begins]
-        parts = np.split(all_points, begins[1:]) if len(begins) else []
+        parts = np.split(all_points, (end - count)[self._begins[1:]]) if self._begins else []
         return [(part, closed) for part, closed in zip(parts, self._closed, strict=True) if len(part) > 1]
-
-    def _begin(self) -> None:
-        self._begins.append(len(self._vertices))
-        self._closed.append(False)
-        self._open = True
-        self._vertices.append(self.at)
 
     def _line(self, x: float, y: float) -> None:
         self.at = (x, y)
-        self._vertices.append(self.at)
+        self.vertices.append(self.at)
 
     def _curve(self, kind: str, points: list[Point]) -> None:
         """Draw a Bézier curve; S and T begin with the mirror image of the handle before them."""
@@ -362,12 +313,9 @@ class _Pen:
         (x, y), (end_x, end_y) = self.at, points[-1]
         if len(points) == 2:  # the same curve as one of degree 3
             u, v = points[0]
-            points = [
-                (x + 2 * (u - x) / 3, y + 2 * (v - y) / 3),
-                (end_x + 2 * (u - end_x) / 3, end_y + 2 * (v - end_y) / 3),
-            ]
-        (a, b), (c, d) = points[:2]
-        self._beziers.append((len(self._vertices), x, y, a, b, c, d, end_x, end_y))
+            first = (x + 2 * (u - x) / 3, y + 2 * (v - y) / 3)
+            points = [first, (end_x + 2 * (u - end_x) / 3, end_y + 2 * (v - end_y) / 3)]
+        self._beziers.append((len(self.vertices), x, y, *points[0], *points[1], end_x, end_y))
         self._line(end_x, end_y)
 
     def _arc(self, v: list[float], end: Point) -> None:
@@ -394,7 +342,7 @@ class _Pen:
         ux, uy, vx, vy = cos * rx, sin * rx, -sin * ry, cos * ry
         centre = ((x + end[0]) / 2 + ux * p + vx * q, (y + end[1]) / 2 + uy * p + vy * q)
         begin = math.atan2(b - q, a - p)
-        self._arcs.append((len(self._vertices), *centre, ux, uy, vx, vy, begin, sweep))
+        self._arcs.append((len(self.vertices), *centre, ux, uy, vx, vy, begin, sweep))
         self._line(*end)
 
 

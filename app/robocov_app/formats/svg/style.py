@@ -5,44 +5,36 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from robocov.errors import MapError
 from robocov_app.formats.xml_tree import Element
 
-Style: TypeAlias = "Mapping[str, str]"
+Style: TypeAlias = Mapping[str, str]
 """Properties by name, as they are written."""
 
 INHERITED = {
-    "fill": "black",
-    "fill-opacity": "1",
-    "fill-rule": "nonzero",
-    "stroke": "none",
-    "stroke-opacity": "1",
-    "stroke-width": "1",
-    "stroke-linecap": "butt",
-    "stroke-linejoin": "miter",
-    "stroke-miterlimit": "4",
-    "stroke-dasharray": "none",
+    "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
+    "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
+    "stroke-linecap": "butt", "stroke-linejoin": "miter", "stroke-miterlimit": "4",
     "visibility": "visible",
-}
+}  # fmt: skip
 """What passes from groups to their elements, and what it is by default (SVG 2, section 13)."""
 
-OWN = ("display", "opacity", "transform", "clip-path", "mask")
-"""What belongs to an element itself."""
+_PROPERTIES = (*INHERITED, "display", "opacity", "transform", "clip-path", "mask")
 
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _AT_RULE_PARTS = re.compile(r"[{};]")
 
 MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000
 """Characters of style sheets, rules in them, and pairs of a rule and an element that are looked at."""
 
 
-@dataclass(frozen=True)
-class _Rule:
-    """A rule of a style sheet, for one selector; of its properties some are marked as important."""
+class _Rule(NamedTuple):
+    """A rule of a style sheet, for one selector; the second of its properties are marked as important."""
 
     tag: str
     marks: tuple[str, ...]
@@ -50,9 +42,7 @@ class _Rule:
     properties: tuple[dict[str, str], dict[str, str]]
 
     def fits(self, element: Element, classes: set[str]) -> bool:
-        if self.tag not in ("", "*", element.tag):
-            return False
-        return all(
+        return self.tag in ("", "*", element.tag) and all(
             mark[1:] in classes if mark[0] == "." else element.attributes.get("id") == mark[1:]
             for mark in self.marks
         )
@@ -60,10 +50,9 @@ class _Rule:
 
 @dataclass
 class StyleSheet:
-    """The rules of all ``style`` elements of a file: of those with selectors of tags, classes and ids.
+    """The rules of all ``style`` elements of the file `where`, of selectors of tags, classes and ids.
 
-    `where`: what messages call the file. `strange`: rules that are left out: of other selectors, or within
-    @media and the like.
+    `strange`: rules that are left out: of other selectors, or within @supports and the like.
     """
 
     where: str
@@ -78,7 +67,10 @@ class StyleSheet:
         self._size += len(text)
         if self._size > MOST_TEXT:
             raise MapError(f"{self.where}: style sheets of over {MOST_TEXT} characters, but less was wanted")
-        text = _without_comments(text.replace("<!--", " ").replace("-->", " "))
+        text = text.replace("<!--", " ").replace("-->", " ")
+        # up to the last end of a comment: to look for one that is not there takes for ever
+        commented, end, text = text.rpartition("*/")
+        text = _COMMENT.sub(" ", commented + end) + text
         for rule in self._without_at_rules(text).split("}")[:-1]:
             before, brace, body = rule.rpartition("{")
             if not brace:
@@ -94,7 +86,7 @@ class StyleSheet:
         Raises MapError when there are too many elements with too many rules each.
         """
         attributes = element.attributes
-        found = {name: attributes[name].strip() for name in (*INHERITED, *OWN) if name in attributes}
+        found = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
         classes = set(attributes.get("class", "").split())
         keys = ["", element.tag, *(f".{name}" for name in classes), f"#{attributes.get('id', '')}"]
         looked_at = [rule for key in keys for rule in self._keyed.get(key, ())]
@@ -137,15 +129,6 @@ class StyleSheet:
         self._keyed.setdefault(key, []).append(rule)
 
 
-def _without_comments(text: str) -> str:
-    """Return a style sheet without comments; one without an end is none."""
-    kept, at = [], 0
-    while (begin := text.find("/*", at)) >= 0 and (end := text.find("*/", begin + 2)) >= 0:
-        kept += [text[at:begin], " "]
-        at = end + 2
-    return "".join([*kept, text[at:]])
-
-
 def declarations(text: str) -> dict[str, str]:
     """Return the properties of a ``style`` attribute or of the body of a rule.
 
@@ -158,11 +141,9 @@ def declarations(text: str) -> dict[str, str]:
 
 def _by_importance(properties: dict[str, str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return the properties that are not marked as important, and those that are, without the mark."""
-    important = {name for name, value in properties.items() if _IMPORTANT.search(value)}
-    return (
-        {name: value for name, value in properties.items() if name not in important},
-        {name: _IMPORTANT.sub("", properties[name]).rstrip() for name in properties if name in important},
-    )
+    important = {name: value for name, value in properties.items() if _IMPORTANT.search(value)}
+    plain = {name: value for name, value in properties.items() if name not in important}
+    return plain, {name: _IMPORTANT.sub("", value).rstrip() for name, value in important.items()}
 
 
 def inherited(parent: Style, own: Style) -> dict[str, str]:
