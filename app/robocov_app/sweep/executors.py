@@ -18,7 +18,8 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import IO, Any, NamedTuple, Self, TypeAlias
+from itertools import count
+from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
 from robocov_app.sweep.performing import Outcome, failed, perform
@@ -55,6 +56,7 @@ class Executor(ABC):
         self._out = 0
         self._lonely = False  # whether the one that is out is to be alone
         self.lost = self._in_a_row = 0
+        self._back: queue.SimpleQueue[tuple[Task, Any]] = queue.SimpleQueue()  # with futures that are done
 
     def __enter__(self) -> Self:
         return self
@@ -70,9 +72,20 @@ class Executor(ABC):
     @abstractmethod
     def _hand_out(self, task: Task) -> None: ...
 
-    @abstractmethod
+    def _awaited(self, task: Task, future: Any) -> None:
+        future.add_done_callback(lambda done: self._back.put((task, done)))
+
     def _returned(self, timeout: float) -> Returned | None:
         """Return a task that was handed out, and what came of it; None where none is for so many seconds."""
+        try:
+            task, future = self._back.get(timeout=timeout)
+        except queue.Empty:
+            return None
+        return task, self._result(future)
+
+    def _result(self, future: Any) -> Outcome | Lost:
+        came: Outcome | Lost = future.result()
+        return came
 
     @property
     def waiting(self) -> str:
@@ -150,25 +163,23 @@ _OUTSIDE = -getattr(signal, "SIGKILL", 9)
 """The status of a process that was ended from outside: by a user, or because memory ran out."""
 
 
-_Event: TypeAlias = "tuple[Task, Outcome | Lost | OutputError]"
-
-
 class LocalPool(Executor):
     """Processes on this machine, each of which does one task at a time; one that ends is replaced."""
 
     def __init__(self, workers: int) -> None:
         super().__init__()
-        self._tasks: queue.SimpleQueue[Task | None] = queue.SimpleQueue()
-        self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
-        self._hands = [_WorkerThread(self._tasks, self._events) for _ in range(workers)]
+        self._hands = [_Hand() for _ in range(workers)]
+        self._idle: queue.LifoQueue[_Hand] = queue.LifoQueue()
+        for hand in self._hands:
+            self._idle.put(hand)
+        self._threads = ThreadPoolExecutor(max(1, workers))
 
     def __exit__(self, *exception: object) -> None:
         for hand in self._hands:
             hand.stop()
-        for _ in self._hands:
-            self._tasks.put(None)
+        self._threads.shutdown(cancel_futures=True)
         for hand in self._hands:
-            hand.join()
+            hand.close()
 
     @property
     def most(self) -> int:
@@ -176,29 +187,25 @@ class LocalPool(Executor):
         return len(self._hands) + 1
 
     def _hand_out(self, task: Task) -> None:
-        self._tasks.put(task)
+        self._awaited(task, self._threads.submit(self._done, task))
 
-    def _returned(self, timeout: float) -> Returned | None:
+    def _done(self, task: Task) -> Outcome | Lost:
+        hand = self._idle.get()
         try:
-            task, event = self._events.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        if isinstance(event, OutputError):
-            raise event
-        return task, event
+            return hand.done(task)
+        finally:
+            self._idle.put(hand)
 
 
-class _WorkerThread:
-    """A thread that hands tasks to a process, and starts another one when that ends."""
+class _Hand:
+    """A process that does tasks; another one is started when it ends."""
 
-    def __init__(self, tasks: queue.SimpleQueue[Task | None], events: queue.SimpleQueue[_Event]) -> None:
-        self._tasks, self._events = tasks, events
+    def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._complaints: IO[bytes] | None = None
+        # appended to, so that it can be emptied
+        self._complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - see `close`
         self._stopped = False
         self._starting = threading.Lock()
-        self._thread = threading.Thread(target=self._work, daemon=True)
-        self._thread.start()
 
     def stop(self) -> None:
         """End the process, whatever it does."""
@@ -207,66 +214,46 @@ class _WorkerThread:
             if self._process is not None:
                 self._process.kill()
 
-    def join(self) -> None:
-        """Wait until the thread has ended."""
-        self._thread.join()
-
-    def _work(self) -> None:
-        while (task := self._tasks.get()) is not None and not self._stopped:
-            try:
-                self._events.put((task, self._done(task)))
-            except OutputError as error:
-                self._events.put((task, error))
+    def close(self) -> None:
+        """Let the process end."""
         self._end()
+        self._complaints.close()
 
-    def _done(self, task: Task) -> Outcome | Lost:
-        if self._process is None or self._process.poll() is not None:
-            self._begin()
-        assert self._process is not None and self._complaints is not None
+    def done(self, task: Task) -> Outcome | Lost:
+        """Do a task; raises OutputError where no process can be started."""
+        process = self._process
+        if process is None or process.poll() is not None:
+            process = self._begun()
         self._complaints.truncate(0)  # what it says of this task, and does not grow for ever
-        reply = asked(self._process, task)
+        reply = asked(process, task)
         if reply is not None and isinstance(reply.answer, Outcome):
             return reply.answer
         status, said = self._end()
-        return Lost(f"its process ended ({_cause(status)})", said, blamed=status != _OUTSIDE)
+        cause = f"signal {-status}" if status < 0 else f"exit status {status}"
+        return Lost(f"its process ended ({cause})", said, blamed=status != _OUTSIDE)
 
-    def _begin(self) -> None:
+    def _begun(self) -> subprocess.Popen[bytes]:
         """Start a process, and wait until it is there."""
         for _ in range(_STARTS):
             self._end()
-            # appended to, so that it can be emptied
-            self._complaints = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - closed with the process
+            self._complaints.truncate(0)
             with self._starting:
                 if self._stopped:
                     break
-                self._process = started("robocov_app.sweep.performing:Performing", stderr=self._complaints)
-            assert self._process.stdout
-            if receive(self._process.stdout) == READY:
-                return
+                process = started("robocov_app.sweep.performing:Performing", stderr=self._complaints)
+                self._process = process
+            assert process.stdout
+            if receive(process.stdout) == READY:
+                return process
         said = self._end()[1].strip().splitlines() or ["it says nothing"]
         raise OutputError(f"no process for the runs can be started: {said[-1]}")
 
     def _end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its status and its last words."""
-        status, said = 0, b""
-        if self._process is not None:
-            status = ended(self._process)
-            self._process = None
-        if self._complaints is not None:
-            self._complaints.seek(0)
-            said = self._complaints.read()[-_LAST_WORDS:]
-            self._complaints.close()
-            self._complaints = None
-        return status, said.decode(errors="replace")
-
-
-def _cause(status: int) -> str:
-    """Return in words how a process ended.
-
-    >>> _cause(-9), _cause(3)
-    ('signal 9', 'exit status 3')
-    """
-    return f"signal {-status}" if status < 0 else f"exit status {status}"
+        status = 0 if self._process is None else ended(self._process)
+        self._process = None
+        self._complaints.seek(0)
+        return status, self._complaints.read()[-_LAST_WORDS:].decode(errors="replace")
 
 
 def processors() -> int:
@@ -296,11 +283,10 @@ class Cluster(Executor):
 
         client: Any = distributed.Client  # it has no types
         self._address = address
-        self._tasks: dict[Any, Task] = {}
-        self._back: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._futures: set[Any] = set()
         # a result is that of this sweep alone, whatever else the cluster does
         self._prefix = f"robocov-{uuid.uuid4().hex[:8]}"
-        self._submitted = 0
+        self._numbers = count(1)
         try:
             _require_answer(address)
             self._client = client(address, timeout=PATIENCE, set_as_default=False)
@@ -315,7 +301,7 @@ class Cluster(Executor):
 
     def __exit__(self, *exception: object) -> None:
         with suppress(Exception):  # the scheduler may be gone
-            self._client.cancel(list(self._tasks))
+            self._client.cancel(list(self._futures))
         with suppress(Exception):
             self._client.close()
         self._talk.setLevel(self._level)
@@ -341,30 +327,24 @@ class Cluster(Executor):
         return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _hand_out(self, task: Task) -> None:
-        self._submitted += 1
-        key = f"{self._prefix}-{self._submitted}"
+        key = f"{self._prefix}-{next(self._numbers)}"
         future: Any = self._client.submit(perform, task, key=key, pure=False)
-        self._tasks[future] = task
-        future.add_done_callback(self._back.put)
+        self._futures.add(future)
+        self._awaited(task, future)
 
-    def _returned(self, timeout: float) -> Returned | None:
+    def _result(self, future: Any) -> Outcome | Lost:
         from distributed import KilledWorker
 
+        self._futures.remove(future)
         try:
-            future = self._back.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        task = self._tasks.pop(future)
-        try:
-            outcome: Outcome = future.result()
+            return super()._result(future)
         except KilledWorker as error:
             # so has every task that waited for the same worker
-            return task, Lost("the process of its worker ended", str(error), blamed=False)
+            return Lost("the process of its worker ended", str(error), blamed=False)
         except Exception as error:
             reason = getattr(error, "reason", None) or f"{type(error).__name__}: {error}"
             reason = " ".join(str(reason).split())
             raise OutputError(f"--scheduler: {self._address}: the runs cannot go on: {reason}") from error
-        return task, outcome
 
 
 def _require_answer(address: str) -> None:
