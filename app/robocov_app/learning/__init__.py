@@ -64,24 +64,24 @@ __all__ = [
     "PolicyController",
 ]
 
-_HOME: dict[str, tuple[str, tuple[str, ...]]] = {
-    # name: its module, and the packages of the extra that it needs
-    "ControllerPolicy": ("policy", ()),
-    "CoverageEnv": ("gym", ("gymnasium",)),
-    "CoverageParallelEnv": ("parallel", ("gymnasium", "pettingzoo")),
-    "CoverageTask": ("task", ()),
-    "CoverageVectorEnv": ("gym", ("gymnasium",)),
-    "GeneratedMaps": ("task", ()),
-    "ObservationLayout": ("layout", ()),
-    "PolicyController": ("policy", ()),
+_HOME = {
+    "ControllerPolicy": "policy",
+    "CoverageEnv": "gym",
+    "CoverageParallelEnv": "parallel",
+    "CoverageTask": "task",
+    "CoverageVectorEnv": "gym",
+    "GeneratedMaps": "task",
+    "ObservationLayout": "layout",
+    "PolicyController": "policy",
 }
+_NEEDED = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}  # packages of the extra
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, needed = _HOME[name]
-    for package in needed:
+    module = _HOME[name]
+    for package in _NEEDED.get(module, ()):
         extra(package, "rl")
     value = getattr(importlib.import_module(f"{__name__}.{module}"), name)
     globals()[name] = value

@@ -58,12 +58,10 @@ class Learner:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of one action of the team."""
+    """What came of an action: rewards, (n,), and how long each robot touched something, (n,) s."""
 
     rewards: Array
-    """(n,)"""
     contact: Array
-    """(n,) s, how long each robot touched a wall or another robot."""
 
 
 def drawn_episode(

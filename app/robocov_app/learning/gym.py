@@ -16,9 +16,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from robocov.arrays import Array
-from robocov.errors import RobocovError
 from robocov_app.learning.episode import (
-    Episode,
     Outcome,
     Place,
     SharedSimulation,
@@ -26,14 +24,13 @@ from robocov_app.learning.episode import (
     drawn_episode,
 )
 from robocov_app.learning.layout import Rows
-from robocov_app.learning.pictures import METADATA, Pictures
+from robocov_app.learning.pictures import METADATA, EpisodeEnv
 from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
-from robocov_app.runs.recording import Frame
 
 ID = "robocov/Coverage-v0"
 
 
-class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     """A team that one learner steers, who is told what all robots know: gymnasium's ``Env``.
 
     Observations are the robots' rows of the task's `ObservationLayout` below each other, (n, size) float32
@@ -46,7 +43,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     actions give the same episode, bit for bit.
 
     The `changes` are of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``; for `render_mode`,
-    `size` and `theme` see `robocov_app.learning.pictures.Pictures`. Several environments may share the
+    `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`. Several environments may share the
     `scenarios` of their task.
 
     Attributes
@@ -74,11 +71,7 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         scenarios: Scenarios | None = None,
         **changes: Any,
     ) -> None:
-        self.task = changed_task(task, changes)
-        self.render_mode = render_mode
-        self._pictures = Pictures(render_mode, size, theme)
-        self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
-        self.episode: Episode | None = None
+        super().__init__(task, changes, render_mode, size, theme, scenarios)
         self.place: Place | None = None
         self.outcome: Outcome | None = None
         n = self.task.robots
@@ -91,10 +84,10 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Rows, dict[str, Any]]:
         """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
-        super().reset(seed=seed)
+        gymnasium.Env.reset(self, seed=seed)
         self.outcome = None
         self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
-        self._pictures.shown(self.episode)
+        self._show()
         info = self._info(np.zeros(self.task.robots))
         return self._rows(), {**info, "map": self.episode.environment.name}
 
@@ -105,23 +98,10 @@ class CoverageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         episode = self._present()
         outcome, self.outcome = self.outcome or episode.advance(action), None
-        self._pictures.shown(episode)
+        self._show()
         ended, over = not episode.working.any(), episode.cycle >= self.task.cycles
         reward = float(outcome.rewards.sum()) / len(episode.team)
         return self._rows(), reward, ended, over, self._info(outcome.contact)
-
-    def render(self) -> Frame | None:
-        """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
-        return self._pictures.frame(self._present())
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._pictures.close()
-
-    def _present(self) -> Episode:
-        if self.episode is None:
-            raise RobocovError("environment: reset() was wanted before anything else")
-        return self.episode
 
     def _rows(self) -> Rows:
         episode = self._present()

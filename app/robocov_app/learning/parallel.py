@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -11,15 +11,17 @@ from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError, RobocovError, shown
-from robocov_app.learning.episode import Episode, drawn_episode
+from robocov.errors import ParameterError, shown
+from robocov_app.learning.episode import drawn_episode
 from robocov_app.learning.layout import Rows
-from robocov_app.learning.pictures import METADATA, Pictures
-from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
-from robocov_app.runs.recording import Frame
+from robocov_app.learning.pictures import METADATA, EpisodeEnv
+from robocov_app.learning.task import CoverageTask, action_limit
+
+Flags: TypeAlias = dict[str, bool]
+Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
 
 
-class CoverageParallelEnv(ParallelEnv):
+class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     """A team that learns to cover, each robot by what it knows: PettingZoo's ``ParallelEnv``.
 
     The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's
@@ -31,17 +33,13 @@ class CoverageParallelEnv(ParallelEnv):
 
     The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``; `max_cycles`
     actions until an episode is truncated are in place of its duration. For `render_mode`, `size` and `theme`
-    see `robocov_app.learning.pictures.Pictures`. `episode` is the present one, None before the first
+    see `robocov_app.learning.pictures.EpisodeEnv`. `episode` is the present one, None before the first
     ``reset``; `state_space` is that of `state`.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        **METADATA,
-        "name": "robocov_coverage_v0",
-        "is_parallelizable": True,
-    }
+    metadata: ClassVar[dict[str, Any]] = METADATA | {"name": "robocov_coverage_v0", "is_parallelizable": True}
 
     def __init__(
         self,
@@ -53,16 +51,12 @@ class CoverageParallelEnv(ParallelEnv):
         max_cycles: int | None = None,
         **changes: Any,
     ) -> None:
-        self.task = changed_task(task, changes)
+        super().__init__(task, changes, render_mode, size, theme)
         self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
         if self.max_cycles < 1:
             raise ParameterError(f"max_cycles: {max_cycles}, but a whole number of at least 1 was wanted")
-        self.render_mode = render_mode
-        self._pictures = Pictures(render_mode, size, theme)
-        self._scenarios = Scenarios(self.task.maps, self.task.lattice)
         self.possible_agents = self.task.agents
         self.agents: list[str] = []
-        self.episode: Episode | None = None
         self._rng = np.random.default_rng()
         low, high = self.task.observation.bounds
         limits = action_limit(self.task.action, self.task.whole_team).tolist()
@@ -89,17 +83,13 @@ class CoverageParallelEnv(ParallelEnv):
             self._rng, _ = seeding.np_random(seed)
         self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
         self.agents = self._working()
-        self._pictures.shown(self.episode)
+        self._show()
         infos = self._infos(np.zeros(self.task.robots))
         for info in infos.values():
             info["map"] = self.episode.environment.name
         return self._observations(self.agents), infos
 
-    def step(
-        self, actions: Mapping[str, Any]
-    ) -> tuple[
-        dict[str, Rows], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]
-    ]:
+    def step(self, actions: Mapping[str, Any]) -> Step:
         """Let every robot act, and return observations, rewards, terminations, truncations and infos.
 
         Raises ParameterError when a robot has no action, or one that is not two finite numbers.
@@ -121,26 +111,13 @@ class CoverageParallelEnv(ParallelEnv):
         observations, infos = self._observations(told), self._infos(outcome.contact)
         if over:
             self.agents = []
-        self._pictures.shown(episode)
+        self._show()
         rewards, infos = ({agent: each[agent] for agent in told} for each in (rewards, infos))
         return observations, rewards, ended, truncated, infos
 
     def state(self) -> Rows:
         """Return where all robots are and how fast, for critics: see `Episode.state`."""
         return self._present().state()
-
-    def render(self) -> Frame | None:
-        """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
-        return self._pictures.frame(self._present())
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self._pictures.close()
-
-    def _present(self) -> Episode:
-        if self.episode is None:
-            raise RobocovError("environment: reset() was wanted before anything else")
-        return self.episode
 
     def _working(self) -> list[str]:
         working = self._present().working.tolist()

@@ -1,56 +1,65 @@
-"""Pictures of an episode: arrays without a display, or a window."""
+"""What all environments of a task have: the present episode, and its pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robocov.errors import ParameterError, RobocovError, unknown_name
+from robocov_app.learning.episode import Episode
+from robocov_app.learning.task import CoverageTask, Scenarios, changed_task
 
 if TYPE_CHECKING:
-    from robocov_app.learning.episode import Episode
     from robocov_app.render.picture import Painter
     from robocov_app.runs.recording import Frame
 
 RENDER_MODES = ("rgb_array", "human")
 
-_THEMES = ("light", "dark")
-
 # of films of the usual task, one picture for each action
 METADATA = {"render_modes": list(RENDER_MODES), "render_fps": 10}
 
 
-class Pictures:
-    """Draws an episode as runs are drawn everywhere.
+class EpisodeEnv:
+    """An environment with `changes` of a task, whose `episode` is drawn as runs are drawn everywhere.
 
     The mode is ``rgb_array``, ``human``, which opens a window and needs a display, or None; `size` is width
-    and height in pixels, `theme` light or dark.
-
-    Raises ParameterError on another mode or theme, or a size that is none.
+    and height in pixels, `theme` light or dark. Raises ParameterError on others.
     """
 
-    def __init__(self, mode: str | None, size: tuple[int, int], theme: str = "light") -> None:
+    def __init__(
+        self,
+        task: CoverageTask | None,
+        changes: Mapping[str, Any],
+        mode: str | None,
+        size: tuple[int, int],
+        theme: str,
+        scenarios: Scenarios | None = None,
+    ) -> None:
+        self.task = changed_task(task, changes)
         if mode is not None and mode not in RENDER_MODES:
             raise ParameterError(f"render_mode: {unknown_name('mode', str(mode), RENDER_MODES)}")
         if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
             raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
-        if theme not in _THEMES:
-            raise ParameterError(f"theme: {unknown_name('theme', str(theme), _THEMES)}")
-        self._theme = theme
-        self.mode, self._size = mode, (int(size[0]), int(size[1]))
+        if theme not in ("light", "dark"):
+            raise ParameterError(f"theme: {unknown_name('theme', str(theme), ('light', 'dark'))}")
+        self.render_mode, self._theme, self._size = mode, theme, (int(size[0]), int(size[1]))
+        self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
+        self.episode: Episode | None = None
         self._painter: Painter | None = None
         self._window: Any = None
         self._clock: Any = None
 
-    def shown(self, episode: Episode) -> None:
-        """Show the present moment where there is a window; else nothing."""
-        if self.mode == "human":
-            self._show(episode)
+    def _present(self) -> Episode:
+        if self.episode is None:
+            raise RobocovError("environment: reset() was wanted before anything else")
+        return self.episode
 
-    def frame(self, episode: Episode) -> Frame | None:
-        """Return the present moment as an RGB picture in the mode ``rgb_array``; else None."""
-        if self.mode != "rgb_array":
+    def render(self) -> Frame | None:
+        """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
+        episode = self._present()
+        if self.render_mode != "rgb_array":
             return None
         painter, scene = self._drawn(episode)
         return painter.frame(scene).copy()
@@ -83,7 +92,10 @@ class Pictures:
         )
         return self._painter, scene
 
-    def _show(self, episode: Episode) -> None:
+    def _show(self) -> None:
+        """Show the present moment where there is a window."""
+        if self.render_mode != "human":
+            return
         import pygame
 
         if self._window is None:
@@ -95,7 +107,7 @@ class Pictures:
             pygame.display.set_caption("robocov")
             self._clock = pygame.time.Clock()
         pygame.event.pump()
-        painter, scene = self._drawn(episode)
+        painter, scene = self._drawn(self._present())
         painter.draw(self._window, scene)
         pygame.display.flip()
-        self._clock.tick(1.0 / episode.task.period)
+        self._clock.tick(1.0 / self.task.period)

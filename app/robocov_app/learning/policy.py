@@ -19,7 +19,7 @@ from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov_app.learning.episode import Episode
 from robocov_app.learning.layout import ObservationLayout
-from robocov_app.learning.task import Action, actions_of, checked_action, driving_forces
+from robocov_app.learning.task import ACTIONS, Action, actions_of, checked_kind, driving_forces
 
 Policy: TypeAlias = "Callable[[NDArray[np.float32]], Any]"
 """From an observation, (size,), to an action, (2,)."""
@@ -29,14 +29,11 @@ _SOON = 5e-7  # seconds that sums of control periods may miss
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What the robots remember of their policy."""
+    """What is remembered of a policy: its last actions, (n, 2) N or m/s, and when the next are due, s."""
 
     team: Team
-    """Their limits, in which observations are told."""
     actions: Array | None = None
-    """The last ones, (n, 2) N or m/s; None before the first."""
     due: float = -np.inf
-    """When the next ones are, s."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ class PolicyController:
     period: float = gain(0.1, "s", "for which an action is held")
 
     def __post_init__(self) -> None:
-        checked_action(self.action)
+        checked_kind("action", self.action, ACTIONS)
         if not isinstance(self.layout, ObservationLayout):
             raise ParameterError(f"layout: {shown(self.layout)}, but an ObservationLayout was wanted")
         validate_gains(self)

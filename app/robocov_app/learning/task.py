@@ -28,12 +28,10 @@ ACTIONS: tuple[Action, ...] = ("force", "velocity")
 FOLLOWING = 0.1  # time constant in seconds with which a robot follows a velocity that it is told
 
 
-def checked_action(action: str) -> Action:
-    """Return the kind of action that is meant; raises ParameterError when there is none of that name."""
-    for known in ACTIONS:
-        if action == known:
-            return known
-    raise ParameterError(f"action: {unknown_name('kind of action', str(action), ACTIONS)}")
+def checked_kind(what: str, given: str, known: Sequence[str]) -> None:
+    """Raise ParameterError when there is no kind of `what` that is called so."""
+    if given not in known:
+        raise ParameterError(f"{what}: {unknown_name(f'kind of {what}', str(given), known)}")
 
 
 def action_limit(action: Action, team: Team) -> Array:
@@ -76,14 +74,6 @@ Reward: TypeAlias = Literal["shared", "own", "level"]
 """Who is rewarded for what; see `shares`."""
 
 REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
-
-
-def checked_reward(reward: str) -> Reward:
-    """Return the kind of reward that is meant; raises ParameterError when there is none of that name."""
-    for known in REWARDS:
-        if reward == known:
-            return known
-    raise ParameterError(f"reward: {unknown_name('kind of reward', str(reward), REWARDS)}")
 
 
 def reference_distance(area: float, robots: int) -> float:
@@ -302,8 +292,9 @@ class CoverageTask:
             raise ParameterError(
                 f"contact_penalty: {shown(self.contact_penalty)}, but a finite number from 0 was wanted"
             )
-        checked_reward(self.reward)
-        if checked_action(self.action) == "velocity" and self.dt > FOLLOWING:
+        checked_kind("reward", self.reward, REWARDS)
+        checked_kind("action", self.action, ACTIONS)
+        if self.action == "velocity" and self.dt > FOLLOWING:
             raise ParameterError(
                 f"dt: {self.dt:g} s, but at most {FOLLOWING:g} s was wanted for robots to follow velocities"
             )

@@ -13,7 +13,7 @@ from robocov_app.learning.task import (
     FOLLOWING,
     action_limit,
     actions_of,
-    checked_action,
+    checked_kind,
     driving_forces,
 )
 
@@ -43,6 +43,6 @@ def test_robots_follow_a_velocity(empty: Environment) -> None:
 
 
 def test_names() -> None:
-    assert checked_action("force") == "force"
+    checked_kind("action", "force", ACTIONS)
     with pytest.raises(ParameterError, match="unknown kind of action 'forces': did you mean 'force'"):
-        checked_action("forces")
+        checked_kind("action", "forces", ACTIONS)

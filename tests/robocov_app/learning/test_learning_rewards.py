@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import ParameterError
-from robocov_app.learning.task import checked_reward, reference_distance, shares
+from robocov_app.learning.task import REWARDS, checked_kind, reference_distance, shares
 
 STEPS = st.integers(0, 2**32)
 
@@ -73,6 +73,6 @@ def test_no_placement_goes_below_the_reference(empty: Environment) -> None:
 
 
 def test_names() -> None:
-    assert checked_reward("own") == "own"
+    checked_kind("reward", "own", REWARDS)
     with pytest.raises(ParameterError, match="unknown kind of reward 'share': did you mean 'shared'"):
-        checked_reward("share")
+        checked_kind("reward", "share", REWARDS)
