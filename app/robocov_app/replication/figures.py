@@ -71,6 +71,7 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -
     return f"{_ends_text(*pair)} {_moved_text(runs)}" if number == 8 else _ends_text(*pair)
 
 
+@plain_style()
 def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
     """Draw the Voronoi partition of a run's first moment with robots and centroids (figure 1)."""
     from matplotlib.collections import PolyCollection
@@ -79,23 +80,22 @@ def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
     environment, robots = first.environment, first.positions[0]
     ink, edge = tone(theme.ink), tone(theme.cell_edge)
     dot: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": ink}
-    with plain_style():
-        handles: list[Artist] = [
-            arena.robot_handle("robot", theme.final, theme),
-            Line2D([], [], label="centre of mass of its cell", **dot),
-            Line2D([], [], color=edge, linewidth=0.9, label="Voronoi cell"),
-            *arena.map_handles(environment, theme)[1:],
-        ]
-        page, (axes,) = panels(environment, 1, NARROW, handles, theme, above=10.0)
-        arena.draw_map(axes, environment, theme)
-        cells = partition(robots, environment.region)
-        hues = [theme.robots[k % len(theme.robots)] for k in range(len(robots))]
-        fills = [tone(mix(theme.background, hue, theme.paper_tint)) for hue in hues]
-        look: Any = {"facecolors": fills, "edgecolors": edge, "linewidths": 0.8, "zorder": 1}
-        axes.add_collection(PolyCollection(list(cells.polygons), **look), autolim=False)
-        axes.plot(*cells.centroid.T, zorder=8, clip_on=False, **dot)
-        arena.draw_robots(axes, robots, first.team.radius, [theme.final] * len(robots), theme)
-        return page.figure
+    handles: list[Artist] = [
+        arena.robot_handle("robot", theme.final, theme),
+        Line2D([], [], label="centre of mass of its cell", **dot),
+        Line2D([], [], color=edge, linewidth=0.9, label="Voronoi cell"),
+        *arena.map_handles(environment, theme)[1:],
+    ]
+    page, (axes,) = panels(environment, 1, NARROW, handles, theme, above=10.0)
+    arena.draw_map(axes, environment, theme)
+    cells = partition(robots, environment.region)
+    hues = [theme.robots[k % len(theme.robots)] for k in range(len(robots))]
+    fills = [tone(mix(theme.background, hue, theme.paper_tint)) for hue in hues]
+    look: Any = {"facecolors": fills, "edgecolors": edge, "linewidths": 0.8, "zorder": 1}
+    axes.add_collection(PolyCollection(list(cells.polygons), **look), autolim=False)
+    axes.plot(*cells.centroid.T, zorder=8, clip_on=False, **dot)
+    arena.draw_robots(axes, robots, first.team.radius, [theme.final] * len(robots), theme)
+    return page.figure
 
 
 def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
@@ -111,6 +111,7 @@ def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figu
     return side_by_side(records, [each.label for each in records], finals, theme, unnamed)
 
 
+@plain_style()
 def side_by_side(
     records: Sequence[Record],
     titles: Sequence[str],
@@ -119,32 +120,31 @@ def side_by_side(
     unnamed: Sequence[str] = (),
 ) -> Figure:
     """Draw runs on one map side by side, titles and final costs above; the legend leaves `unnamed` out."""
-    with plain_style():
-        handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
-        handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
-        page, places = panels(records[0].environment, len(records), WIDE, handles, theme, above=30.0)
-        each = zip("abcdef", records, titles, finals, places, strict=False)
-        for letter, record, title, final, axes in each:
-            arena.draw_run(axes, record, theme, "paper")
-            box = axes.get_position()
-            left, right = box.x0 * page.size[0], box.x1 * page.size[0]
-            top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
-            page.text(f"({letter})  {title}", left, top, points=TITLE, bold=True)
-            page.text(final, right, top, points=SMALL, colour=theme.faint, align="right")
-        return page.figure
+    handles = united((arena.run_handles(record, theme, "paper") for record in records), arena.label_of)
+    handles = [handle for handle in handles if arena.label_of(handle) not in unnamed]
+    page, places = panels(records[0].environment, len(records), WIDE, handles, theme, above=30.0)
+    each = zip("abcdef", records, titles, finals, places, strict=False)
+    for letter, record, title, final, axes in each:
+        arena.draw_run(axes, record, theme, "paper")
+        box = axes.get_position()
+        left, right = box.x0 * page.size[0], box.x1 * page.size[0]
+        top = (1.0 - box.y1) * page.size[1] - 14 * page.scale
+        page.text(f"({letter})  {title}", left, top, points=TITLE, bold=True)
+        page.text(final, right, top, points=SMALL, colour=theme.faint, align="right")
+    return page.figure
 
 
+@plain_style()
 def cost_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
     """Draw the cost of runs against time (figures 3, 5, 7)."""
-    with plain_style():
-        both = [(run.record, run.history) for run in runs]
-        curves = [(run.label, run.controller, cost.time, cost.mean_distance) for run, cost in both]
-        page = Page((WIDE, 1050), theme, DOTS)
-        edge = 34 * page.scale
-        longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
-        box = (edge, edge, WIDE - 2 * edge - longest, 1050 - edge - 44 * page.scale)
-        draw_curves(page.axes(box), curves, theme)
-        return page.figure
+    both = [(run.record, run.history) for run in runs]
+    curves = [(run.label, run.controller, cost.time, cost.mean_distance) for run, cost in both]
+    page = Page((WIDE, 1050), theme, DOTS)
+    edge = 34 * page.scale
+    longest = max(page.text_width(end_label(curve), bold=True) for curve in curves)
+    box = (edge, edge, WIDE - 2 * edge - longest, 1050 - edge - 44 * page.scale)
+    draw_curves(page.axes(box), curves, theme)
+    return page.figure
 
 
 def panels(

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from markupsafe import Markup
 
 from robocov import __version__
-from robocov.errors import OutputError
 from robocov.files.atomic import written
+from robocov.files.result_folder import for_results
 from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
@@ -103,10 +103,8 @@ def _save_figures(
 ) -> dict[str, Image]:
     """Write figures as PNG, SVG and PDF, and as PNG for dark pages."""
     target = folder / "figures"
-    try:
+    with for_results(target):
         target.mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be used for results: {error.strerror or error}") from error
     light, dark = drawn("light"), drawn("dark")
     found: dict[str, Image] = {}
     with progress("figures", len(light), quiet=quiet) as update:

@@ -148,6 +148,7 @@ def gap_samples(results: BeyondResults) -> list[Sample]:
     return found
 
 
+@plain_style()
 def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
     rpf, rapf = gains["rpf"].complete, gains["rapf"].complete
@@ -159,21 +160,21 @@ def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     left, right, above, below = 44 * DOTS, 10 * DOTS, 52 * DOTS, 44 * DOTS
     width = WIDE / columns - left - right
     height = len(second) * 24 * DOTS
-    with plain_style():
-        page = Page((WIDE, round(rows * (height + above + below))), theme, DOTS)
-        for number, (name, part) in enumerate(panels):
-            row, column = divmod(number, columns)
-            x, y = left + column * (width + left + right), above + row * (height + above + below)
-            values = np.full((len(second), len(first)), np.nan)
-            for each, excess in zip(part.gains, part.excess, strict=True):
-                at = second.index(float(each["rho_0"] or 0.0)), first.index(float(each["k_rep"] or 0.0))
-                values[at] = 100.0 * (excess.mean() - 1.0)
-            axes = page.axes((x, y, width, height))
-            plot_gain_grid(first, second, values, ("k_rep (N m³)", "rho_0 (m)"), axes, theme)
-            page.text(name, x - left / 2, y - 36 * DOTS, points=TITLE, bold=True)
-        return page.figure
+    page = Page((WIDE, round(rows * (height + above + below))), theme, DOTS)
+    for number, (name, part) in enumerate(panels):
+        row, column = divmod(number, columns)
+        x, y = left + column * (width + left + right), above + row * (height + above + below)
+        values = np.full((len(second), len(first)), np.nan)
+        for each, excess in zip(part.gains, part.excess, strict=True):
+            at = second.index(float(each["rho_0"] or 0.0)), first.index(float(each["k_rep"] or 0.0))
+            values[at] = 100.0 * (excess.mean() - 1.0)
+        axes = page.axes((x, y, width, height))
+        plot_gain_grid(first, second, values, ("k_rep (N m³)", "rho_0 (m)"), axes, theme)
+        page.text(name, x - left / 2, y - 36 * DOTS, points=TITLE, bold=True)
+    return page.figure
 
 
+@plain_style()
 def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw the gaps of all contenders as boxes, in percent, on an axis of square roots."""
     from matplotlib.ticker import FixedLocator, NullLocator
@@ -192,13 +193,12 @@ def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     def square(places: Array) -> Array:
         return np.asarray(np.sign(places) * np.square(places))
 
-    with plain_style():
-        axes.set_xscale("function", functions=(root, square))
-        # a little room to the left of what lies below the reference
-        axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
-        axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= high]))
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xscale("function", functions=(root, square))
+    # a little room to the left of what lies below the reference
+    axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= high]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
     return figure
 
 
@@ -213,6 +213,7 @@ def density_plot(density: DensityResults, theme: Theme) -> Figure:
     )
 
 
+@plain_style()
 def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) -> Figure:
     """Plot final costs, one at least, by those of the runs without the disturbance: a panel for each axis."""
     theme = theme_named(theme)
@@ -224,24 +225,23 @@ def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) 
     ends = [value for each in found for value in (each.ratio.estimate, each.ratio.low, each.ratio.high)]
     bottom, top = min(1.0, float(np.nanmin(ends))), max(1.05, float(np.nanmax(ends)))
     room = 0.06 * (top - bottom)
-    with plain_style():
-        page = Page(_SIZE, theme, scale=1.0)
-        page.title("Coverage when things go wrong", 26)
-        words = "final mean distance, as a multiple of the same run's in which that does not go wrong"
-        page.text(words, page.margin, 50, colour=quiet, room=page.room)
-        for k, name in enumerate(names):
-            row, column = divmod(k, columns)
-            box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
-            axes = page.axes(box)
-            axes.set_ylim(bottom - room, top + room)
-            _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
-        handles, labels = page.figure.axes[0].get_legend_handles_labels()
-        place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
-        look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
-        page.figure.legend(handles, labels, ncols=len(handles), **place, **look)
-        pairs = counted(max(each.runs for each in found), "pair")
-        words = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
-        page.text(words, page.margin, _SIZE[1] - 18, points=SMALL, colour=quiet)
+    page = Page(_SIZE, theme, scale=1.0)
+    page.title("Coverage when things go wrong", 26)
+    words = "final mean distance, as a multiple of the same run's in which that does not go wrong"
+    page.text(words, page.margin, 50, colour=quiet, room=page.room)
+    for k, name in enumerate(names):
+        row, column = divmod(k, columns)
+        box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
+        axes = page.axes(box)
+        axes.set_ylim(bottom - room, top + room)
+        _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
+    handles, labels = page.figure.axes[0].get_legend_handles_labels()
+    place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
+    look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
+    page.figure.legend(handles, labels, ncols=len(handles), **place, **look)
+    pairs = counted(max(each.runs for each in found), "pair")
+    words = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
+    page.text(words, page.margin, _SIZE[1] - 18, points=SMALL, colour=quiet)
     return page.figure
 
 

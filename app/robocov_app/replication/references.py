@@ -14,6 +14,7 @@ from typing import Any
 
 from robocov.errors import OutputError
 from robocov.files.atomic import written
+from robocov.files.result_folder import for_results
 from robocov.mapfile import from_json, to_json
 from robocov_app.replication.plan import ROBOTS, TEAM, Plan
 from robocov_app.sweep.study import StudyMap
@@ -80,10 +81,8 @@ def find_references(
     radius: float = TEAM["radius"],
 ) -> dict[str, Reference]:
     """Return the reference of every map by its name, kept in `folder` or searched for until `stop`."""
-    try:
+    with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
     found: dict[str, Reference] = {}
     missing: dict[str, Question] = {}
     for each in maps:

@@ -16,8 +16,9 @@ import numpy as np
 import robocov
 from robocov.controllers import CONTROLLERS, controller_kind
 from robocov.cost import CoverageCost
-from robocov.errors import InputError, OutputError, RobocovError, counted
+from robocov.errors import InputError, RobocovError, counted
 from robocov.files.atomic import written
+from robocov.files.result_folder import for_results
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
 from robocov.record import Record
@@ -95,9 +96,7 @@ class PaperResults:
     claims: Outcomes  # on non-convex maps
     contenders: tuple[Contender, ...]
     references: Mapping[str, Reference]  # by map
-    worst: Sequence[
-        tuple[Scenario, Record]
-    ]  # RAPF's worst runs with the shared gains, done again to be shown
+    worst: Sequence[tuple[Scenario, Record]]  # RAPF's with the shared gains, done again to be shown
     runs: int
     failed: int  # among these
 
@@ -107,7 +106,7 @@ class DensityResults:
     """What became of knowing the density."""
 
     outcomes: (
-        Outcomes  # contenders ``known`` and ``ignored``; ``final`` is the mean distance by φ, m, for both
+        Outcomes  # of ``known`` and ``ignored``, for both of which ``final`` is the mean distance by φ, m
     )
     pictures: tuple[FigureRun, FigureRun]  # one run that knew it, one that did not, from the same places
     costs: tuple[float, float]  # their final ones
@@ -131,9 +130,7 @@ class BeyondResults:
 
     plan: Plan
     outcomes: Outcomes  # of all contenders: those of the claims, the baselines, and ours
-    unseen: (
-        Outcomes | None
-    )  # of the first of ours and the strongest of the paper's, on maps that nobody looked at
+    unseen: Outcomes | None  # of ours and the paper's strongest, on maps that nobody looked at
     contenders: tuple[Contender, ...]
     gains: Mapping[str, GainOutcomes]  # of the baselines whose gains were tuned here
     steps: Mapping[int, StepTimes]  # by number of robots
@@ -149,11 +146,9 @@ class BeyondResults:
 def open_folder(folder: Path, plan: Plan) -> None:
     """Make the folder of a study, or make sure that it is that of the same study, quick or full."""
     mark = folder / MARK
-    try:
+    with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
         used = any(folder.iterdir())
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
     if not used:
         with written(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
@@ -174,20 +169,9 @@ def open_folder(folder: Path, plan: Plan) -> None:
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
     """Do the runs of a sweep that are left, in ``studies/`` under its name; return that folder."""
     target = folder / "studies" / name
-    try:
-        target.parent.mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be used for results: {error.strerror or error}") from error
-    totals = sweep(
-        study,
-        target,
-        workers=options.workers,
-        scheduler=options.scheduler,
-        keep_versions=options.keep_versions,
-        quiet=options.quiet,
-        title=f"paper: {name}",
-        stop=options.stop,
-    )
+    names = ("workers", "scheduler", "keep_versions", "quiet", "stop")
+    how: Any = {option: getattr(options, option) for option in names}
+    totals = sweep(study, target, title=f"paper: {name}", **how)
     if totals.interrupted or options.stop.requested:
         raise Interrupted
     return target
@@ -200,7 +184,6 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
     folder of its sweep, as if each had been done alone, and each then writes its table.
     """
     if options.scheduler is None:
-        (folder / "studies").mkdir(parents=True, exist_ok=True)
         with ExitStack() as stack:
             ledgers = {
                 name: stack.enter_context(opened(folder / "studies" / name, study.to_json()))

@@ -52,7 +52,7 @@ class ResultFolder:
         self.path, self.new = path, path / _STAGING / part
         self._prefix = f"{part}/" if part else ""
         self._owned, self._replaces = owned, replaces
-        with _telling(path):
+        with for_results(path):
             self.new.mkdir(parents=True)
 
     def claim(self, name: str) -> None:
@@ -66,7 +66,7 @@ class ResultFolder:
 
     def commit(self) -> None:
         """Put what is made in the place of the earlier result; or beside it, where it replaces none."""
-        with _telling(self.path):
+        with for_results(self.path):
             staging = self.path / _STAGING
             made = {path.relative_to(staging).as_posix() for path in staging.rglob("*") if not path.is_dir()}
             if not made:
@@ -99,12 +99,12 @@ def results(
     Raises `InputError` when what is in the folder may not be replaced, `OutputError` when it cannot be used,
     another process is at work in it, or a file of somebody else is in the way.
     """
-    with _telling(folder):
+    with for_results(folder):
         existed = folder.exists()
         folder.mkdir(parents=True, exist_ok=True)
     try:
         with _held(folder):
-            with _telling(folder):
+            with for_results(folder):
                 earlier = _replaceable(folder, overwrite=overwrite)
                 owned = earlier or set()
                 own = (*_FILES[kind], "frames/000000.png", *_frames(folder))
@@ -125,7 +125,7 @@ def extended(folder: Path) -> Iterator[ResultFolder]:
     """Give the folder of a result, or of one run of a comparison, to which files are added."""
     home, part = _home(folder)
     with _held(home):
-        with _telling(home):
+        with for_results(home):
             owned = _owned(home)
         if owned is None:
             raise InputError(f"{folder}: there is no result of robocov in it")
@@ -140,7 +140,7 @@ def settle(folder: Path) -> None:
     Raises `InputError` when it cannot be known what is left to be done, `OutputError` when it cannot be done.
     """
     if os.path.lexists(folder / _JOURNAL):
-        with locked(folder, _LOCK, remove=True), _telling(folder):
+        with locked(folder, _LOCK, remove=True), for_results(folder):
             _carry_out(folder)
     home, part = _home(folder, _JOURNAL)
     if part:
@@ -204,7 +204,7 @@ def _carry_out(folder: Path) -> None:
 def _held(folder: Path) -> Iterator[None]:
     """Lock a folder and put it in order; afterwards discard what was made and not committed."""
     with locked(folder, _LOCK, remove=True):
-        with _telling(folder):
+        with for_results(folder):
             _carry_out(folder)
             _discard_staging(folder)
         try:
@@ -320,7 +320,7 @@ def _inside(folder: Path, name: str) -> Path:
 
 
 @contextmanager
-def _telling(folder: Path) -> Iterator[None]:
+def for_results(folder: Path) -> Iterator[None]:
     """Turn errors of the system into one line about the folder."""
     try:
         yield
