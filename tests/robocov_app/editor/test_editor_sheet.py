@@ -128,8 +128,8 @@ def test_what_the_hull_adds_is_told_apart() -> None:
     area = beyond(sketch)
     assert area is not None and area.area > 1.0
     assert beyond(sheet()).is_empty
-    assert beyond(replace(sketch, boundary=None)) is None
-    assert beyond(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))) is None
+    assert beyond(replace(sketch, boundary=None)).is_empty
+    assert beyond(replace(sketch, boundary=((0, 0), (1, 1), (1, 0), (0, 1)))).is_empty
 
 
 def test_a_picture_lies_under_the_obstacles(tmp_path: Path) -> None:

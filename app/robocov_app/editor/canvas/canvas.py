@@ -5,68 +5,43 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 import shapely
 
-from robocov_app.editor.canvas.overlay import (
-    Hatching,
-    accent,
-    badge_places,
-    draw_box,
-    draw_gap,
-    draw_ghost,
-    draw_grips,
-    draw_guides,
-    draw_outline,
-    draw_path,
-    draw_preview,
-    draw_problems,
-    draw_start,
-    draw_typed,
-    tag_gap,
-)
+from robocov.environment import Point
+from robocov_app.editor.canvas import overlay
+from robocov_app.editor.canvas.overlay import accent
 from robocov_app.editor.canvas.sheet import Sheet, View
 from robocov_app.editor.canvas.strips import Strips
 from robocov_app.editor.edits.motion_path import goes, moving
+from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.model.selection import Change
-from robocov_app.editor.model.sketch import BOUNDARY
+from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
+from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.handles import KNOB, frame_of, handles
 from robocov_app.editor.tools.select import Moving
+from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.team import Team
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
-from robocov_app.render.theme import mix
+from robocov_app.render.theme import Colour, Theme, mix
+from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.layout import Layout
 
-if TYPE_CHECKING:
-    from robocov.environment import Point
-    from robocov_app.editor.model.selection import Selection
-    from robocov_app.editor.model.sketch import Owner, Sketch
-    from robocov_app.editor.model.validation import Problem
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.editor.ui.team import Team
-    from robocov_app.render.canvas import Canvas
-    from robocov_app.render.theme import Theme
-    from robocov_app.toolkit.layout import Layout
+MANY = 200  # selected things from which on their outlines are drawn once, and then the picture of them
+REACH = 12.0  # pixels at scale 1 that a finger is wide
+MARGIN = 26.0  # pixels at scale 1 around the map when all of it is shown
+STAYS = 0.45  # part of the view by which the map can be moved out of its middle
+EMPTY = (0.0, 0.0, 10.0, 10.0)  # m; what is shown of a sheet with nothing on it
 
-MANY = 200
-"""Selected things from which on their outlines are drawn once, and then the picture of them."""
-
-REACH = 12.0
-"""Pixels at scale 1 that a finger is wide."""
-
-MARGIN = 26.0
-"""Pixels at scale 1 around the map when all of it is shown."""
-
-STAYS = 0.45
-"""Part of the view by which the map can be moved out of its middle."""
-
-EMPTY = (0.0, 0.0, 10.0, 10.0)
-"""What is shown of a sheet with nothing on it, m."""
+_BLEND = pygame.BLEND_PREMULTIPLIED
 
 
 class EditorCanvas:
@@ -78,12 +53,11 @@ class EditorCanvas:
         self.strips = Strips(editor)
         self.team: Team | None = None
         self.hovered: Problem | None = None
-        self.at: tuple[float, float] | None = None
-        """Where the mouse is, px; None where it is elsewhere."""
-        self._hatching = Hatching()
+        self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
         self._camera: Camera | None = None
-        self._carried: tuple[Moving, Camera, pygame.Surface] | None = None
-        self._outlined: tuple[Sketch, object, pygame.Surface] | None = None
+        self._hatched: Latest[tuple[pygame.Surface, pygame.Rect] | None] = Latest()
+        self._carried: Latest[pygame.Surface] = Latest()
+        self._outlined: Latest[pygame.Surface] = Latest()
 
     # cameras
 
@@ -106,13 +80,15 @@ class EditorCanvas:
 
     def fit(self) -> None:
         """Show the whole map."""
-        self._show(self.editor.sketch.bounds or EMPTY)
+        self._show(self._bounds)
 
     def fit_selection(self) -> None:
         """Show what is selected, or all."""
-        from robocov_app.editor.edits.transform import bounds_of
+        self._show(bounds_of(self.editor.sketch, self.editor.selection) or self._bounds)
 
-        self._show(bounds_of(self.editor.sketch, self.editor.selection) or self.editor.sketch.bounds or EMPTY)
+    @property
+    def _bounds(self) -> tuple[float, float, float, float]:
+        return self.editor.sketch.bounds or EMPTY
 
     def _show(self, bounds: tuple[float, float, float, float]) -> None:
         low_x, low_y, high_x, high_y = bounds
@@ -133,9 +109,9 @@ class EditorCanvas:
         if not (left + edge < x < left + width - edge and top + edge < y < top + height - edge):
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
-    def zoom(self, factor: float, at: tuple[float, float]) -> None:
+    def zoom(self, factor: float, at: Point) -> None:
         """Magnify what is under a pixel of the window."""
-        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
+        low_x, low_y, high_x, high_y = self._bounds
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
         factor = float(np.clip(self.camera.zoom * factor, 20.0 / whole, 2e4)) / self.camera.zoom
@@ -144,7 +120,7 @@ class EditorCanvas:
     def pan(self, dx: float, dy: float) -> None:
         """Move the sheet by so many pixels; the map stays within reach."""
         camera = self.camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self.editor.sketch.bounds or EMPTY
+        low_x, low_y, high_x, high_y = self._bounds
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
         x = float(np.clip(camera.center[0], low_x - far_x, high_x + far_x))
         y = float(np.clip(camera.center[1], low_y - far_y, high_y + far_y))
@@ -156,17 +132,17 @@ class EditorCanvas:
 
     # what is where
 
-    def over(self, pixel: tuple[float, float]) -> bool:
+    def over(self, pixel: Point) -> bool:
         """Return whether a pixel of the window shows the sheet."""
         left, top, width, height = self.camera.view
         return left <= pixel[0] < left + width and top <= pixel[1] < top + height
 
-    def to_world(self, pixel: tuple[float, float]) -> Point:
+    def to_world(self, pixel: Point) -> Point:
         """Return the place under a pixel of the window, m."""
         x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
         return x, y
 
-    def to_pixel(self, point: Point) -> tuple[float, float]:
+    def to_pixel(self, point: Point) -> Point:
         """Return the pixel of the window where a place is."""
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
@@ -176,11 +152,11 @@ class EditorCanvas:
         """How many metres a finger is wide."""
         return REACH * self.layout.scale / self.camera.zoom
 
-    def problem_at(self, pixel: tuple[float, float]) -> Problem | None:
+    def problem_at(self, pixel: Point) -> Problem | None:
         """Return the problem whose badge is under a pixel."""
         if "problems" not in self.editor.shown:
             return None
-        for problem, at in badge_places(self.editor.problems, self._view()):
+        for problem, at in overlay.badge_places(self.editor.problems, self._view()):
             if distance(at, pixel) < 10 * self.layout.scale:
                 return problem
         return None
@@ -188,104 +164,91 @@ class EditorCanvas:
     # drawing
 
     def _view(self) -> View:
-        editor = self.editor
-        folder = editor.document.path.parent if editor.document.path is not None else editor.folder
-        return View(
-            self.camera,
-            self.theme,
-            self.layout.scale,
-            self.layout.size,
-            frozenset(editor.shown),
-            editor.grid,
-            Path(folder),
-        )
+        editor, layout = self.editor, self.layout
+        folder = Path(editor.document.path.parent if editor.document.path is not None else editor.folder)
+        shown = frozenset(editor.shown)
+        return View(self.camera, self.theme, layout.scale, layout.size, shown, editor.grid, folder)
 
     def draw(self, screen: pygame.Surface) -> None:
         """Draw all of it."""
-        editor, shown = self.editor, self.editor.shown
-        wide = pygame.Surface((self.layout.arena[2], 1))
-        self.strips.update(self._view().canvas(wide), self.team)
+        editor, shown, theme = self.editor, self.editor.shown, self.theme
+        box = pygame.Rect(self.layout.arena)
+        self.strips.update(self._view().canvas(pygame.Surface((box.width, 1))), self.team)
         if self.camera.view != self._view_box():
             self._look(self.camera.within(self._view_box()))
         view = self._view()
-        pending = editor.pending
-        base, now = editor.sketch, pending.sketch if pending is not None else editor.sketch
+        base, (now, chosen) = editor.sketch, editor.preview
         moved = getattr(editor.tools["picture"], "moved", None)
         weighed = getattr(editor.tool, "change", None)
         drag = editor.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
-        lifted = self._lifted(base, now) if carried is None else _kept_keys(carried)
+        lifted = _changed(base, now)
+        if carried is not None:
+            lifted = frozenset() if carried.copies else carried.moving.items
         under = now if now.boundary is not base.boundary else base
         if moved is not None:
             under = replace(under, background=moved)
         if isinstance(weighed, Change):
             under = replace(under, density=weighed.sketch.density)
         page = self.sheet.page(view, under, lifted)
-        left, top, width, height = self.layout.arena
-        screen.fill(self.theme.background, pygame.Rect(left, top, width, height))
+        screen.fill(theme.background, box)
         clip = view.clip
         screen.blit(page, clip, clip)
         screen.set_clip(clip)
         # words keep to the canvas
-        canvas = view.canvas(screen.subsurface(pygame.Rect(left, top, width, height)))
+        canvas = view.canvas(screen.subsurface(box))
         canvas.surface.set_clip(clip)
         if carried is not None:
             self._carry(screen, view, carried)
-        elif lifted:
-            there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
-            self.sheet.draw_items(canvas, there, mix(self.theme.obstacle, accent(self.theme), 0.22))
         elif now is not base:
-            new = [item for item in now.obstacles if item.key not in base.places]
-            self.sheet.draw_items(canvas, new, mix(self.theme.obstacle, accent(self.theme), 0.22))
-        if "impassable" in shown and editor.measurement is not None:
-            self._hatching.draw(screen, view, editor.measurement)
-            if editor.measurement.gap is not None:
-                draw_gap(canvas, editor.measurement.gap, editor.measurement.radius)
+            there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
+            self.sheet.draw_items(canvas, there, self._lifted_fill)
+        measurement = editor.measurement if "impassable" in shown else None
+        if measurement is not None:
+            self._hatch(screen, view, measurement)
+            if measurement.gap is not None:
+                overlay.draw_gap(canvas, measurement.gap, measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
-        self._draw_starts(canvas, now)
-        if self.team is not None and "robots" in shown:
+        for k, (name, spec) in enumerate(now.starts):
+            overlay.draw_start(canvas, spec, name, chosen=name in editor.selection.starts, first=k == 0)
+        if self.team is not None and self.team.places and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
-            chosen = pending.selection if pending is not None else editor.selection
             self._draw_selection(screen, view, canvas, now, chosen)
-        if "impassable" in shown and editor.measurement is not None and editor.measurement.gap is not None:
+        if measurement is not None and measurement.gap is not None:
             busy = editor.tool is not editor.selector or drag is not None
-            tag_gap(canvas, editor.measurement.gap, editor.measurement.radius, self.at if busy else None)
+            overlay.tag_gap(canvas, measurement.gap, measurement.radius, self.at if busy else None)
         if "problems" in shown:
-            draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
+            overlay.draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
         self._draw_tool(canvas)
         screen.set_clip(None)
         self.strips.draw(screen, canvas, self.layout.arena)
 
-    def _lifted(self, base: Sketch, now: Sketch) -> frozenset[int]:
-        """Return the obstacles that are being changed."""
-        if now is base:
-            return frozenset()
-        places = now.places
-        return frozenset(
-            item.key
-            for item in base.obstacles
-            if (place := places.get(item.key)) is None or now.obstacles[place] is not item
-        )
+    @property
+    def _lifted_fill(self) -> Colour:
+        return mix(self.theme.obstacle, accent(self.theme), 0.22)
+
+    def _hatch(self, screen: pygame.Surface, view: View, measurement: Measurement) -> None:
+        look = view.camera, view.theme.name, view.scale, view.size
+        patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
+        if patch is not None:
+            screen.blit(*patch, special_flags=_BLEND)
 
     def _carry(self, screen: pygame.Surface, view: View, drag: Moving) -> None:
         """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
-        if self._carried is None or self._carried[0] is not drag or self._carried[1] != view.camera:
+        sketch, colour = self.editor.sketch, accent(self.theme)
+
+        def drawn() -> pygame.Surface:
             page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
-            own = view.canvas(page)
-            sketch = self.editor.sketch
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
-            fill = mix(self.theme.obstacle, accent(self.theme), 0.22)
-            self.sheet.draw_items(own, there, fill, accent(self.theme))
+            self.sheet.draw_items(view.canvas(page), there, self._lifted_fill, colour)
             for owner in drag.moving.owners - drag.moving.items:
-                self._draw_owner(own, sketch, owner, accent(self.theme), 2.0)
-            self._carried = drag, view.camera, page
-        dx, dy = drag.offset
-        zoom = view.camera.zoom
-        screen.blit(
-            self._carried[2], (round(dx * zoom), round(-dy * zoom)), special_flags=pygame.BLEND_PREMULTIPLIED
-        )
+                self._draw_owner(view.canvas(page), sketch, owner, colour, 2.0)
+            return page
+
+        dx, dy = (view.camera.zoom * by for by in drag.offset)
+        screen.blit(self._carried.of(drag, view.camera, drawn), (round(dx), round(-dy)), special_flags=_BLEND)
 
     def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
@@ -295,18 +258,15 @@ class EditorCanvas:
             path = item.shape.path
             assert path is not None
             chosen = key in self.editor.selection.items
-            draw_path(canvas, path, accent(theme) if chosen else mix(theme.background, theme.ink, 0.6))
+            colour = accent(theme) if chosen else mix(theme.background, theme.ink, 0.6)
+            overlay.draw_path(canvas, path, colour)
             if since is not None and goes(path):
                 shift = path.shift(self.editor.now - since)
-                draw_ghost(canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by))
-
-    def _draw_starts(self, canvas: Canvas, sketch: Sketch) -> None:
-        for k, (name, spec) in enumerate(sketch.starts):
-            draw_start(canvas, spec, name, chosen=name in self.editor.selection.starts, first=k == 0)
+                overlay.draw_ghost(
+                    canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by)
+                )
 
     def _draw_team(self, canvas: Canvas, team: Team) -> None:
-        if not team.places:
-            return
         theme, scale = canvas.theme, canvas.scale
         places = canvas.camera.to_pixels(np.array(team.places))
         true = np.full(len(places), team.radius * canvas.camera.zoom)
@@ -315,68 +275,70 @@ class EditorCanvas:
         )
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (at, radius) in enumerate(zip(places.tolist(), radii.tolist(), strict=True)):
-            fill = theme.robots[k % len(theme.robots)]
+            fill, number = theme.robots[k % len(theme.robots)], str(k + 1)
             size = round(2 * min(radius, 400.0)) / 2
-            text = str(k + 1) if sprites.number_size(size, min(len(str(k + 1)), 4)) > 7.5 * scale else ""
-            canvas.stamp(
-                partial(sprites.disc, size, fill, theme.robot_ring, min(1.4 * scale, 0.3 * size), edge, text),
-                at,
-            )
+            text = number if sprites.number_size(size, min(len(number), 4)) > 7.5 * scale else ""
+            rim = min(1.4 * scale, 0.3 * size)
+            canvas.stamp(partial(sprites.disc, size, fill, theme.robot_ring, rim, edge, text), at)
 
     def _draw_selection(
         self, screen: pygame.Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
     ) -> None:
-        editor, theme = self.editor, self.theme
-        selector = editor.selector
+        editor, selector, colour = self.editor, self.editor.selector, accent(self.theme)
+        floor = self.theme.background
         selection = selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
         hovered = selector.hovered if editor.tool is selector and not selector.busy and self.at else None
         if hovered is not None and hovered not in owners:
-            self._draw_owner(canvas, sketch, hovered, mix(theme.background, accent(theme), 0.7), 1.5)
-        if len(owners) > MANY:
-            look, known = (selection, view.camera, theme.name, view.scale), self._outlined
-            if known is None or known[0] is not sketch or known[1] != look:
-                known = sketch, look, pygame.Surface(view.size, pygame.SRCALPHA, 32)
-                own = view.canvas(known[2])
-                for owner in owners:
-                    self._draw_owner(own, sketch, owner, accent(theme), 2.0)
-                self._outlined = known
-            screen.blit(known[2], (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        else:
+            self._draw_owner(canvas, sketch, hovered, mix(floor, colour, 0.7), 1.5)
+
+        def outline(canvas: Canvas) -> None:
             for owner in owners:
-                self._draw_owner(canvas, sketch, owner, accent(theme), 2.0)
+                self._draw_owner(canvas, sketch, owner, colour, 2.0)
+
+        def outlined() -> pygame.Surface:
+            page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
+            outline(view.canvas(page))
+            return page
+
+        if len(owners) > MANY:
+            look = (selection, view.camera, view.theme.name, view.scale)
+            screen.blit(self._outlined.of(sketch, look, outlined), (0, 0), special_flags=_BLEND)
+        else:
+            outline(canvas)
         if "handles" not in editor.shown or editor.tool is not selector or not selection:
             return
         box = frame_of(sketch, selection, editor.pixel)
         if box is not None:
-            draw_box(canvas, box, mix(theme.background, accent(theme), 0.6))
+            overlay.draw_box(canvas, box, mix(floor, colour, 0.6))
         found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
-        draw_grips(canvas, found, frozenset(selection.vertices), selector.near, KNOB * canvas.scale)
+        chosen = frozenset(selection.vertices)
+        overlay.draw_grips(canvas, found, chosen, selector.near, KNOB * canvas.scale)
 
-    def _draw_owner(
-        self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: tuple[int, int, int], width: float
-    ) -> None:
+    def _draw_owner(self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: Colour, width: float) -> None:
         if isinstance(owner, str):
             if owner in dict(sketch.starts):
-                draw_start(canvas, sketch.start(owner), "", chosen=True, first=False, scale_of_dots=1.3)
+                overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
         elif owner == BOUNDARY:
             if sketch.boundary is not None:
-                draw_outline(canvas, [np.asarray(sketch.boundary, dtype=float)], colour, width + 0.5)
+                ring = np.asarray(sketch.boundary, dtype=float)
+                overlay.draw_outline(canvas, [ring], colour, width + 0.5)
         elif owner in sketch.places:
-            draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
+            overlay.draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
 
     def _draw_tool(self, canvas: Canvas) -> None:
         editor = self.editor
-        at = self.at
-        draw_guides(canvas, editor.tool.guides)
+        overlay.draw_guides(canvas, editor.tool.guides)
         preview = editor.tool.preview(editor)
         if preview is not None:
-            draw_preview(canvas, preview, at)
+            overlay.draw_preview(canvas, preview, self.at)
         if editor.typed:
-            left, top, width, height = self.camera.view
-            draw_typed(canvas, editor.typed, at or (left + width / 2, top + height / 2))
+            overlay.draw_typed(canvas, editor.typed, self.at or pygame.Rect(self.camera.view).center)
 
 
-def _kept_keys(drag: Moving) -> frozenset[int]:
-    """Return the obstacles that are not where they were while they are moved."""
-    return frozenset() if drag.copies else drag.moving.items
+def _changed(base: Sketch, now: Sketch) -> frozenset[int]:
+    """Return the obstacles of a sketch that are others, or gone, in another."""
+    if now is base:
+        return frozenset()
+    there: dict[int, Item] = {item.key: item for item in now.obstacles}
+    return frozenset(item.key for item in base.obstacles if there.get(item.key) is not item)

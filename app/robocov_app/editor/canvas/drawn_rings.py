@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
+from robocov.arrays import Array
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.toolkit.latest import Latest
 
-    from shapely.geometry.base import BaseGeometry
-
-    from robocov.arrays import Array
-    from robocov_app.editor.model.sketch import Item, Sketch
-
-_FORGOTTEN = 4
-"""How many times more outlines than obstacles are kept, those of what was undone among them."""
+_FORGOTTEN = 4  # how many times more outlines than obstacles are kept, those of what was undone among them
 
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """What an obstacle looks like.
+    """What an obstacle looks like."""
 
-    `rings`, (k, 2) m: of each of its parts the outer ring, then its holes. `outer`: which of them are outer
-    rings. `lines`, (k, 2) m: of what covers nothing. `bounds`: (4,) m.
-    """
-
-    rings: list[Array]
-    outer: list[bool]
-    lines: list[Array]
-    bounds: Array
+    rings: list[Array]  # (k, 2) m; of each of its parts the outer ring, then its holes
+    outer: list[bool]  # which of them are outer rings
+    lines: list[Array]  # (k, 2) m; of what covers nothing
+    bounds: Array  # (4,) m
     geometry: BaseGeometry
 
     @property
@@ -75,15 +67,10 @@ def outline_of(geometry: BaseGeometry) -> Outline:
     lines: list[Array] = []
     for part in shapely.get_parts(geometry):
         if isinstance(part, shapely.Polygon):
-            rings.append(np.asarray(part.exterior.coords)[:-1])
-            outer.append(True)
-            for hole in part.interiors:
-                rings.append(np.asarray(hole.coords)[:-1])
-                outer.append(False)
-        else:
-            points = shapely.get_coordinates(part)
-            if len(points):
-                lines.append(points)
+            rings += [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
+            outer += [True] + [False] * len(part.interiors)
+        elif not part.is_empty:
+            lines.append(shapely.get_coordinates(part))
     return Outline(rings, outer, lines, np.array(shapely.bounds(geometry)), geometry)
 
 
@@ -92,7 +79,7 @@ class Outlines:
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[Item, Outline]] = {}
-        self._bounds: tuple[Sketch | None, Array] = (None, np.empty((0, 4)))
+        self._bounds: Latest[Array] = Latest()
 
     def of(self, item: Item) -> Outline:
         """Return the outline of an obstacle."""
@@ -103,19 +90,15 @@ class Outlines:
 
     def bounds(self, sketch: Sketch) -> Array:
         """Return the bounds of all obstacles of a sketch, (n, 4) m, in their order."""
-        if self._bounds[0] is not sketch:
-            if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
-                self._known = {}
-            rows = [self.of(item).bounds for item in sketch.obstacles]
-            self._bounds = sketch, np.array(rows) if rows else np.empty((0, 4))
-        return self._bounds[1]
+        return self._bounds.of(sketch, None, lambda: self._all_bounds(sketch))
+
+    def _all_bounds(self, sketch: Sketch) -> Array:
+        if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
+            self._known = {}
+        return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
 
     def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
         """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
         low_x, low_y, high_x, high_y = self.bounds(sketch).T
         there = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
-        return [
-            item
-            for item, is_there in zip(sketch.obstacles, there.tolist(), strict=True)
-            if is_there and not item.hidden
-        ]
+        return [sketch.obstacles[k] for k in np.flatnonzero(there) if not sketch.obstacles[k].hidden]

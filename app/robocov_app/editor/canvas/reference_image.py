@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 
+from robocov_app.editor.model.background import Background
+from robocov_app.render.camera import Camera
+
 if TYPE_CHECKING:
     from PIL import Image
 
-    from robocov_app.editor.model.background import Background
-    from robocov_app.render.camera import Camera
-
-LARGEST = 4096
-"""Pixels of a side that are kept of a larger picture."""
-
-_LARGEST_SHOWN = 8192
-"""Pixels of a side of what is made of it at most."""
+LARGEST = 4096  # pixels of a side that are kept of a larger picture
+_LARGEST_SHOWN = 8192  # of a side of what is made of it at most
 
 
 class ReferenceImage:
@@ -40,54 +37,30 @@ class ReferenceImage:
             return
         factor = background.scale * camera.zoom * self._shrunk
         if background.turn % 360.0:
-            self._draw_turned(page, picture, background, camera, factor)
-        else:
-            self._draw_straight(page, picture, background, camera, factor, clip)
-
-    def _draw_straight(
-        self,
-        page: pygame.Surface,
-        picture: pygame.Surface,
-        background: Background,
-        camera: Camera,
-        factor: float,
-        clip: pygame.Rect,
-    ) -> None:
-        """Draw the part that can be seen: magnified, the whole may be huge."""
-        left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
-        width, height = picture.get_size()
-        first_x, first_y = (
-            max(int((c - o) / factor) - 1, 0) for c, o in ((clip.left, left), (clip.top, top))
-        )
-        last_x = min(int((clip.right - left) / factor) + 2, width)
-        last_y = min(int((clip.bottom - top) / factor) + 2, height)
-        if last_x <= first_x or last_y <= first_y:
-            return
-        part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
-        x, y = left + first_x * factor, top + first_y * factor
-        to_x, to_y = left + last_x * factor, top + last_y * factor
-        size = max(round(to_x) - round(x), 1), max(round(to_y) - round(y), 1)
-        if max(size) > _LARGEST_SHOWN:
-            return
-        shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
+            if factor * max(picture.get_size()) > _LARGEST_SHOWN:
+                return
+            shown = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
+            corners = camera.to_pixels(np.array(background.corners))
+            x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+            at = shown.get_rect(center=(round(x), round(y)))
+        else:  # the part that can be seen: magnified, the whole may be huge
+            left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
+            width, height = picture.get_size()
+            first_x = max(int((clip.left - left) / factor) - 1, 0)
+            first_y = max(int((clip.top - top) / factor) - 1, 0)
+            last_x = min(int((clip.right - left) / factor) + 2, width)
+            last_y = min(int((clip.bottom - top) / factor) + 2, height)
+            if last_x <= first_x or last_y <= first_y:
+                return
+            part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
+            at = pygame.Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
+            to_x, to_y = round(left + last_x * factor), round(top + last_y * factor)
+            size = max(to_x - at.x, 1), max(to_y - at.y, 1)
+            if max(size) > _LARGEST_SHOWN:
+                return
+            shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
         shown.set_alpha(round(255 * background.opacity))
-        page.blit(shown, (round(x), round(y)))
-
-    def _draw_turned(
-        self,
-        page: pygame.Surface,
-        picture: pygame.Surface,
-        background: Background,
-        camera: Camera,
-        factor: float,
-    ) -> None:
-        if factor * max(picture.get_size()) > _LARGEST_SHOWN:
-            return
-        shown = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
-        shown.set_alpha(round(255 * background.opacity))
-        corners = camera.to_pixels(np.array(background.corners))
-        x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
-        page.blit(shown, shown.get_rect(center=(round(x), round(y))))
+        page.blit(shown, at)
 
     def _load(self, path: Path) -> None:
         if path == self._of:

@@ -3,65 +3,45 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pygame
 import shapely
 
-from robocov_app.editor.canvas.drawn_rings import Outlines
+from robocov.arrays import Array
+from robocov_app.editor.canvas.drawn_rings import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
-from robocov_app.render.camera import round_length
+from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import draw_shading
-from robocov_app.render.theme import LIGHT, mix, robot_hues
+from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
+from robocov_app.toolkit.latest import Latest
 
-if TYPE_CHECKING:
-    from pathlib import Path
+# pixels at scale 1
+FINE, COARSE = 11.0, 55.0  # between the fine and the strong lines of the grid, at least
+_EDGE = 6  # around what changed that are drawn anew too
+_ROOM = 8.0  # that a name leaves free beside it
 
-    from robocov.arrays import Array
-    from robocov_app.editor.canvas.drawn_rings import Outline
-    from robocov_app.editor.model.sketch import Item, Sketch
-    from robocov_app.render.camera import Camera
-    from robocov_app.render.theme import Colour, Theme
-
-FINE, COARSE = 11.0, 55.0
-"""Pixels at scale 1 between the fine and the strong lines of the grid, at least."""
-
-BIAS = 1e-4
-"""Pixels by which all is shifted: round numbers would else lie between two pixels, and fall anyhow."""
-
-PATCHES = 0.5
-"""Part of the page from which on it is drawn anew as a whole."""
-
-_EDGE = 6
-"""Pixels at scale 1 around what changed that are drawn anew too."""
-
-_ROOM = 8.0
-"""Pixels at scale 1 that a name leaves free beside it."""
-
-LEAST_LETTERS = 6
-"""Letters of a shortened name, at least."""
-
-SEEN_THROUGH = 0.62
-"""Opacity of obstacles over a picture."""
+BIAS = 1e-4  # pixels by which all is shifted: round numbers would else lie between two, and fall anyhow
+PATCHES = 0.5  # part of the page from which on it is drawn anew as a whole
+LEAST_LETTERS = 6  # of a shortened name
+SEEN_THROUGH = 0.62  # opacity of obstacles over a picture
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a sheet is looked at.
-
-    `size`: (width, height) px. `grid` in m. `folder`: what a picture's path counts from.
-    """
+    """How a sheet is looked at."""
 
     camera: Camera
     theme: Theme
     scale: float
-    size: tuple[int, int]
+    size: tuple[int, int]  # width and height, px
     shown: frozenset[str]
-    grid: float
-    folder: Path
+    grid: float  # m
+    folder: Path  # what a picture's path counts from
 
     @property
     def clip(self) -> pygame.Rect:
@@ -80,20 +60,17 @@ def outside_colour(theme: Theme) -> Colour:
 
 
 class Sheet:
-    """Draws the page, and keeps it.
-
-    `full`, `patched`, `scrolled`: how often the page was drawn as a whole, in part, and moved.
-    """
+    """Draws the page, and keeps it."""
 
     def __init__(self) -> None:
         self.outlines = Outlines()
         self.underlaid = ReferenceImage()
-        self.full = self.patched = self.scrolled = 0
+        self.full = self.patched = self.scrolled = 0  # how often it was drawn whole, in part, and moved
         self._page: pygame.Surface | None = None
         self._look: tuple[object, ...] = ()
         self._camera: Camera | None = None
         self._drawn: dict[int, Item] = {}
-        self._beyond: tuple[object, shapely.Geometry | None] = (None, None)
+        self._beyond: Latest[shapely.Geometry] = Latest()
 
     def page(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> pygame.Surface:
         """Return the page with a sketch, without the obstacles that are being dragged."""
@@ -170,12 +147,8 @@ class Sheet:
         ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
         (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
         edge = round(_EDGE * view.scale)
-        return pygame.Rect(
-            int(left) - edge,
-            int(top) - edge,
-            int(right - left) + 2 * edge + 2,
-            int(bottom - top) + 2 * edge + 2,
-        )
+        box = pygame.Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
+        return box.inflate(2 * edge, 2 * edge)
 
     # painting
 
@@ -222,9 +195,8 @@ class Sheet:
         zoom, theme = view.camera.zoom, view.theme
         close, wide = grid_steps(view.grid, zoom, view.scale)
         floor = theme.background
-        soft, strong = (
-            mix(floor, theme.grid, part) for part in ((0.32, 0.75) if theme is LIGHT else (0.2, 0.5))
-        )
+        parts = (0.32, 0.75) if theme is LIGHT else (0.2, 0.5)
+        soft, strong = (mix(floor, theme.grid, part) for part in parts)
         low_x, low_y, high_x, high_y = view.camera.visible()
         width = max(1, round(view.scale))
         for step, colour in ((close, soft), (wide, strong))[0 if fine else 1 :]:
@@ -239,11 +211,7 @@ class Sheet:
 
     def _draw_beyond(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw what robots take for free although it lies outside the boundary: it is in their hull."""
-        if self._beyond[0] is not sketch.boundary:
-            self._beyond = sketch.boundary, beyond(sketch)
-        geometry = self._beyond[1]
-        if geometry is None or geometry.is_empty:
-            return
+        geometry = self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))
         fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
         for part in shapely.get_parts(geometry):
             if isinstance(part, shapely.Polygon):
@@ -293,14 +261,10 @@ class Sheet:
                 canvas.text(words, at, size=canvas.theme.small_text, colour=colour, anchor="middle")
 
 
-def beyond(sketch: Sketch) -> shapely.Geometry | None:
-    """Return what of the boundary's convex hull lies outside the boundary; None without a boundary."""
-    if sketch.boundary is None or len(sketch.boundary) < 3:
-        return None
-    ring = shapely.Polygon(sketch.boundary)
-    if not ring.is_valid:
-        return None
-    return shapely.difference(ring.convex_hull, ring)
+def beyond(sketch: Sketch) -> shapely.Geometry:
+    """Return what of the boundary's convex hull lies outside the boundary."""
+    ring = shapely.Polygon(sketch.boundary if sketch.boundary and len(sketch.boundary) > 2 else None)
+    return shapely.difference(ring.convex_hull, ring) if ring.is_valid else shapely.Polygon()
 
 
 def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pygame
 
+from robocov.errors import counted
 from robocov_app.editor.canvas.overlay import legend_entries
 from robocov_app.editor.canvas.sheet import beyond
+from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.team import Team
 from robocov_app.render.annotations import (
     EDGE,
     LEGEND_ROW,
@@ -18,15 +20,12 @@ from robocov_app.render.annotations import (
     legend_rows,
     legend_strip,
 )
+from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import density_entry
-
-if TYPE_CHECKING:
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.editor.ui.team import Team
-    from robocov_app.render.canvas import Canvas, LegendEntry
-    from robocov_app.toolkit.layout import Box
+from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.layout import Box
 
 
 class Strips:
@@ -37,19 +36,15 @@ class Strips:
         self._entries: list[LegendEntry] = []
         self._rows = 1
         self._rows_for: object = None
-        self._unfree: tuple[object, bool] = (None, False)
-        self._kept: tuple[object, pygame.Surface | None] = (None, None)
+        self._unfree: Latest[bool] = Latest()
+        self._legend: Latest[pygame.Surface] = Latest()
 
     def room(self, box: Box, scale: float) -> tuple[float, float, float, float]:
         """Return what of a box is left: left, top, width and height, px."""
         left, top, width, height = box
         above = round((10 + LEGEND_ROW * self._rows) * scale) if "legend" in self._editor.shown else 0
-        return (
-            float(left),
-            float(top + above),
-            float(width),
-            float(max(height - above - round(STRIP * scale), 1)),
-        )
+        below = max(height - above - round(STRIP * scale), 1)
+        return float(left), float(top + above), float(width), float(below)
 
     def update(self, canvas: Canvas, team: Team | None) -> None:
         """Look what there is to tell, on a canvas as wide as the sheet.
@@ -67,12 +62,10 @@ class Strips:
         sketch, shown = self._editor.sketch, self._editor.shown
         if "legend" not in shown:
             return []
-        if self._unfree[0] is not sketch.boundary:
-            geometry = beyond(sketch)
-            self._unfree = sketch.boundary, geometry is not None and geometry.area > 1e-6
+        unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
         standing = "robots" in shown and team is not None and bool(team.places)
         measurement = self._editor.measurement if "impassable" in shown else None
-        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=self._unfree[1])
+        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=unfree)
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary:
             x, y = zip(*sketch.boundary, strict=True)
@@ -85,11 +78,9 @@ class Strips:
         left, top, width, height = box
         if self._entries:
             key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
-            if self._kept[0] != key:
-                wide = replace(canvas, surface=pygame.Surface((width, 1)))
-                self._kept = key, legend_strip(self._entries, wide)
-            assert self._kept[1] is not None
-            screen.blit(self._kept[1], (left, top))
+            wide = replace(canvas, surface=pygame.Surface((width, 1)))
+            legend = self._legend.of(None, key, lambda: legend_strip(self._entries, wide))
+            screen.blit(legend, (left, top))
         high = round(STRIP * canvas.scale)
         foot = screen.subsurface(pygame.Rect(left, top + height - high, width, high))
         own = replace(canvas, surface=foot)
@@ -103,14 +94,10 @@ class Strips:
 def map_words(editor: Editor) -> str:
     """Return what the strip below the sheet says: whose map it is, and what it is like."""
     sketch, measurement = editor.sketch, editor.measurement
-    count = len(sketch.obstacles)
-    said = [
-        f"{'● ' if editor.document.unsaved else ''}{editor.document.title}",
-        f"{count} obstacle{'' if count == 1 else 's'}",
-    ]
+    unsaved = "● " if editor.document.unsaved else ""
+    said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
     if measurement is not None:
         said.append(f"{measurement.free_area:.2f} m² free")
-        grave = sum(problem.grave for problem in measurement.problems)
-        if grave:
-            said.append(f"draft: {grave} problem{'' if grave == 1 else 's'}")
+        if grave := sum(problem.grave for problem in measurement.problems):
+            said.append(f"draft: {counted(grave, 'problem')}")
     return "   ·   ".join(said)
