@@ -19,7 +19,7 @@ from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.cells import free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
@@ -134,17 +134,8 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     with written(path) as part:
         part.write_bytes(head.encode("ascii") + letters.tobytes())
     x, y = grid.origin
-    return ExportReport(
-        "movingai",
-        (path,),
-        environment.free_area,
-        float(np.count_nonzero(free)) * grid.cell**2,
-        dropped=(
-            f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]",
-            *not_held(environment),
-        ),
-        warnings=lost_passages(environment, grid, free),
-    )
+    place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
+    return grid_report("movingai", (path,), environment, grid, free, dropped=(place,))
 
 
 EXPORTER = Exporter(

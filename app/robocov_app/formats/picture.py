@@ -29,7 +29,7 @@ from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.cells import free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
@@ -53,21 +53,17 @@ _PILLOW = {
 }
 """First bytes (magic numbers) of formats that Pillow reads, by its names for them."""
 
-_ORIENTATION, _BITS, _PHOTOMETRIC = 274, 258, 262
-"""Tags of EXIF and TIFF."""
-
 _MOST_OF_JPEG = 512
 """Pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey."""
 
 
 @dataclass(frozen=True, eq=False)
 class Brightness:
-    """A picture without its colours.
+    """A picture without its colours, the top row first.
 
-    `level`, (rows, columns): whole numbers from 0, black, to `full`, white, the top row first: of colours the
-    sum of red, green and blue. `alpha`, (rows, columns) uint8: from 0, transparent, to 255, opaque; None
-    where the picture has no such thing. `texts`: what a PNG says of itself. `lossy`: whether pixels may have
-    got another brightness when it was saved, as in a JPEG.
+    `level`, (rows, columns): from 0, black, to `full`, white: of colours the sum of red, green and blue.
+    `alpha`, (rows, columns): from 0, transparent, to 255, opaque; None where there is no such thing. `texts`:
+    what a PNG says of itself. `lossy`: whether pixels may have changed when saved, as in a JPEG.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
@@ -83,10 +79,9 @@ def is_picture(head: bytes) -> bool:
 
 
 def read_picture(path: Path, where: str) -> Brightness:
-    """Return the picture at `path`.
+    """Return the picture at `path`, which messages call `where`.
 
-    `where`: what messages call it. Raises MapError when there is no such file, it is no picture that can be
-    read, broken, cut off, or has more than `files.MAX_CELLS` pixels.
+    Raises MapError when it is none that can be read, broken, cut off, or has over `files.MAX_CELLS` pixels.
     """
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
@@ -156,8 +151,9 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
                 numbers = np.fromstring(piece, dtype=np.int64, sep=" ")[: count - done]
             except (DeprecationWarning, ValueError, OverflowError):
                 raise MapError(f"{where}: pixels that are not whole numbers, of {count}") from None
-        if numbers.min() < 0 or numbers.max() > 65535:
-            worst = int(numbers.min()) if numbers.min() < 0 else int(numbers.max())
+        low, high = int(numbers.min()), int(numbers.max())
+        if low < 0 or high > 65535:
+            worst = low if low < 0 else high
             raise MapError(f"{where}: a pixel of {worst}, but a number from 0 to 65535 was wanted")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
@@ -191,19 +187,22 @@ def _decoded(data: bytes, name: str, where: str) -> Brightness:
 def _converted(image: Image) -> Brightness:
     """Return a picture without its colours, turned as it says; only a strip of it is copied at a time."""
     import PIL.ImageOps
+    from PIL.ExifTags import Base
 
     lossy, tags = image.format == "JPEG", getattr(image, "tag_v2", {})
     image.load()
-    if image.getexif().get(_ORIENTATION, 1) != 1:
+    if image.getexif().get(Base.Orientation, 1) != 1:
         PIL.ImageOps.exif_transpose(image, in_place=True)
     texts = {str(key): value for key, value in image.info.items() if isinstance(value, str)}
     transparent = "transparency" in image.info
     if image.mode == "F" or (image.mode == "I" and tags):
         raise ValueError("samples of 32 bits or with a sign, but up to 16 bits without were wanted")
     if image.mode.startswith("I") and not transparent:
-        full = (1 << tags[_BITS][0]) - 1 if tags else 65535
+        full = (1 << tags[Base.BitsPerSample][0]) - 1 if tags else 65535
         deep = np.asarray(image).astype(np.uint16)
-        return Brightness(full - deep if tags.get(_PHOTOMETRIC) == 0 else deep, full, None, texts)
+        return Brightness(
+            full - deep if tags.get(Base.PhotometricInterpretation) == 0 else deep, full, None, texts
+        )
     has_alpha = transparent or image.mode in ("LA", "PA", "RGBA", "La", "RGBa")
     grey = image.mode in ("1", "L", "LA") and not transparent
     mode = ("LA" if has_alpha else "L") if grey else ("RGBA" if has_alpha else "RGB")
@@ -232,10 +231,6 @@ _NOISE = 1.5
 
 _OPAQUE = 128
 """Less opaque pixels count as transparent, of 255."""
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return is_picture(head)
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -284,7 +279,7 @@ IMPORTER = Importer(
     name="picture",
     title="picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
     suffixes=(".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
-    sniff=_sniff,
+    sniff=lambda path, head: is_picture(head),
     read=_read,
     options=frozenset({"cell", "unknown", "threshold", "invert"}),
 )
@@ -300,14 +295,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     texts.add_text(CHUNK, json.dumps({"cell_m": grid.cell, "origin_m": list(grid.origin)}))
     with written(path) as part:
         Image.fromarray(free[::-1]).save(part, format="PNG", pnginfo=texts)
-    return ExportReport(
-        "picture",
-        (path,),
-        environment.free_area,
-        float(np.count_nonzero(free)) * grid.cell**2,
-        dropped=not_held(environment),
-        warnings=lost_passages(environment, grid, free),
-    )
+    return grid_report("picture", (path,), environment, grid, free)
 
 
 EXPORTER = Exporter(

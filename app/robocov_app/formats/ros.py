@@ -35,7 +35,7 @@ from robocov.files.atomic import written
 from robocov_app.formats import files
 from robocov_app.formats.files import named_file
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.cells import Grid, free_cells, grid_over, lost_passages, not_held
+from robocov_app.formats.geometry.cells import Grid, free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.picture import Brightness, read_picture
@@ -262,15 +262,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
             f"free_thresh: {_FREE}\n",
             encoding="utf-8",
         )
-    return ExportReport(
-        "ros",
-        (path, image),
-        environment.free_area,
-        float(np.count_nonzero(free)) * grid.cell**2,
-        dropped=not_held(environment),
-        notes=notes,
-        warnings=lost_passages(environment, grid, free),
-    )
+    return grid_report("ros", (path, image), environment, grid, free, notes=notes)
 
 
 def _graded(

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
@@ -18,6 +19,7 @@ from robocov.errors import ParameterError, counted
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
+from robocov_app.formats.options import ExportReport
 
 CELL = 0.05
 """Side of a cell in metres where none is given: what maps of robots mostly have."""
@@ -205,3 +207,25 @@ def not_held(environment: Environment) -> tuple[str, ...]:
     if any(obstacle.name for obstacle in environment.obstacles):
         lost.append("names of obstacles")
     return tuple(lost)
+
+
+def grid_report(
+    name: str,
+    files: tuple[Path, ...],
+    environment: Environment,
+    grid: Grid,
+    free: BoolArray,
+    *,
+    dropped: tuple[str, ...] = (),
+    notes: tuple[str, ...] = (),
+) -> ExportReport:
+    """Return the report of a map that was written as the free cells of a grid, in the format `name`."""
+    return ExportReport(
+        name,
+        files,
+        environment.free_area,
+        float(np.count_nonzero(free)) * grid.cell**2,
+        dropped=(*dropped, *not_held(environment)),
+        notes=notes,
+        warnings=lost_passages(environment, grid, free),
+    )

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import shapely
 from shapely import Polygon, STRtree
 
-from robocov.environment import CircleObstacle, Ring, WallObstacle
+from robocov.environment import CircleObstacle, Obstacle, PolygonObstacle, Ring, WallObstacle
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov_app.formats.geometry.passages import rooms
 
 Primitive: TypeAlias = CircleObstacle | WallObstacle
+_Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 
 MOST = 5_000
 """Circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds."""
@@ -37,7 +38,7 @@ def with_primitives(
     where there would be more places for a robot, apart from each other. `solid` in m. `primitives`: as the
     file draws them; they may overlap and stick out of the boundary. `boundary` in m. `tolerance`, m: by so
     much walls were allowed to move. `digits`: decimals of the coordinates. `places`: so many separate places
-    a robot may be at; see `robocov_app.formats.geometry.passages.rooms`. `radius`, m: of the robot.
+    a robot may be at, as of `passages.rooms`. `radius`, m: of the robot.
 
     Examples
     --------
@@ -47,7 +48,7 @@ def with_primitives(
     >>> kept == [wall], rest == [desk]
     (True, True)
     """
-    rounded = {_rounded(primitive, digits): primitive for primitive in primitives}
+    rounded = {with_numbers(each, lambda value: round(value, digits) + 0.0): each for each in primitives}
     usable = [primitive for primitive in rounded if _fits(primitive)]
     if not usable or len(usable) > MOST:
         return [], list(solid)
@@ -65,7 +66,7 @@ def with_primitives(
         own = set(source[found].tolist())
         union = shapely.union_all(piece[found])
         same = (
-            sum(points_of(usable[k]) for k in own) < shapely.get_num_coordinates(part)
+            sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
             and union.buffer(2 * (tolerance + hair)).covers(part)
             and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
         )
@@ -80,28 +81,30 @@ def with_primitives(
     return [], list(solid)
 
 
-def points_of(primitive: Primitive) -> int:
-    """Return how many points a primitive is given by."""
-    return 1 if isinstance(primitive, CircleObstacle) else len(primitive.points)
+def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obstacle:
+    """Return an obstacle with other numbers for all that it has."""
+
+    def ring(points: Ring) -> Ring:
+        return tuple((number(x), number(y)) for x, y in points)
+
+    if isinstance(obstacle, CircleObstacle):
+        return replace(obstacle, center=ring((obstacle.center,))[0], radius=number(obstacle.radius))
+    if isinstance(obstacle, WallObstacle):
+        return replace(obstacle, points=ring(obstacle.points), width=number(obstacle.width))
+    assert isinstance(obstacle, PolygonObstacle)
+    return replace(obstacle, vertices=ring(obstacle.vertices), holes=tuple(map(ring, obstacle.holes)))
 
 
-def _rounded(primitive: Primitive, digits: int) -> Primitive:
-    def decimal(points: Ring) -> Ring:
-        return tuple((round(x, digits) + 0.0, round(y, digits) + 0.0) for x, y in points)
-
-    if isinstance(primitive, CircleObstacle):
-        (center,) = decimal((primitive.center,))
-        return replace(primitive, center=center, radius=round(primitive.radius, digits))
-    return replace(primitive, points=decimal(primitive.points), width=round(primitive.width, digits))
+def _points(primitive: Primitive) -> np.ndarray:
+    """Return the points that a primitive is given by, (k, 2)."""
+    return np.array([primitive.center] if isinstance(primitive, CircleObstacle) else primitive.points)
 
 
 def _fits(primitive: Primitive) -> bool:
     """Return whether a map may have it."""
+    points = _points(primitive)
     if isinstance(primitive, CircleObstacle):
-        points, size, longest = np.array([primitive.center]), primitive.radius, primitive.radius
+        sizes = [primitive.radius]
     else:
-        points, size = np.array(primitive.points), primitive.width
-        longest = float(np.ptp(points, axis=0).max())
-    return bool(
-        min(size, longest) >= SMALLEST and max(size, longest) <= LARGEST and np.abs(points).max() <= FARTHEST
-    )
+        sizes = [primitive.width, np.ptp(points, axis=0).max()]
+    return bool(min(sizes) >= SMALLEST and max(sizes) <= LARGEST and np.abs(points).max() <= FARTHEST)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -13,8 +14,9 @@ from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, Wal
 from robocov.files.atomic import written
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import decimal, free_area
+from robocov_app.formats.geometry.primitives import with_numbers
 from robocov_app.formats.options import Exporter, ExportReport, WriteOptions
-from robocov_app.render.theme import DARK, LIGHT, Colour, Theme
+from robocov_app.render.theme import DARK, LIGHT, Theme
 
 DIGITS = 3
 """Decimals of millimetres by default: as fine as the free space is known at true scale."""
@@ -23,12 +25,12 @@ _MARGIN = 0.03
 """Of the longer side, around the map."""
 
 
+@dataclass(frozen=True)
 class _Pen:
     """Writes shapes in millimetres of the drawing, y down."""
 
-    def __init__(self, scale: float, digits: int) -> None:
-        self.scale = scale
-        self.digits = digits
+    scale: float
+    digits: int
 
     def length(self, metres: float) -> str:
         return decimal(metres / self.scale, self.digits)
@@ -41,7 +43,7 @@ class _Pen:
         places = (f"{self.length(x)} {self.length(-y)}" for x, y in ring)
         return f"M{' L'.join(places)}{end}"
 
-    def shape(self, obstacle: Obstacle, title: str) -> str:
+    def shape(self, obstacle: Obstacle) -> str:
         """Return the element of an obstacle."""
         if isinstance(obstacle, CircleObstacle):
             x, y = obstacle.center
@@ -52,28 +54,20 @@ class _Pen:
         else:
             rings = " ".join(self.ring(ring) for ring in (obstacle.vertices, *obstacle.holes))
             kind = f'path fill-rule="evenodd" d="{rings}"'
+        title = _plain(obstacle.name or "")
         return f"<{kind}><title>{title}</title></{kind.split(' ', 1)[0]}>" if title else f"<{kind}/>"
-
-    def as_read(self, obstacle: Obstacle) -> Obstacle:
-        """Return the obstacle that the element of `obstacle` is read as."""
-        if isinstance(obstacle, CircleObstacle):
-            (centre,) = self.points((obstacle.center,))
-            return CircleObstacle(centre, self.rounded(obstacle.radius))
-        if isinstance(obstacle, WallObstacle):
-            return WallObstacle(self.points(obstacle.points), self.rounded(obstacle.width))
-        return type(obstacle)(self.points(obstacle.vertices), tuple(map(self.points, obstacle.holes)))
-
-    def points(self, ring: Ring) -> Ring:
-        return tuple((self.rounded(x), self.rounded(y)) for x, y in ring)
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     scale = 0.001 if options.scale is None else options.scale
     pen = _Pen(scale, DIGITS if options.digits is None else options.digits)
+    boundary = np.asarray(environment.boundary, dtype=float)
+    margin = _MARGIN * float(np.ptp(boundary, axis=0).max())
+    low, high = boundary.min(axis=0) - margin, boundary.max(axis=0) + margin
     with written(path) as part:
-        part.write_text(_text(environment, pen), encoding="utf-8")
-    obstacles = [pen.as_read(obstacle).polygon for obstacle in environment.obstacles]
-    low, high = _corners(environment)
+        part.write_text(_text(environment, pen, low, high), encoding="utf-8")
+    written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
+    obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
     notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
     if options.scale is not None:
         notes.append(f"to import it again: --scale {scale:g}")
@@ -81,22 +75,14 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         EXPORTER.name,
         (path,),
         environment.free_area,
-        free_area(Polygon(pen.points(environment.boundary)), obstacles),
+        free_area(written_boundary, obstacles),
         dropped=tuple(thing for thing in not_held(environment) if not thing.startswith("names")),
         notes=tuple(notes),
     )
 
 
-def _corners(environment: Environment) -> tuple[Array, Array]:
-    """Return the lower left and the upper right corner of the page, (2,) m each."""
-    boundary = np.asarray(environment.boundary, dtype=float)
-    low, high = boundary.min(axis=0), boundary.max(axis=0)
-    margin = _MARGIN * float((high - low).max())
-    return low - margin, high + margin
-
-
-def _text(environment: Environment, pen: _Pen) -> str:
-    low, high = _corners(environment)
+def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
+    """Return the drawing; `low` and `high`, (2,) m, are corners of the page."""
     x, y = pen.length(low[0]), pen.length(-high[1])
     width, height = pen.length(high[0] - low[0]), pen.length(high[1] - low[1])
     # where the corner is that the box gives with its decimals
@@ -119,7 +105,7 @@ def _text(environment: Environment, pen: _Pen) -> str:
         "</style>",
         f'<path id="boundary" d="{pen.ring(environment.boundary)}"/>',
         '<g id="obstacles">',
-        *(pen.shape(obstacle, _plain(obstacle.name or "")) for obstacle in environment.obstacles),
+        *map(pen.shape, environment.obstacles),
         "</g>",
         "</svg>",
     ]
@@ -128,16 +114,16 @@ def _text(environment: Environment, pen: _Pen) -> str:
 
 def _colours(theme: Theme) -> list[str]:
     """Return rules with the colours of a theme."""
+    ground, page, edge, solid = (
+        "#{:02x}{:02x}{:02x}".format(*colour)
+        for colour in (theme.panel, theme.background, theme.boundary, theme.obstacle)
+    )
     return [
-        f"svg {{ background: {_code(theme.panel)} }}",
-        f"#boundary {{ fill: {_code(theme.background)}; stroke: {_code(theme.boundary)} }}",
-        f"#obstacles {{ fill: {_code(theme.obstacle)} }}",
-        f".wall {{ fill: none; stroke: {_code(theme.obstacle)} }}",
+        f"svg {{ background: {ground} }}",
+        f"#boundary {{ fill: {page}; stroke: {edge} }}",
+        f"#obstacles {{ fill: {solid} }}",
+        f".wall {{ fill: none; stroke: {solid} }}",
     ]
-
-
-def _code(colour: Colour) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
 def _plain(text: str) -> str:
