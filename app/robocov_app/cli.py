@@ -79,7 +79,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _guarded(name: str, rest: list[str]) -> int:
-    """Call the command; every way to end is an exit status."""
     from robocov.errors import ParameterError, RobocovError
 
     try:

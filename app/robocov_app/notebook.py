@@ -175,7 +175,6 @@ def record_html(record: Record) -> str:
 
 
 def _history_to_show(record: Record) -> CostHistory | None:
-    """Return the cost along a run, None where nobody would wait for it or it cannot be had."""
     if shapely.get_num_coordinates(record.environment.free) > COST_VERTICES:
         return None
     span = float(record.time[-1] - record.time[0])
@@ -207,5 +206,4 @@ def _checked(axes: Any) -> Any:
 
 
 def _map_axes(figure: Figure, given: Axes | None) -> Axes:
-    """Return the axes that were given, else those of the page that were drawn last: the map's."""
     return figure.axes[-1] if given is None else given

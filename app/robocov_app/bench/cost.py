@@ -109,7 +109,6 @@ def evaluated(cost: CoverageCost, places: Places) -> float:
 
 
 def _marched(cost: CoverageCost, places: Places) -> float:
-    """Return the mean distance, by fast marching."""
     import skfmm
 
     side = cost.lattice

@@ -67,11 +67,7 @@ class Row:
 
 @dataclass
 class InTurn:
-    """Median times of calls that are made in turn, each round after an untimed call of `before`.
-
-    The moods of a shared machine fall on all alike: the ratio of two medians holds although neither time
-    does.
-    """
+    """Median times of calls in turn, as a shared machine slows all alike; `before` each round, untimed."""
 
     calls: Mapping[str, Call]
     clock: Callable[[], float] = perf_counter

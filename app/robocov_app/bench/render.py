@@ -76,7 +76,6 @@ def _travelled(name: str, n: int) -> Record:
 
 
 def _scene_at(record: Record, k: int) -> Scene:
-    """Return what is drawn of moment `k`."""
     drawn = record.environment, record.team, record.snapshot(k)
     trail, time = record.positions[: k + 1], record.time[: k + 1]
     return Scene.of(*drawn, starts=trail[0], trail=trail, trail_time=time, label=record.label)

@@ -138,7 +138,6 @@ def _show(output: Console, title: str, outcome: Outcome, former: MapReport | Non
 
 
 def _path(name: str) -> Path:
-    """Return the file to watch; where there is none of that name, the one that may come."""
     try:
         return map_file(name)
     except MapError:

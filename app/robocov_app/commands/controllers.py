@@ -63,7 +63,6 @@ def command(options: Arguments) -> None:
 
 
 def _told(gain: Gain | Option) -> dict[str, Any]:
-    """Return what is known of a gain as it is printed in JSON."""
     told: dict[str, Any] = {"name": gain.name, "default": gain.default, "unit": gain.unit}
     if isinstance(gain, Option):
         told["words"] = list(gain.words)

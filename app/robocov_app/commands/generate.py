@@ -145,7 +145,6 @@ def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
 
 
 def _require_map(path: Path) -> None:
-    """Make sure that no file but a map is replaced in a folder."""
     if writable(path).exists():
         try:
             load_map(path)

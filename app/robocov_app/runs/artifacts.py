@@ -59,11 +59,7 @@ def performed(
 
 
 def gains_for(names: Sequence[str], given: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the gains of each controller out of those given for the comparison.
-
-    ``k_rep`` goes to every controller that has a gain of that name, ``rapf.k_rep`` to RAPF alone. Raises
-    ParameterError when a gain belongs to none of the controllers.
-    """
+    """Return the gains of each controller: ``k_rep`` is for all that have it, ``rapf.k_rep`` for one."""
     known = {name: gains_of(controller_kind(name)) for name in names}
     chosen: list[dict[str, Any]] = [{} for _ in names]
     # what is said of one controller alone counts for more than what is said of all
@@ -150,10 +146,7 @@ def save_pictures(
 
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
-    """Return the last moments of runs, to be drawn, with what `cost` knows of the map of the first.
-
-    The others are on the same map, but for robots that failed at other places.
-    """
+    """Return the last moments of runs on one map, but for robots that failed at other places, to be drawn."""
     drawn, moments = runs[0].record.environment, []
     cost = cost_for_pictures(drawn, cost)
     for run in runs:

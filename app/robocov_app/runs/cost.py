@@ -20,20 +20,13 @@ FILM_LATTICE = 128  # the same for films, of which every frame takes its time
 def built_cost(
     environment: Environment, lattice: int, *, quiet: bool = False, geodesics: Geodesics | None = None
 ) -> CoverageCost:
-    """Return the coverage cost of a map; how far it is gets told when that takes more than a second.
-
-    `quiet`: tell nothing. `geodesics`: the shortest paths of this map, where they are known. Raises
-    ParameterError as `CoverageCost`.
-    """
+    """Return the coverage cost of a map; unless `quiet`, tell how far it is when it takes over a second."""
     with late_progress("map of ways", quiet=quiet) as tell:
         return CoverageCost(environment, lattice, progress=tell, geodesics=geodesics)
 
 
 def cost_for_pictures(environment: Environment, cost: CoverageCost, least: int | None = None) -> CoverageCost:
-    """Return `cost`, or where its lattice is too coarse to be drawn one of the same map on a finer one.
-
-    Maps of many vertices are drawn as they were measured: finer pictures would double what a run takes.
-    """
+    """Return `cost`, or where its lattice is too coarse to be drawn and the map is simple a finer one."""
     least = least or PICTURE_LATTICE
     if cost.lattice >= least or vertex_count(environment) > MANY_VERTICES:
         return cost

@@ -68,13 +68,7 @@ def iter_frames(
     rows: IntArray | None = None,
     fields: Fields | None = None,
 ) -> Iterator[Frame]:
-    """Draw the frames of a saved run, one at a time; the arrays are the caller's own.
-
-    `size`: (width, height) in px. `layers`: from the lowest to the topmost, `standard_layers` by default.
-    `scale`: of text and lines, by default what suits the size. `cost`: of which each frame tells the latest
-    known. `rows`: of the record, by default those of `frame_rows`. `fields`: what layers of
-    distances draw.
-    """
+    """Draw the frames of a saved run, by default of `frame_rows`; each tells the latest known `cost`."""
     painter = _painter(record, film, size, layers or standard_layers(film.colours), scale)
     if rows is None:
         rows = frame_rows(record.time, film.fps, film.film_speed)
@@ -214,11 +208,7 @@ def tiled(frames: Sequence[Frame], columns: int, gap: int, line: Colour, blank: 
 def film_fields(
     runs: Sequence[Run], cost: CoverageCost | None, film: FilmOptions, *, quiet: bool
 ) -> Fields | None:
-    """Return the distances that films of runs on one map show on one scale of colours, if they show any.
-
-    The scale suits the end, when the robots have spread; farther places at the start are all of one colour.
-    Where no `cost` of the map is there, it is made.
-    """
+    """Return the distances that films of runs show on one scale of colours, which suits the end; or None."""
     if not film.layers()[0] & {"distances", "geodesic_cells"}:
         return None
     environment = runs[0].record.environment
@@ -244,11 +234,7 @@ def save_moving(
     quiet: bool,
     bare: Sequence[Run] | None = None,
 ) -> None:
-    """Write ``frames/``, and ``run.mp4`` or of several runs ``comparison.mp4``, as the options say.
-
-    Ctrl-C ends both early. `bare`: the same runs on one map, where distances are to one without robots that
-    failed. For `cost` see `film_fields`.
-    """
+    """Write ``frames/`` and the film as the options say; `bare`: the runs on one map, without who failed."""
     if not (film.frames or film.video):
         return
     fields = film_fields(bare or runs, cost, film, quiet=quiet)

@@ -45,7 +45,6 @@ def save_moving_picture(
 
 
 def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
-    """Write frames as PNGs, and hand each on once it is written whole."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -57,12 +56,7 @@ def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
 
 
 def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -> int:
-    """Write frames of one size as an MP4 film, which browsers and slides play; return how many.
-
-    The film gets its name at the end: after an error or Ctrl-C there is no half film, and an older one is
-    still there. H.264 wants even sizes: an odd one gets its last row or column twice. Raises OutputError when
-    the encoder is missing or fails, or the film cannot be written; ParameterError when there are no frames.
-    """
+    """Write frames of one size as an MP4 film, whole or not at all; return how many."""
     path = Path(path)
     source = iter(frames)
     first = next(source, None)
@@ -124,10 +118,7 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
 
 
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
-    """Return the encoder's command: raw RGB frames of an even size come in, an MP4 film goes to `path`.
-
-    A `streamed` film can be played up to where it has come, whatever happens to the encoder.
-    """
+    """Return the encoder's command: raw RGB frames in, an MP4 film out, playable while `streamed`."""
     import imageio_ffmpeg
 
     try:

@@ -43,10 +43,7 @@ class Roster(NamedTuple):
 
 
 def load_saved(path: Path) -> list[Saved]:
-    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it.
-
-    Raises InputError when there is none, or something of it cannot be read; the message names the file.
-    """
+    """Return the runs of a comparison, or a single run, by the folder or the JSON file in it."""
     folder = path.parent if path.name in ("run.json", "comparison.json") and not path.is_dir() else path
     settle(folder)
     if (folder / "comparison.json").is_file():

@@ -101,10 +101,7 @@ class RunSpec:
         every: int = 1,
         watch: Callable[[int], bool] = lambda step: False,
     ) -> Record:
-        """Simulate, and return the record of one step in `every`, and of the last.
-
-        Each step is told to `watch`, which ends the run by saying True.
-        """
+        """Simulate, and return the record of one step in `every` and the last; `watch` may end the run."""
         with provided(self.source.modules if self.source else {}):
             simulation = simulation or self.simulation()
             recorder = self.recorder(simulation.controller, self.controller)

@@ -108,10 +108,7 @@ class Executor(ABC):
         self._feed()
 
     def next(self, timeout: float) -> tuple[Task, Outcome] | None:
-        """Return a task that has come back, in any order; None where none does for so many seconds.
-
-        Raises OutputError when nobody can do tasks any more, or workers end again and again.
-        """
+        """Return a task that has come back, in any order; None where none does for so many seconds."""
         self._feed()
         back = self._returned(timeout)
         if back is None:
@@ -125,7 +122,6 @@ class Executor(ABC):
         return None if outcome is None else (task, outcome)
 
     def _feed(self) -> None:
-        """Hand tasks out, or one alone."""
         if self._lonely:
             return
         if self._alone:
@@ -233,7 +229,6 @@ class _Hand:
         return Lost(f"its process ended ({cause})", said, blamed=status != _OUTSIDE)
 
     def _begun(self) -> subprocess.Popen[bytes]:
-        """Start a process, and wait until it is there."""
         for _ in range(_STARTS):
             self._end()
             self._complaints.truncate(0)
@@ -270,10 +265,7 @@ _LOOK = 2.0  # seconds between two looks at how many workers there are; they may
 
 
 class Cluster(Executor):
-    """The workers of a Dask cluster; they need robocov, and no disk that is shared.
-
-    Raises InputError when Dask is not installed, or nobody answers at the address of the scheduler.
-    """
+    """The workers of a Dask cluster; they need robocov, and no disk that is shared."""
 
     def __init__(self, address: str) -> None:
         super().__init__()

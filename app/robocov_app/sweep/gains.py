@@ -51,11 +51,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How ranges are sampled by `scipy.stats.qmc`, scrambled: all ranges of a controller together.
-
-    Controllers with the same ranges get the same samples. The first samples of a Sobol or a Halton sequence
-    stay the same when there are more of them.
-    """
+    """How all ranges of a controller are sampled together by `scipy.stats.qmc`, scrambled."""
 
     method: Method = "sobol"
     samples: int = 16

@@ -176,7 +176,6 @@ class Ledger:
         return Entry(outcome.figures, outcome.error, outcome.versions)
 
     def _tidy(self) -> None:
-        """Remove what a sweep that was killed has left half-written."""
         for folder in (self._runs, self.folder):
             for part in folder.glob(".*"):
                 if _LEFT_OVER.fullmatch(part.name):
@@ -194,12 +193,7 @@ def difference_of(versions: Mapping[str, str]) -> str:
 
 @contextmanager
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
-    """Give the ledger of a sweep, for one process at a time; the folder is made where it is missing.
-
-    `study` is the content of ``study.json``. That of an earlier study is replaced, but where its tables are
-    whole only with them, by `Table`. Raises InputError when the folder holds something else than a sweep;
-    OutputError when it cannot be written to, or another process is at work in it.
-    """
+    """Give the ledger of a sweep, for one process at a time; `study` is the content of ``study.json``."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         used = any(not path.name.startswith(".") for path in folder.iterdir())
@@ -256,8 +250,7 @@ def _versions_1(run: Mapping[str, Any], figures: Mapping[str, Any], error: str |
 
 
 def _content(path: Path) -> bytes:
-    """Return the content of a file; anything else, which might have no end, is none."""
-    if not path.is_file():
+    if not path.is_file():  # a pipe, say, might have no end
         raise FileNotFoundError(path)
     return path.read_bytes()
 
@@ -271,7 +264,6 @@ def _check_sum(row: Mapping[str, Any]) -> str:
 
 
 def _remove(path: Path) -> None:
-    """Remove the folder of a run, or a file; links are not followed."""
     if path.is_symlink() or path.is_file():
         path.unlink()
     elif path.exists():

@@ -170,7 +170,6 @@ def _performed(task: Task) -> Outcome:
 
 
 def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]) -> dict[str, bytes]:
-    """Return what ``robocov run`` writes of the numbers of a run, with a part of its moments."""
     content = record.to_json(summary, lattice=task.lattice)
     content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
     if task.source is not None:

@@ -363,7 +363,6 @@ def _number(at: str, value: object, most: float) -> float:
 
 
 def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
-    """Return a parameter of a team, None for a range without limit."""
     if name in _RANGES and value in (None, NO_LIMIT, math.inf):
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
@@ -421,11 +420,7 @@ class Task:
 
 
 def tasks_of(study: Study) -> Iterator[Task]:
-    """Yield the runs of a study in their fixed order, that of the rows of its table.
-
-    Maps are outermost; then robots, the rest of the team, starts and seeds; controllers and their gains are
-    innermost.
-    """
+    """Yield the runs in the order of the table: maps outermost, controllers and their gains innermost."""
     once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
     once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
     if study.metrics:

@@ -182,7 +182,6 @@ def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
 
 
 def _named_map(entry: str, folder: Path) -> tuple[str, Environment]:
-    """Return what a map is called in the table, and the map."""
     known = bundled_maps()
     if entry in known:
         return entry, load_map(known[entry])

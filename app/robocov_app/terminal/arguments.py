@@ -46,7 +46,6 @@ _JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
 
 
 def _choices(text: str) -> str:
-    """Return choices without None; with it they come in any order, and are sorted then."""
     choices = text.split(", ")
     return ", ".join(sorted(set(choices) - {"'None'"}) if "'None'" in choices else choices)
 

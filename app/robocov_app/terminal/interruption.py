@@ -12,11 +12,7 @@ INTERRUPTED = 130  # exit status
 
 
 class Interruption:
-    """Context in which the first Ctrl-C (or SIGTERM) is only noted; a second one ends at once.
-
-    Long loops ask `requested` between two steps, so that nothing is cut in the middle.
-    Outside the main thread signals are left alone.
-    """
+    """Context in which the first Ctrl-C (or SIGTERM) is only noted, for long loops; a second ends at once."""
 
     def __init__(self) -> None:
         self.requested = False

@@ -21,11 +21,7 @@ _State: TypeAlias = tuple[int, int, int, int] | None
 def changes(
     paths: Sequence[Path], *, sleep: Callable[[float], None] = time.sleep
 ) -> Iterator[tuple[Path, ...]]:
-    """Yield the files that were written, removed or replaced since the last time, at first all of them.
-
-    It never ends. Files need not be there yet. What counts is what a path leads to, so that a file which an
-    editor replaces by renaming another, and one behind a link, are seen as well.
-    """
+    """Yield the files, or links to them, that were written, removed or replaced; at first all; for ever."""
     seen = {path: _state(path) for path in paths}
     yield tuple(paths)
     while True:
@@ -48,7 +44,6 @@ def changes(
 
 
 def _state(path: Path) -> _State:
-    """Return what differs after every write; None where there is no file."""
     try:
         found = path.stat()
     except (OSError, ValueError):
