@@ -102,8 +102,10 @@ def command(options: Arguments) -> int:
             first = results.partition_record()
             images = pages.save_paper_figures(out, runs, first, paper, quiet=quiet)
             if beyond is not None:
-                pages.save_beyond_page(out, pages.save_beyond_figures(out, beyond, quiet=quiet), beyond)
-            pages.save_paper_page(out, plan, images, runs, first, paper, found, more)
+                drawn = pages.save_beyond_figures(out, beyond, quiet=quiet)
+                pages.save(out / pages.BEYOND_PAGE, pages.beyond_page(drawn, beyond))
+            page = pages.paper_page(plan, images, runs, first, paper, found, more)
+            pages.save(out / pages.PAGE, page)
         except Interrupted:
             if quiet:
                 print(json.dumps({"out": str(out), "interrupted": True}))

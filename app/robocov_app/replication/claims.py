@@ -6,7 +6,8 @@ every run of it. Statistics are medians over scenarios with 95 % bootstrap inter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -71,6 +72,15 @@ def paper_claims(
 def share_of(there: ArrayLike, on: Outcomes) -> Interval:
     """Return in which share of the runs something is so, (m,) bool."""
     return bootstrap(there, "mean", on.maps)
+
+
+def _both(
+    measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float
+) -> tuple[Criterion, ...]:
+    """Return that RAPF's values are to be below a bound in the median, and RPF's above it."""
+    mine, others = (bootstrap(values, clusters=maps) for values in (ours, theirs))
+    low = Criterion(f"RAPF: {measure}", mine, high=bound, unit="%")
+    return low, Criterion("RPF: the same", others, low=bound, unit="%")
 
 
 def pair_claim(
@@ -171,11 +181,8 @@ def gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     ours, theirs, maps = variation(rapf), variation(rpf), rapf.maps
     measure = "median standard deviation of the final cost over the gains, by its mean"
     ratio = bootstrap(ours / np.maximum(theirs, 1e-12), clusters=maps)
-    criteria = (
-        Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY, unit="%"),
-        Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY, unit="%"),
-        Criterion("median ratio of that deviation, RAPF to RPF", ratio, high=1.0),
-    )
+    relative = Criterion("median ratio of that deviation, RAPF to RPF", ratio, high=1.0)
+    criteria = *_both(measure, ours, theirs, maps, BARELY), relative
     levels = sorted({float(gains["k_att"] or 0.0) for gains in rapf.gains if "k_att" in gains})
     at = "; ".join(
         f"k_att = {level:g}: {median_text(variation(part), '%')}, "
@@ -222,10 +229,7 @@ def starts_cost(outcomes: Outcomes) -> Claim:
     if not maps:
         return head
     measure = "median standard deviation of the final cost over the starts, by its mean"
-    criteria = (
-        Criterion(f"RAPF: {measure}", bootstrap(ours, clusters=maps), high=BARELY_BY_START, unit="%"),
-        Criterion("RPF: the same", bootstrap(theirs, clusters=maps), low=BARELY_BY_START, unit="%"),
-    )
+    criteria = _both(measure, ours, theirs, maps, BARELY_BY_START)
     of = {
         law: median_text(_variation_by_start(outcomes.measured("final", law), law)[0], "%")
         for law in ("rapf-best", "rpf-best", "lloyd")
@@ -417,9 +421,6 @@ def _variation_by_start(outcomes: Outcomes, law: str) -> tuple[Array, list[str]]
 
 
 def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
-    """Return what both laws did in the scenarios where no run of either failed."""
-    rapf, rpf = rapf.complete, rpf.complete
-    ours, theirs = set(rapf.scenarios), set(rpf.scenarios)
-    return rapf.where([each in theirs for each in rapf.scenarios]), rpf.where(
-        [each in ours for each in rpf.scenarios]
-    )
+    """Return what both laws did in the scenarios, the same of both, where no run of either failed."""
+    fine: Any = np.isfinite(np.vstack([rapf.excess, rpf.excess])).all(axis=0)
+    return rapf.where(fine), rpf.where(fine)

@@ -67,10 +67,16 @@ class Image(NamedTuple):
     words: str
 
 
+def save(path: Path, text: str) -> None:
+    """Write a text, whole or not at all; may raise OutputError."""
+    with written(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
 def save_claims(folder: Path, found: Sequence[Claim]) -> None:
     """Write ``claims.json``: claims with verdict, estimate, interval, runs, ...; may raise OutputError."""
     text = json.dumps([finite(claim.to_json()) for claim in found], indent=1, ensure_ascii=False)
-    _write(folder / CLAIMS, text + "\n")
+    save(folder / CLAIMS, text + "\n")
 
 
 def save_paper_figures(
@@ -117,16 +123,6 @@ def _save_figures(
             found[name] = Image(name, *size, words.get(name) or WORDS[name])
             update(number)
     return found
-
-
-def save_paper_page(folder: Path, *content: Any) -> None:
-    """Write ``index.html``, the `paper_page` of the rest, which needs nothing but ``figures/`` beside it."""
-    _write(folder / PAGE, paper_page(*content))
-
-
-def save_beyond_page(folder: Path, images: Mapping[str, Image], results: BeyondResults) -> None:
-    """Write ``beyond.html``, which needs nothing but ``figures/`` beside it; may raise OutputError."""
-    _write(folder / BEYOND_PAGE, beyond_page(images, results))
 
 
 def paper_page(
@@ -253,11 +249,6 @@ def _unbroken(value: object) -> object:
 
 def _unbroken_markup(value: Markup) -> Markup:
     return Markup(_UNIT.sub("\N{NO-BREAK SPACE}", str(value)))
-
-
-def _write(path: Path, text: str) -> None:
-    with written(path) as part:
-        part.write_text(text, encoding="utf-8")
 
 
 def _picture(record: Record) -> Markup:

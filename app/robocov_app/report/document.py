@@ -103,7 +103,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "gains": tables.gains_table(result),
         "summaries": tables.summary_tables(result),
         "runs": tables.runs_table(result),
-        "costs": list(plots.cost_plots(result, plots.Curves(result), looks, f"{key}c")),
+        "costs": list(plots.cost_plots(result, looks, f"{key}c")),
         "weighed": facts.weighed_text(result),
         "medians": any(len(group.entries) > 1 for group in grouped.variants(result)),
         "measures": plots.measure_plots(result, replayed, choice.entries, looks, f"{key}m"),

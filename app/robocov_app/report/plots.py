@@ -46,60 +46,51 @@ class Plot(NamedTuple):
     narrow: str = ""
 
 
-class Curves:
-    """Mean distances over time of all runs of a result, at common moments."""
-
-    def __init__(self, result: Result) -> None:
-        histories = {}
-        for entry in result.fine:
-            history = result.history(entry)
-            if history is not None and np.isfinite(history.mean_distance).any():
-                histories[entry] = history.time - history.time[0], history.mean_distance
-        longest = max([float(time[-1]) for time, _ in histories.values()], default=0.0)
-        self.time: Array = np.linspace(0.0, longest, _MOMENTS if longest > 0.0 else 1)
-        self.values: dict[Entry, Array] = {
-            entry: np.interp(self.time, time, values, right=np.nan)
-            for entry, (time, values) in histories.items()
-        }
-
-    def bands(self, groups: Sequence[Group], *, parts: bool = False) -> list[Band]:
-        """Return the curves of groups, as multiples of their first values where so wanted."""
-        found = []
-        for group in groups:
-            rows = [self.values[entry] for entry in group.entries if entry in self.values]
-            if parts:
-                rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
-            if rows:
-                found.append(Band(group.label, group.controller, self.time, np.array(rows)))
-        return found
-
-
-def _each_setting(result: Result, key: str) -> Iterator[tuple[str, str, list[Group]]]:
-    """Yield title, key and groups of each setting; nothing of very many."""
-    every = settings(result)
+def _parts(result: Result, key: str) -> Iterator[tuple[str, str, list[Group], bool]]:
+    """Yield title, key and groups of several settings together, then of each where they are not many."""
+    groups, every = shown_groups(result), settings(result)
+    if len(every) > 1:
+        yield TOGETHER, f"{key}-all", groups, True
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
         title = setting_label(result, setting) if len(every) > 1 else ""
-        yield title, f"{key}-{k}", [group.at(setting) for group in shown_groups(result)]
+        yield title, f"{key}-{k}", [group.at(setting) for group in groups], False
 
 
-def cost_plots(result: Result, curves: Curves, looks: Looks, key: str) -> Iterator[Plot]:
+def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the cost curves: over all settings, as parts of the first value, then of each setting."""
-    if len(settings(result)) > 1 and (bands := curves.bands(shown_groups(result), parts=True)):
-        yield _band_plot(TOGETHER, bands, looks, f"{key}-all", "mean distance / that of the start", "")
-    for title, own, groups in _each_setting(result, key):
-        if bands := curves.bands(groups):
-            yield _band_plot(title, bands, looks, own, "mean distance to the nearest robot (m)", "m")
+    known = {entry: history for entry in result.fine if (history := result.history(entry)) is not None}
+    known = {entry: each for entry, each in known.items() if np.isfinite(each.mean_distance).any()}
+    longest = max((float(each.time[-1] - each.time[0]) for each in known.values()), default=0.0)
+    time = np.linspace(0.0, longest, _MOMENTS if longest > 0.0 else 1)
+    values = {
+        entry: np.interp(time, each.time - each.time[0], each.mean_distance, right=np.nan)
+        for entry, each in known.items()
+    }
+    for title, own, groups, several in _parts(result, key):
+        bands = []
+        for group in groups:
+            rows = [values[entry] for entry in group.entries if entry in values]
+            if several:
+                rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
+            if rows:
+                bands.append(Band(group.label, group.controller, time, np.array(rows)))
+        if bands:
+            what = (
+                "mean distance / that of the start" if several else "mean distance to the nearest robot (m)"
+            )
+            yield _band_plot(title, bands, looks, own, what, "" if several else "m")
 
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
-    if len(settings(result)) > 1:
-        scales, groups = grouped.medians(result), shown_groups(result)
-        values = [grouped.relative(group.entries, scales) for group in groups]
-        yield from _sample_plot(TOGETHER, groups, values, looks, f"{key}-all", RELATIVE, "")
-    for title, own, groups in _each_setting(result, key):
-        values = [group.finals[np.isfinite(group.finals)] for group in groups]
-        yield from _sample_plot(title, groups, values, looks, own, METRES, " m")
+    scales = grouped.medians(result)
+    for title, own, groups, several in _parts(result, key):
+        values = [
+            grouped.relative(group.entries, scales) if several else group.finals[np.isfinite(group.finals)]
+            for group in groups
+        ]
+        what, unit = (RELATIVE, "") if several else (METRES, " m")
+        yield from _sample_plot(title, groups, values, looks, own, what, unit)
 
 
 def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> Iterator[Plot]:
@@ -122,12 +113,12 @@ def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> I
 
 
 def _band_plot(title: str, bands: list[Band], looks: Looks, key: str, what: str, unit: str) -> Plot:
-    own = [looks[band.label] for band in bands]
-    figures = [
+    styles = [looks[band.label] for band in bands]
+
+    def drawn(size: tuple[int, int]) -> Figure:
         # the axis tells the unit: names have little room
-        plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=own, label=what, unit="")
-        for size in ((PANEL,) if title else (WIDE, PANEL))
-    ]
+        return plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=styles, label=what, unit="")
+
     words = []
     for band in bands:
         low, middle, high = (row[np.isfinite(row)][-1] for row in quartiles_of(band.values))
@@ -135,14 +126,15 @@ def _band_plot(title: str, bands: list[Band], looks: Looks, key: str, what: str,
         if len(band.values) > 1:
             text += f" at the end (median of {len(band.values)} runs, quartiles {low:.3f} to {high:.3f})"
         words.append(text)
-    about = f"{title}: {what}" if title else what
-    sentence = f"{about} against time, up to {bands[0].time[-1]:.4g} s. {'; '.join(words)}."
-    return _alone(title, figures, key, sentence)
+    about = f"{what} against time, up to {bands[0].time[-1]:.4g} s. {'; '.join(words)}."
+    return _fitting(title, key, about, drawn)
 
 
-def _alone(title: str, figures: Sequence[Figure], key: str, sentence: str) -> Plot:
-    """Return a plot that was drawn once, or for wide screens and for narrow ones."""
-    return Plot(title, *(inline_svg(figure, f"{key}{k or ''}", sentence) for k, figure in enumerate(figures)))
+def _fitting(title: str, key: str, about: str, drawn: Callable[[tuple[int, int]], Figure]) -> Plot:
+    """Return a plot as a panel, or where it stands alone for wide screens and for narrow ones."""
+    sizes, sentence = ((PANEL,), f"{title}: {about}") if title else ((WIDE, PANEL), about)
+    svgs = (inline_svg(drawn(size), f"{key}{k or ''}", sentence) for k, size in enumerate(sizes))
+    return Plot(title, *svgs)
 
 
 def _sample_plot(
@@ -152,18 +144,18 @@ def _sample_plot(
     samples = [Sample(group.label, group.controller, own) for group, own in each if len(own)]
     if not samples or max(len(sample.values) for sample in samples) < 2:
         return
-    own = [looks[sample.label] for sample in samples]
-    figures = [
-        plot_final_costs([("", samples)], size=(width, None), scale=SCALE, styles=own, label=what)
-        for width, _ in ((PANEL,) if title else (WIDE, PANEL))
-    ]
+    styles = [looks[sample.label] for sample in samples]
+
+    def drawn(size: tuple[int, int]) -> Figure:
+        wide = size[0], None
+        return plot_final_costs([("", samples)], size=wide, scale=SCALE, styles=styles, label=what)
+
     words = []
     for label, _, found in samples:
         low, middle, high = np.percentile(found, [25, 50, 75])
         text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
         words.append(f"{text}, {counted(len(found), 'run')}")
-    about = f"{title}: {what}" if title else what
-    yield _alone(title, figures, key, f"{about}. {'; '.join(words)}.")
+    yield _fitting(title, key, f"{what}. {'; '.join(words)}.", drawn)
 
 
 class _Parameter(NamedTuple):
