@@ -63,9 +63,7 @@ def plot_environment(
     size: tuple[int, int] | None = None,
 ) -> Axes:
     """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
-    from robocov_app.figures import runs as figures
-
-    return _map_axes(figures.plot_environment(environment, _checked(axes), theme, size), axes)
+    return _map_axes(_figures().plot_environment(environment, _checked(axes), theme, size), axes)
 
 
 def plot_record(
@@ -79,10 +77,8 @@ def plot_record(
     mean_time: float | None = None,
 ) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
-    from robocov_app.figures import runs as figures
-
     look = (theme, colours, size, mean_distance, mean_time)
-    return _map_axes(figures.plot_trajectories(record, _checked(axes), *look), axes)
+    return _map_axes(_figures().plot_trajectories(record, _checked(axes), *look), axes)
 
 
 def plot_history(
@@ -96,10 +92,8 @@ def plot_history(
     title: str = "Coverage cost over time",
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
-    from robocov_app.figures import runs as figures
-
     curve = (label, controller, history.time, history.mean_distance)
-    return _map_axes(figures.plot_cost([curve], _checked(axes), theme, size, title), axes)
+    return _map_axes(_figures().plot_cost([curve], _checked(axes), theme, size, title), axes)
 
 
 def plot_result(
@@ -160,9 +154,7 @@ def environment_html(environment: Environment) -> str:
 
 def environment_png(environment: Environment) -> bytes:
     """Return a map's page."""
-    from robocov_app.figures import runs as figures
-
-    return figure_png(figures.plot_environment(environment))
+    return figure_png(_figures().plot_environment(environment))
 
 
 def record_html(record: Record) -> str:
@@ -187,9 +179,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
-    from robocov_app.figures import runs as figures
-
-    return figure_png(figures.plot_trajectories(record))
+    return figure_png(_figures().plot_trajectories(record))
 
 
 def _checked(axes: Any) -> Any:
@@ -207,3 +197,9 @@ def _checked(axes: Any) -> Any:
 
 def _map_axes(figure: Figure, given: Axes | None) -> Axes:
     return figure.axes[-1] if given is None else given
+
+
+def _figures() -> Any:
+    from robocov_app.figures import runs
+
+    return runs

@@ -22,7 +22,6 @@ if TYPE_CHECKING:  # not for the processes of a sweep
     from robocov_app.runs.options import RunOptions
 
 STOPPED_SAMPLES = 200  # samples of the coverage cost of a run that was stopped
-COST_COLUMNS = "time_s,mean_distance_m,cost_m3,uncovered_area_m2"  # the header of ``cost.csv``
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,17 +85,13 @@ def saved_run(
 def save_numbers(run: Run, folder: Path, lattice: int) -> None:
     """Write ``record.npz``, ``run.json`` and ``cost.csv``; the summary depends on the lattice."""
     run.record.save(folder, finite(run.summary), lattice=lattice)
-    write_csv(folder / "cost.csv", cost_columns(run.history), cost_rows(run.history))
+    write_csv(folder / "cost.csv", *cost_table(run.history))
 
 
-def cost_columns(history: CostHistory) -> str:
-    """Return the header of ``cost.csv``; where robots are not equally fast, with one column more."""
-    return COST_COLUMNS if history.mean_time is None else f"{COST_COLUMNS},mean_time_s"
-
-
-def cost_rows(history: CostHistory) -> Iterator[tuple[float, ...]]:
-    """Return the rows of ``cost.csv``, under `cost_columns`."""
-    columns = [history.time, history.mean_distance, history.cost, history.uncovered_area]
+def cost_table(history: CostHistory) -> tuple[str, Iterator[tuple[float, ...]]]:
+    """Return the header and the rows of ``cost.csv``; where robots are not equally fast, with times."""
+    columns = {"time_s": history.time, "mean_distance_m": history.mean_distance, "cost_m3": history.cost}
+    columns["uncovered_area_m2"] = history.uncovered_area
     if history.mean_time is not None:
-        columns.append(history.mean_time)
-    return zip(*(column.tolist() for column in columns), strict=True)
+        columns["mean_time_s"] = history.mean_time
+    return ",".join(columns), zip(*(column.tolist() for column in columns.values()), strict=True)

@@ -14,7 +14,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers import gain_values, gains_of
 from robocov.controllers.gains import Gain, Option, Value, with_gains
-from robocov.errors import ParameterError, place, shown, unknown_name
+from robocov.errors import ParameterError, checked, place, shown, unknown_name
 
 T = TypeVar("T")
 
@@ -60,8 +60,8 @@ class Sampling:
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
             raise ParameterError(f"sampling.method: {unknown_name('method', self.method, get_args(Method))}")
-        whole("sampling.samples", self.samples, 1, MOST_SAMPLES)
-        whole("sampling.seed", self.seed, 0, 2**63 - 1)
+        checked("sampling.samples", self.samples, 1, MOST_SAMPLES, whole=True)
+        checked("sampling.seed", self.seed, 0, 2**63 - 1, whole=True)
 
     def points(self, dimensions: int) -> Array:
         """Return as many points of the unit cube as there are samples, (samples, dimensions)."""
@@ -213,9 +213,3 @@ def once(values: Sequence[object], path: Place) -> None:
                 f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}; "
                 f"each once was wanted"
             )
-
-
-def whole(at: str, value: object, low: int, high: int) -> None:
-    """Check that a value is a whole number in range. Raises ParameterError; the message begins with `at`."""
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ParameterError(f"{at}: {shown(value)}, but a whole number from {low} to {high} was wanted")

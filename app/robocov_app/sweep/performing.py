@@ -22,7 +22,7 @@ from robocov.mapfile import from_json
 from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
 from robocov.record import ARRAYS, Record, versions
-from robocov_app.runs.run import cost_columns, cost_rows
+from robocov_app.runs.run import cost_table
 from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
 from robocov_app.terminal.output import csv_text, finite
@@ -180,7 +180,7 @@ def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[st
     return {
         "run.json": _json(content),
         "record.npz": arrays.getvalue(),
-        "cost.csv": csv_text(cost_columns(history), cost_rows(history)).encode(),
+        "cost.csv": csv_text(*cost_table(history)).encode(),
     }
 
 

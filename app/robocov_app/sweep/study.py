@@ -19,13 +19,13 @@ from robocov.controllers import controller_kind
 from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import Source, own_modules
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, place, shown, unknown_name
+from robocov.errors import InputError, ParameterError, checked, place, shown, unknown_name
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.spec import MOST_ROWS
-from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, placed, whole
+from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, placed
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
@@ -183,11 +183,10 @@ class Study:
         self._check_names()
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
-                whole(place((name, k)), value, low, high)
-        whole("lattice", self.lattice, 2, 2048)
-        for name, most in (("duration", 1e6), ("cost_hz", 1e4), ("record_hz", 1e4)):
-            object.__setattr__(self, name, _number(name, getattr(self, name), most))
-        object.__setattr__(self, "dt", _number("dt", self.dt, 1.0))
+                checked(place((name, k)), value, low, high, whole=True)
+        checked("lattice", self.lattice, 2, 2048, whole=True)
+        for name, most in (("duration", 1e6), ("dt", 1.0), ("cost_hz", 1e4), ("record_hz", 1e4)):
+            object.__setattr__(self, name, checked(name, getattr(self, name), 0.0, most))
         check_dt(self.dt)
         if not isinstance(self.metrics, bool):
             raise ParameterError(f"metrics: {shown(self.metrics)}, but true or false was wanted")
@@ -354,12 +353,6 @@ def source_json(source: Source) -> dict[str, Any]:
     """Return what files say of a controller's source: its text, and those of the modules that it imports."""
     modules = {name: module.text for name, module in source.modules.items()}
     return {"source": source.text, **({"modules": modules} if modules else {})}
-
-
-def _number(at: str, value: object, most: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
-        raise ParameterError(f"{at}: {shown(value)}, but a number from 0 to {most:g} was wanted")
-    return float(value)
 
 
 def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robocov.compiled import compile_kernels
-from robocov.errors import OutputError, ParameterError, RobocovError, counted, shown
+from robocov.errors import OutputError, RobocovError, checked, counted
 from robocov_app.sweep.executors import Executor, LocalPool, processors
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened, study_bytes
 from robocov_app.sweep.performing import Outcome, perform, prepared
@@ -173,10 +173,8 @@ def sweep(
     InputError when the folder holds something else, OutputError when workers end again and again or something
     cannot be written; what is done is kept.
     """
-    if workers is not None and not 1 <= workers <= MOST_WORKERS:
-        raise ParameterError(
-            f"workers: {shown(workers)}, but a whole number from 1 to {MOST_WORKERS} was wanted"
-        )
+    if workers is not None:
+        checked("workers", workers, 1, MOST_WORKERS, whole=True)
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop

@@ -31,7 +31,7 @@ from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
 from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
-from robocov_app.runs.run import Run, cost_columns, cost_rows, evaluated, save_numbers
+from robocov_app.runs.run import Run, cost_table, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
 from robocov_app.terminal.output import write_csv, write_json
 from robocov_app.viewer.session.changes import Place
@@ -218,11 +218,11 @@ def save_story(
     if several:
         content = {"format": "robocov-story", "version": 1, "parts": told}
         write_json(result.new / STORY, content)
-        header = "controller," + cost_columns(histories[0][2])
+        header = "controller," + cost_table(histories[0][2])[0]
         lines = (
             (name, begin + row[0], *row[1:])
             for begin, name, history in histories
-            for row in cost_rows(history)
+            for row in cost_table(history)[1]
         )
         write_csv(result.new / "cost.csv", header, lines)
     look = options.film

@@ -7,7 +7,7 @@ from called import SHORT, answer, complaint
 
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.runs.run import cost_columns
+from robocov_app.runs.run import cost_table
 from robocov_app.runs.saved import load_saved
 
 TEAM = """
@@ -44,7 +44,7 @@ def test_a_run_of_robots_that_differ(tmp_path: Path, team: Path, capsys: pytest.
     assert saved.history is not None
     assert saved.history.mean_time is not None
     assert saved.history.mean_time[-1] == said["mean_time_s"] == float(rows[-1].split(",")[-1])
-    assert cost_columns(saved.history) == header
+    assert cost_table(saved.history)[0] == header
     apart = np.hypot(*(record.positions[0, 1] - record.positions[0, 2]))
     assert apart >= 0.4, "room for the largest"
     speeds = np.hypot(*np.moveaxis(record.velocities, -1, 0)).max(axis=0)
