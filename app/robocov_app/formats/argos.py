@@ -7,7 +7,6 @@ Intelligence 6 (2012), 271-295.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -45,42 +44,24 @@ def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
     understood; with the line.
     """
     root, where = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
-    arena = next((child for child in root.children if child.tag == "arena"), None)
+    arena = root.child("arena")
     if arena is None:
         root.refuse(where, "no <arena>, but one was wanted")
     shapes = Shapes(where, options)
-    size, centre = (
-        _lengths(arena, "size", where)[:2],
-        arena.numbers(where, "center", count=3, default="0,0,0")[:2],
-    )
-    corner = centre - size / 2
-    robots: list[tuple[float, float]] = []
+    size = _lengths(arena, "size", where)[:2]
+    corner = arena.numbers(where, "center", count=3, default="0,0,0")[:2] - size / 2
+    world = MultiPolygon([shapely.box(*corner, *(corner + size))])
     for child in arena.children:
         if child.tag == "distribute":
-            _distribute(child, shapes, robots)
-        else:
-            body = child.child("body")
-            if body is not None:
-                position = body.numbers(where, "position", count=3, default="0,0,0")
-                _place(
-                    child,
-                    position,
-                    body.numbers(where, "orientation", count=3, default="0,0,0"),
-                    shapes,
-                    robots,
-                )
-    foreign = foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=path.stem,
-        description="An arena of ARGoS, imported.",
-        solid=True,
-        world=MultiPolygon([shapely.box(*corner, *(corner + size))]),
-    )
-    return replace(foreign, robots=tuple(robots))
+            _distribute(child, shapes)
+        elif (body := child.child("body")) is not None:
+            position = body.numbers(where, "position", count=3, default="0,0,0")
+            _place(child, position, body.numbers(where, "orientation", count=3, default="0,0,0"), shapes)
+    text = "An arena of ARGoS, imported."
+    return foreign_map(shapes, IMPORTER.name, path.stem, text, solid=True, world=world)
 
 
-def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, float]]) -> None:
+def _distribute(element: Element, shapes: Shapes) -> None:
     """Place what ARGoS would, where that is no matter of chance."""
     where = shapes.where
     parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
@@ -108,18 +89,16 @@ def _distribute(element: Element, shapes: Shapes, robots: list[tuple[float, floa
         steps = [k % layout[0], k // layout[0] % layout[1], k // (layout[0] * layout[1])]
         places = [*(first - np.column_stack(steps) * gaps)]
     for place in places:
-        _place(thing, place, turn, shapes, robots)
+        _place(thing, place, turn, shapes)
 
 
-def _place(
-    element: Element, position: Array, turn: Array, shapes: Shapes, robots: list[tuple[float, float]]
-) -> None:
+def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> None:
     """Add a body at a position, m, turned about z, y, x, degrees."""
     where, tag = shapes.where, element.tag
     labels = [element.attributes.get("id", tag), tag]
     if tag not in ("box", "cylinder"):
         if shapes.wants(labels):
-            robots.append((float(position[0]), float(position[1])))
+            shapes.robots.append((float(position[0]), float(position[1])))
     elif not shapes.wants(labels):
         return
     elif (np.abs((turn[1:] + 90) % 180 - 90) > _UPRIGHT).any():

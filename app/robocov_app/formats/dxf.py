@@ -79,7 +79,7 @@ def flat(points: Sequence[Any]) -> Array:
     return np.array([(point[0], point[1]) for point in points], dtype=float).reshape(-1, 2)
 
 
-MOST_ENTITIES = 200_000
+MOST_DRAWN = 200_000
 """That are drawn, blocks and all."""
 
 _FRAME = 16
@@ -146,17 +146,17 @@ class DxfDrawing:
             return max(rows, 1) * max(columns, 1) * (1 + counted[name])
 
         total = count(space)
-        if total > MOST_ENTITIES:
+        if total > MOST_DRAWN:
             # of blocks in blocks it may be too many for a float
             what = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
-            raise MapError(f"{self.where}: {what}, but at most {MOST_ENTITIES} were wanted")
+            raise MapError(f"{self.where}: {what}, but at most {MOST_DRAWN} were wanted")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
         """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""
         for entity in entities:
             self.drawn += 1
-            if self.drawn > MOST_ENTITIES:
-                raise MapError(f"{self.where}: more than {MOST_ENTITIES} entities, but fewer were wanted")
+            if self.drawn > MOST_DRAWN:
+                raise MapError(f"{self.where}: more than {MOST_DRAWN} entities, but fewer were wanted")
             try:
                 self._one(entity, layer, blocks)
             except RobocovError:
@@ -381,14 +381,8 @@ def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
     drawing.draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=one_line(path.stem)[:60] or "map",
-        description="Imported from DXF.",
-        solid=True,
-        notes=[unit, *drawing.notes()],
-    )
+    shapes.notes = [unit, *drawing.notes()]
+    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
 def _check(path: Path, where: str) -> None:

@@ -146,11 +146,7 @@ def _reason(error: Exception) -> str:
     return one_line(error.strerror if isinstance(error, OSError) and error.strerror else error)
 
 
-_MARKS = (
-    (codecs.BOM_UTF8, "utf-8"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
+_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 
 
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
@@ -168,6 +164,11 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
         return data[len(mark) :].decode(encoding), where
     except UnicodeDecodeError as error:
         raise MapError(f"{where}: byte {error.start}: not {encoding.upper()}, but text was wanted") from None
+
+
+def name_of_map(path: Path) -> str:
+    """Return what a map in a file is called that gives no name."""
+    return one_line(path.stem)[:60] or "map"
 
 
 _LONG = 400

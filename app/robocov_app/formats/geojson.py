@@ -59,21 +59,13 @@ def read_geojson(path: Path, options: ReadOptions) -> ForeignMap:
         found.read(document)
         options = _with_units(options, document, where)
         origin = _origin(document, where)
-    figures, notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
-    for figure in figures:
-        shapes.add(figure)
-    shapes.join_lines()
+    figures, shapes.notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
+    shapes.add_all(figures)
     named = document.get("name")
     name = named if isinstance(named, str) and named.strip() else path.stem
     text = document.get("description")
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=one_line(name)[:80] or "map",
-        description=one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON.",
-        solid=False,
-        notes=notes,
-    )
+    text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
+    return foreign_map(shapes, IMPORTER.name, one_line(name)[:80] or "map", text, solid=False)
 
 
 class _Found:
@@ -159,13 +151,7 @@ class _Found:
                 self.shapes.mended["ring", "closed: the last point was not the first"] += unclosed
             self._keep("polygon", rings, labels, at)
 
-    def _keep(
-        self,
-        kind: Kind,
-        rings: list[Array],
-        labels: tuple[str, ...],
-        at: Steps,
-    ) -> None:
+    def _keep(self, kind: Kind, rings: list[Array], labels: tuple[str, ...], at: Steps) -> None:
         self.figures.append(Figure(kind, tuple(rings), labels, place(at)))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
@@ -54,17 +54,15 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
     world = root["world"]
     size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
     corner = world["offset"].numbers([0.0, 0.0])[:2]
-    free, cell, notes = MultiPolygon([shapely.box(*corner, *(corner + size))]), None, []
+    free = MultiPolygon([shapely.box(*corner, *(corner + size))])
     source = world["obstacle_map"]
     if source.given:
         light, moved = _picture(source, world["mdownsample"], path, options)
-        notes = [] if moved is None else [moved]
+        shapes.notes += [] if moved is None else [moved]
         width, height = (size / light.shape[::-1]).tolist()
         free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
-        cell = max(width, height)
-        shapes.vertices += vertices_of(free)
-        files.require_vertices(shapes.vertices, where)
-    robots: list[tuple[float, float]] = []
+        shapes.cell = max(width, height)
+        shapes.count(vertices_of(free))
     count = moving = 0
     for kind in ("robot", "obstacle"):
         for group in root[kind].items(one=True):
@@ -82,7 +80,7 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
                 labels = [label for label in (*given, group["group_name"].text()) if label]
                 x, y, turn = states[min(k, len(states) - 1)][:3]
                 if kind == "robot":
-                    robots.append((float(x), float(y)))
+                    shapes.robots.append((float(x), float(y)))
                 elif shapes.wants(labels):
                     if group["unobstructed"].text().lower() in _TRUE:
                         shapes.leave_out(kind, "that nothing collides with")
@@ -91,19 +89,10 @@ def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
                     figures = group["shape"].items(one=True) or [group["shape"]]
                     _draw(figures[min(k, len(figures) - 1)], _frame(x, y, turn), shapes, labels)
     if moving:
-        notes.append(
-            f"{counted(moving, 'obstacle')} with kinematics taken as standing where the file has them"
-        )
-    foreign = foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=world["name"].text() or path.stem,
-        description="A world of IR-SIM, imported.",
-        solid=True,
-        world=free,
-        notes=notes,
-    )
-    return replace(foreign, cell=cell, robots=tuple(robots))
+        many = counted(moving, "obstacle")
+        shapes.notes.append(f"{many} with kinematics taken as standing where the file has them")
+    name = world["name"].text() or path.stem
+    return foreign_map(shapes, IMPORTER.name, name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
 def _picture(source: _Node, step: _Node, path: Path, options: ReadOptions) -> tuple[BoolArray, str | None]:
@@ -113,9 +102,7 @@ def _picture(source: _Node, step: _Node, path: Path, options: ReadOptions) -> tu
             name = shown(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
-    file, moved = named_file(
-        path, source.text(), anywhere=bool(options.anywhere), at=source.at, what="picture"
-    )
+    file, moved = named_file(path, source.text(), anywhere=options.anywhere, at=source.at, what="picture")
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:

@@ -83,20 +83,12 @@ def read_osm(path: Path, options: ReadOptions) -> ForeignMap:
         origin = (float(west + east) / 2, float(south + north) / 2)
         corners = np.array([[west, south], [east, south], [east, north], [west, north]])
         figures.append(Figure("polygon", (corners,), (BOUNDARY,), "bounds"))
-    figures, notes = in_metres(figures, options, where, crs=DEGREES, origin=origin)
-    for figure in figures:
-        shapes.add(figure)
-    shapes.join_lines()
+    figures, shapes.notes = in_metres(figures, options, where, crs=DEGREES, origin=origin)
+    shapes.add_all(figures)
     if extract.gates:
-        notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=one_line(path.stem)[:60] or "map",
-        description="Imported from OpenStreetMap, © OpenStreetMap contributors.",
-        solid=True,
-        notes=notes,
-    )
+        shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
+    text = "Imported from OpenStreetMap, © OpenStreetMap contributors."
+    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), text, solid=True)
 
 
 class _Extract:

@@ -11,8 +11,14 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
-from robocov.errors import one_line
-from robocov_app.formats.files import located_errors, positions, read_json, refused, require_shapes
+from robocov_app.formats.files import (
+    located_errors,
+    name_of_map,
+    positions,
+    read_json,
+    refused,
+    require_shapes,
+)
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.shapes import Shapes
@@ -45,17 +51,9 @@ def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
     for number, rings in enumerate(polygons, start=1):
         if not shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}"):
             shapes.leave_out("outline", "without an area")
-    notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
-    name = one_line(path.stem)[:60] or "map"
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=name,
-        description="Imported from rings.",
-        solid=False,
-        accessible=True,
-        notes=notes,
-    )
+    shapes.notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
+    name, text = name_of_map(path), "Imported from rings."
+    return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
 
 
 def _polygons(document: Any, where: str, shapes: Shapes) -> list[list[Array]]:
@@ -108,13 +106,8 @@ def _pairs(value: Any, at: Steps, where: str, dimensions: int, shapes: Shapes) -
     """Return the points of a flat list of numbers, (k, 2)."""
     if not isinstance(value, list) or len(value) % dimensions or len(value) < 3 * dimensions:
         raise refused(where, at, value, f"at least 3 times {dimensions} numbers were wanted")
-    points = positions(
-        [value[k : k + dimensions] for k in range(0, len(value), dimensions)],
-        at,
-        where,
-        least=3,
-        dimensions=(dimensions, dimensions),
-    )
+    pairs = [value[k : k + dimensions] for k in range(0, len(value), dimensions)]
+    points = positions(pairs, at, where, least=3, dimensions=(dimensions, dimensions))
     if dimensions == 3:
         shapes.leave_heights(points[:, 2])
     return np.ascontiguousarray(points[:, :2])

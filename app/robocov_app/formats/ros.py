@@ -75,9 +75,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             f"but numbers from 0 to 1 were wanted, the first not the larger"
         )
     name = _text(given, "image", where)
-    image, moved = named_file(
-        path, name, anywhere=bool(options.anywhere), at=f"{where}: image", what="picture"
-    )
+    at = f"{where}: image"
+    image, moved = named_file(path, name, anywhere=options.anywhere, at=at, what="picture")
     picture = read_picture(image, one_line(image))
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
@@ -210,8 +209,6 @@ IMPORTER = Importer(
     options=frozenset({"unknown", "threshold", "anywhere"}),
 )
 
-
-"""The thresholds of map_server's own maps."""
 
 _WHITE, _GREY, _BLACK = 254, 205, 0
 """What map_saver writes for free, unknown and occupied."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -116,7 +116,7 @@ def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
     world.place(root.inside, np.eye(3))
     rooms = sorted(world.rooms, key=lambda room: -room.box.area)
     places = [*(outline.area.representative_point() for outline in shapes.outlines)]
-    places += [*(room.box.centroid for room in rooms), *map(shapely.Point, world.robots)]
+    places += [*(room.box.centroid for room in rooms), *map(shapely.Point, shapes.robots)]
     main = next((room for room in rooms if shapely.covers(room.box, places).mean() > 0.5), None)
     for room in rooms:
         dark = polygons_of(shapely.difference(room.box, room.free)) if room is not main else MultiPolygon()
@@ -125,18 +125,10 @@ def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
     free = None if main is None else main.free
     if free is None and shapes.outlines:
         free, words = surrounding(shapes)
-        world.notes.append(words)
-    foreign = foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=root.text("name") or path.stem,
-        description="A world of Stage, imported.",
-        solid=True,
-        world=free,
-        notes=world.notes,
-    )
-    cell = max((room.cell for room in rooms if room.cell is not None), default=None)
-    return replace(foreign, cell=cell, robots=tuple(world.robots))
+        shapes.notes.append(words)
+    shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
+    name = root.text("name") or path.stem
+    return foreign_map(shapes, IMPORTER.name, name, "A world of Stage, imported.", solid=True, world=free)
 
 
 class _World:
@@ -152,8 +144,6 @@ class _World:
         self.bitmaps: dict[Path, tuple[MultiPolygon, int, int]] = {}
         self.metre, self.turn = 1.0, math.pi / 180
         self.rooms: list[_Room] = []
-        self.robots: list[tuple[float, float]] = []
-        self.notes: list[str] = []
 
     def read(self) -> _Entity:
         """Return the file as an entity: what is global, and the models."""
@@ -165,9 +155,9 @@ class _World:
         return root
 
     def _named(self, token: _Token, what: str) -> Path:
-        anywhere = bool(self.shapes.options.anywhere)
+        anywhere = self.shapes.options.anywhere
         file, note = named_file(self.path, token.text, anywhere=anywhere, at=token.at, what=what)
-        self.notes += [] if note is None or note in self.notes else [note]
+        self.shapes.notes += [] if note is None or note in self.shapes.notes else [note]
         return file
 
     def _split(self, path: Path, depth: int) -> None:
@@ -252,7 +242,7 @@ class _World:
             elif not self.shapes.wants(labels):
                 continue
             elif entity.type == "position":
-                self.robots.append((float(here[0, 2]), float(here[1, 2])))
+                self.shapes.robots.append((float(here[0, 2]), float(here[1, 2])))
             else:
                 if self._met(entity):
                     self._shape(entity, here @ self._pose(entity, "origin"), labels)
@@ -282,9 +272,8 @@ class _World:
         values = entity.numbers(name, (0.0, 0.0, 0.0, 0.0))
         x, y = values[:2] * self.metre
         turn = values[2 if len(entity.properties.get(name, [])) == 3 else 3] * self.turn
-        return np.array(
-            [[math.cos(turn), -math.sin(turn), x], [math.sin(turn), math.cos(turn), y], [0, 0, 1]]
-        )
+        cos, sin = math.cos(turn), math.sin(turn)
+        return np.array([[cos, -sin, x], [sin, cos, y], [0, 0, 1]])
 
     def _met(self, entity: _Entity) -> bool:
         """Return whether robots run into a model, or see it."""
@@ -309,8 +298,7 @@ class _World:
         if "bitmap" in entity.properties:
             token = _Token("string", entity.text("bitmap"), f"{entity.at}: bitmap")
             free, columns, rows = self._bitmap(self._named(token, "picture"))
-            self.shapes.vertices += vertices_of(free)
-            files.require_vertices(self.shapes.vertices, self.shapes.where)
+            self.shapes.count(vertices_of(free))
             cell = float(max(size[0] / columns, size[1] / rows))
             self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
             if rings:

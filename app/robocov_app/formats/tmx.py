@@ -12,7 +12,7 @@ import re
 import warnings
 import zlib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -108,8 +108,6 @@ class _Map:
     def __init__(self, path: Path, root: Element, shapes: Shapes) -> None:
         self.path, self.root, self.shapes, self.where = path, root, shapes, shapes.where
         self.tiles_read = self.parts = 0
-        self.notes: list[str] = []
-        self.robots: list[tuple[float, float]] = []
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
             root.refuse(self.where, f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
@@ -120,7 +118,7 @@ class _Map:
         if options.cell is not None and options.scale is not None:
             raise ParameterError("--cell, --scale: both say how large a tile is, but one of them was wanted")
         if options.cell is None and options.scale is None:
-            self.notes.append(f"no size of a tile was given: {CELL:g} m wide taken (--cell)")
+            shapes.notes.append(f"no size of a tile was given: {CELL:g} m wide taken (--cell)")
         self.pixel = options.scale or (options.cell or CELL) / float(self.tile[0])
         files.require_length(self.pixel * float(self.tile.max()), f"{self.where}: the side of a tile")
         self.corner = np.zeros(2)
@@ -144,18 +142,10 @@ class _Map:
             )
         width, height = (self.pixel * self.tile).tolist()
         world = free_area(~solid, (width, height), (0.0, 0.0), self.where)
-        shapes.vertices += vertices_of(world)
-        files.require_vertices(shapes.vertices, self.where)
-        foreign = foreign_map(
-            shapes,
-            format=IMPORTER.name,
-            name=self.path.stem,
-            description="A map of Tiled, imported.",
-            solid=True,
-            world=world,
-            notes=self.notes,
-        )
-        return replace(foreign, cell=max(width, height) if solid.any() else None, robots=tuple(self.robots))
+        shapes.count(vertices_of(world))
+        shapes.cell = max(width, height) if solid.any() else None
+        text = "A map of Tiled, imported."
+        return foreign_map(shapes, IMPORTER.name, self.path.stem, text, solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
         """Return the tiles that are solid by their global IDs."""
@@ -167,9 +157,9 @@ class _Map:
             source = element.attributes.get("source")
             if source is not None:
                 at = f"{self.where}:{element.line}"
-                anywhere = bool(self.shapes.options.anywhere)
+                anywhere = self.shapes.options.anywhere
                 file, note = named_file(self.path, source, anywhere=anywhere, at=at, what="tileset")
-                self.notes += [] if note is None else [note]
+                self.shapes.notes += [] if note is None else [note]
                 tileset, where = read_xml_tree(file, "tileset", "TSX")
             size = np.array([_number(tileset, name, where) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")
@@ -341,7 +331,7 @@ class _Map:
                 asked = bool(folded(options.only or ()) & folded(labels))
                 if figure is not None and any(_START.fullmatch(_plain(label)) for label in given):
                     x, y = self._metres(figure[1].mean(axis=0)).tolist()
-                    self.robots.append((x, y))
+                    shapes.robots.append((x, y))
                 elif asked or (
                     options.only is None and (anything or layer.wall or _says_solid(element, labels))
                 ):

@@ -15,10 +15,10 @@ from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import MapError, one_line, shown
+from robocov.errors import MapError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
-from robocov_app.formats.files import MAX_DEPTH, read_text
+from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.enclosing import foreign_map
@@ -262,20 +262,10 @@ def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
     parsed = WktText(text, where, shapes)
     figures = parsed.figures()
     crs = f"EPSG:{parsed.srid}" if parsed.srid else None
-    figures, notes = in_metres(figures, options, where, crs=crs)
-    for figure in figures:
-        shapes.add(figure)
-    shapes.join_lines()
-    name = one_line(path.stem)[:60] or "map"
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=name,
-        description="Imported from WKT.",
-        solid=False,
-        accessible=True,
-        notes=notes,
-    )
+    figures, shapes.notes = in_metres(figures, options, where, crs=crs)
+    shapes.add_all(figures)
+    name, text = name_of_map(path), "Imported from WKT."
+    return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
 
 
 IMPORTER = Importer(

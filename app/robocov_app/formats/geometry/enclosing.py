@@ -43,14 +43,13 @@ class _Enclosure:
 
 def foreign_map(
     shapes: Shapes,
-    *,
     format: str,  # noqa: A002 - as of a `ForeignMap`
     name: str,
     description: str,
+    *,
     solid: bool,
     accessible: bool = False,
     world: MultiPolygon | None = None,
-    notes: Sequence[str] = (),
 ) -> ForeignMap:
     """Return the map that the shapes of a file stand for.
 
@@ -68,7 +67,7 @@ def foreign_map(
     `accessible`: whether outlines are all free in files of that format, as JuPedSim's accessible area, so
     that one may overlap another: then 2 holds only where all others lie wholly in the largest, which would
     add nothing to it as free space. `world`, m: what is free before the shapes stand in it, where the format
-    says so: then no boundary is looked for. `notes`: what else is worth knowing. Raises MapError when there
+    says so: then no boundary is looked for. Raises MapError when there
     are no shapes, the boundary has no area, or the shapes cross each other too often; ParameterError when a
     name in the options is none of the file's.
     """
@@ -131,14 +130,16 @@ def foreign_map(
         free=free,
         boundary=outer,
         vertices_read=shapes.vertices,
+        cell=shapes.cell,
         primitives=(
             *(outline.circle for outline in inner if outline.circle is not None),
             *(wall for line in walls if (wall := line.wall) is not None),
             *shapes.pillars,
         ),
+        robots=tuple(shapes.robots),
         repaired=shapes.repaired,
         dropped=shapes.dropped,
-        notes=(*notes, *_words(shapes, solid, boundary, len(blocks))),
+        notes=(*shapes.notes, *_words(shapes, solid, boundary, len(blocks))),
     )
 
 

@@ -108,6 +108,7 @@ class Shapes:
     `pillars`: obstacles whatever outlines are. `vertices`: all that were read. `left_out`, `mended`: things
     that are no part of the map, with the reason where it needs one, or had to be put right, with what was
     done, and how many there are. `labels`: all of them, as they are compared and as they are written.
+    `robots`, `notes`, `cell`: as of a `ForeignMap`.
     """
 
     where: str
@@ -119,6 +120,9 @@ class Shapes:
     left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
     mended: Counter[tuple[str, str]] = field(default_factory=Counter)
     labels: dict[str, str] = field(default_factory=dict)
+    robots: list[tuple[float, float]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    cell: float | None = None
     _heights: list[Array] = field(default_factory=list)
     _met: list[str] = field(default_factory=list)
 
@@ -135,6 +139,12 @@ class Shapes:
             return True
         self.leave_out("shape", "by the names that were asked for")
         return False
+
+    def add_all(self, figures: Iterable[Figure]) -> None:
+        """Add geometries as `add`, and join the lines that meet."""
+        for figure in figures:
+            self.add(figure)
+        self.join_lines()
 
     def add(self, figure: Figure) -> None:
         """Add a geometry whose coordinates are metres. Raises MapError as `add_outline`."""
@@ -256,10 +266,14 @@ class Shapes:
         rings = shapely.get_rings(shapely.get_parts([outline.area for outline in self.outlines]))
         Crossings(self.where).add([*rings, *(shapely.linestrings(line.points) for line in self.lines)])
 
+    def count(self, vertices: int) -> None:
+        """Count vertices that were read. Raises MapError when there are too many."""
+        self.vertices += vertices
+        files.require_vertices(self.vertices, self.where)
+
     def _checked(self, rings: Sequence[Array], at: str) -> list[Array]:
         """Count the points of rings, and return them to a nanometre: next to nothing is nothing."""
-        self.vertices += sum(map(len, rings))
-        files.require_vertices(self.vertices, self.where)
+        self.count(sum(map(len, rings)))
         for ring in rings:
             good = np.abs(ring) <= FARTHEST  # nan is not good either
             if not good.all():

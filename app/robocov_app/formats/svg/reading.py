@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.errors import MapError, one_line
-from robocov_app.formats.files import MAX_VERTICES, require_shapes
+from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
 from robocov_app.formats.geometry.enclosing import foreign_map
@@ -71,17 +71,11 @@ def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     if options.scale is None:
         _require_size(shapes)
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
-    return foreign_map(
-        shapes,
-        format=IMPORTER.name,
-        name=texts.get("title", "")[:80] or one_line(path.stem)[:60] or "map",
-        description=texts.get("desc", "")[:1000] or "Imported from SVG.",
-        solid=True,
-        notes=[
-            "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m",
-            *drawing.notes(),
-        ],
-    )
+    own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
+    shapes.notes = [own, *drawing.notes()]
+    name = texts.get("title", "")[:80] or name_of_map(path)
+    text = texts.get("desc", "")[:1000] or "Imported from SVG."
+    return foreign_map(shapes, IMPORTER.name, name, text, solid=True)
 
 
 def _page(root: Element, scale: float | None) -> tuple[Array, float, float]:
