@@ -11,11 +11,11 @@ import numpy as np
 
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
-from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, tone
+from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 WIDTH = 1100
 
@@ -55,7 +55,7 @@ def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> Non
     theme = page.theme
     page.text(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
     axes = page.axes((LEFT, top + GAP - 26, WIDTH - LEFT - RIGHT, ROW * len(rows)))
-    _plain(axes, theme)
+    quiet_axes(axes, theme, grid="x")
     axes.set_xscale("log")
     ratios = np.array([cast("float", row.ratio) for row in rows])
     wanted = np.array([row.goal for row in rows if row.goal is not None] + [1.0])
@@ -68,27 +68,16 @@ def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> Non
         axes.plot(ratio, y, "o", color=colour, markersize=6.5)
         if row.goal is not None:
             axes.plot([row.goal] * 2, [y - 0.36, y + 0.36], color=tone(theme.ink), linewidth=2)
-        words = ", ".join(part for part in (row.name, row.case) if part)
+        words = f"{', '.join(filter(None, (row.name, row.case)))}  /  {row.yardstick}"
         middle = top + GAP - 26 + ROW * (place + 0.5)
-        page.text(
-            f"{words}  /  {row.yardstick}", LEFT - 14, middle, points=SMALL, room=LEFT - 38, align="right"
-        )
+        page.text(words, LEFT - 14, middle, points=SMALL, room=LEFT - 38, align="right")
         page.text(f"{ratio:.2f}", WIDTH - RIGHT + 14, middle, points=SMALL, bold=row.met is False)
     axes.set_ylim(-0.5, len(rows) - 0.5)
     axes.set_xlim(low, high)
     ticks = _ticks(low, high)
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=SMALL)
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_yticks([])
     axes.minorticks_off()
-
-
-def _plain(axes: Axes, theme: Theme) -> None:
-    axes.set_facecolor(tone(theme.background))
-    axes.tick_params(colors=tone(theme.ink), length=3)
-    axes.grid(visible=True, color=tone(theme.grid), linewidth=0.6)
-    axes.set_axisbelow(True)
-    for side in ("top", "right", "left", "bottom"):
-        axes.spines[side].set_visible(False)
 
 
 def _ticks(low: float, high: float) -> list[float]:

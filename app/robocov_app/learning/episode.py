@@ -75,10 +75,7 @@ def drawn_episode(
 
     The options: ``map``: a map, its name or path. ``start``: the name of one of its starts. ``start_seed``:
     the seed of the positions, as that of `robocov run`. ``positions``: the positions themselves, (n, 2) m.
-    ``conditions_seed``: the seed of the task's conditions. Other keys mean nothing here. `place`: beside the
-    episodes of others, where these are on the same map.
-
-    Raises InputError when a map cannot be read or a team has no room at its start.
+    ``conditions_seed``: the seed of the task's conditions. `place`: beside others on the same map.
     """
     options = options or {}
     environment = scenarios.draw(rng)
@@ -112,10 +109,7 @@ def drawn_episode(
 
 
 class SharedSimulation:
-    """One simulation for `count` episodes of learning environments on one map, moved on together.
-
-    The task is without conditions, and not recording; in the map nothing moves.
-    """
+    """One simulation for `count` ideal episodes on one map, in which nothing moves, moved on together."""
 
     def __init__(self, task: CoverageTask, environment: Environment, count: int) -> None:
         self.environment, self._task, self._count = environment, task, count
@@ -164,11 +158,8 @@ Place: TypeAlias = "tuple[SharedSimulation, int]"
 class Episode:
     """A team in one map, of which `cost` is the coverage cost, from the start of a run.
 
-    `place` is where the team is moved together with others, which is its `shared` simulation then. `working`,
-    (n,), are the robots that are there and have not failed; `result` and `initial` the coverage cost of these
-    when it was last evaluated and at the beginning; `reference`, m, the unit of rewards; `trail` the
-    positions, (n, 2) m, at each decision so far. Raises StartError when a robot would start in a wall or in
-    another robot; ParameterError when the lattice of the cost is too coarse for the map.
+    `working`, (n,): who is there and has not failed; `result`, `initial`: their cost now and at first;
+    `reference`, m: the unit of rewards; `trail`: positions, (n, 2) m, at each decision so far.
     """
 
     def __init__(
@@ -227,11 +218,7 @@ class Episode:
         return self.task.observation.rows(self.simulation.observe(), self.team, self._scans)
 
     def state(self) -> Rows:
-        """Return what nobody knows in the team: where all are, and how fast, (4 n,) from -1 to 1.
-
-        For each robot its position from the middle of the region's bounding box, in the diagonal of that,
-        and its velocity in its largest speed.
-        """
+        """Return where all are, from the middle in diagonals, and how fast, (4 n,) from -1 to 1."""
         low_x, low_y, high_x, high_y = self.environment.region.bounds
         middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
         where = (self.positions - middle) / self.environment.region.diameter
@@ -248,10 +235,7 @@ class Episode:
         }
 
     def advance(self, actions: Array, *, last: bool = False) -> Outcome:
-        """Hold actions, (n, 2) N or m/s, for the time of one decision; the last one is rewarded in any case.
-
-        Raises ParameterError when they are not finite numbers of that shape; the message names the robot.
-        """
+        """Hold actions, (n, 2) N or m/s, for one decision; the last one is rewarded in any case."""
         keep = self._moments if self.task.recording else None
         contact = held(self.task, self.simulation, checked_actions(actions, len(self.team)), keep)
         self.working = self.simulation.working[self._rows]

@@ -16,13 +16,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from robocov.arrays import Array
-from robocov_app.learning.episode import (
-    Outcome,
-    Place,
-    SharedSimulation,
-    checked_actions,
-    drawn_episode,
-)
+from robocov_app.learning.episode import Outcome, Place, SharedSimulation, checked_actions, drawn_episode
 from robocov_app.learning.layout import Rows
 from robocov_app.learning.pictures import METADATA, EpisodeEnv
 from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
@@ -44,17 +38,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
 
     The `changes` are of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``; for `render_mode`,
     `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`. Several environments may share the
-    `scenarios` of their task.
-
-    Attributes
-    ----------
-    task : CoverageTask
-    episode : Episode or None
-        The present one; None before the first ``reset``.
-    place : Place or None
-        Where its team is moved together with those of other environments; see `CoverageVectorEnv`.
-    outcome : Outcome or None
-        Of the next action, where it was carried out together with others.
+    `scenarios` of their task; `place` and `outcome` are `CoverageVectorEnv`'s.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
@@ -92,10 +76,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         return self._rows(), {**info, "map": self.episode.environment.name}
 
     def step(self, action: Any) -> tuple[Rows, float, bool, bool, dict[str, Any]]:
-        """Let the team act, and return observation, reward, termination, truncation and info.
-
-        Raises ParameterError when the action is not finite numbers of shape (n, 2).
-        """
+        """Let the team act, and return observation, reward, termination, truncation and info."""
         episode = self._present()
         outcome, self.outcome = self.outcome or episode.advance(action), None
         self._show()
@@ -146,10 +127,7 @@ class CoverageVectorEnv(SyncVectorEnv):
                 env.place = self._shared, run
 
     def step(self, actions: Any) -> Any:
-        """Let all teams act, and return observations, rewards, terminations, truncations and infos.
-
-        Raises ParameterError when the actions are not finite numbers of shape (num_envs, n, 2).
-        """
+        """Let all teams act, and return observations, rewards, terminations, truncations and infos."""
         begun_now = self._autoreset_envs & (self.autoreset_mode == AutoresetMode.NEXT_STEP)
         values, together = np.zeros((self.num_envs, self.task.robots, 2)), {}
         for run, (env, action) in enumerate(zip(self._teams, actions, strict=True)):

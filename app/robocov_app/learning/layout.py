@@ -96,10 +96,7 @@ class ObservationLayout:
         return low, np.ones(self.size, dtype=np.float32)
 
     def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
-        """Return what each robot is told, (n, size), with the latest scans, by default those of `seen`.
-
-        Raises ParameterError when rays are wanted and there is no scan of so many.
-        """
+        """Return what each robot is told, (n, size), with the latest scans, by default those of `seen`."""
         n, unit = len(seen.positions), seen.region.diameter
         reach = sensing_unit(team, seen.region)[:, None]
         places, rows = self.blocks, np.zeros((n, self.size))

@@ -90,10 +90,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         return self._observations(self.agents), infos
 
     def step(self, actions: Mapping[str, Any]) -> Step:
-        """Let every robot act, and return observations, rewards, terminations, truncations and infos.
-
-        Raises ParameterError when a robot has no action, or one that is not two finite numbers.
-        """
+        """Let every robot act, and return observations, rewards, terminations, truncations and infos."""
         episode = self._present()
         values = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):

@@ -218,41 +218,10 @@ MOST_ROBOTS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class CoverageTask:
-    """All that makes a learning environment, for one learner or many.
+    """All that makes a learning environment, for one learner or many; all in SI units.
 
-    Attributes
-    ----------
-    maps : map, its name or path, or a function from a seed to one; or a sequence of these
-        With several, one is drawn for each episode, each as likely; a function, such as `GeneratedMaps`,
-        is given a new seed each time.
-    start : str or None
-        A named start of the maps; None for each map's first, ``"*"`` for any of its starts.
-    robots : int
-    team : Team or None
-        Limits and ranges of the robots; None for `Team.homogeneous(robots)`. Its size goes before `robots`.
-    duration : float, s
-        After that an episode is truncated. It never ends by itself.
-    dt : float, s
-        Control period of the physics.
-    repeat : int
-        So many control periods long an action is held: 6 of 1/60 s are 10 decisions a second.
-    action : {"force", "velocity"}
-        See `robocov_app.learning.task`.
-    reward : {"shared", "own", "level"}
-        See `robocov_app.learning.task.shares`; in units of `reference_distance`, with all robots and the
-        whole area that they can come to.
-    contact_penalty : float
-        What a second in contact with a wall or another robot costs a robot.
-    lattice : int
-        Of the coverage cost that is rewarded: exact distances, from few sites.
-    reward_every : int
-        The cost is evaluated, and rewarded, after every so many actions and after the last one: it takes
-        about as long as ten control periods of six robots.
-    observation : ObservationLayout
-    conditions : Conditions or None
-        Noise, loss of messages, robots that fail or join. Their seed is drawn anew for each episode.
-    recording : bool
-        Keep what `Episode.record` needs: some 2 MB a minute for six robots.
+    With several `maps` one is drawn for each episode, each as likely; a function, such as `GeneratedMaps`, is
+    given a new seed each time. The exact cost takes about as long as ten control periods of six robots.
 
     Raises ParameterError when a value is out of range.
 
@@ -264,20 +233,20 @@ class CoverageTask:
     """
 
     maps: MapSource | Sequence[MapSource] = "rooms"
-    start: str | None = None
+    start: str | None = None  # None: each map's first; "*": any of its starts
     robots: int = 6
-    team: Team | None = None
-    duration: float = 60.0
-    dt: float = DEFAULT_DT
-    repeat: int = 6
-    action: Action = "force"
-    reward: Reward = "shared"
-    contact_penalty: float = 0.1
-    lattice: int = 32
-    reward_every: int = 1
+    team: Team | None = None  # None: equal robots; its size goes before `robots`
+    duration: float = 60.0  # s, after which an episode is truncated
+    dt: float = DEFAULT_DT  # control period of the physics, s
+    repeat: int = 6  # so many control periods long an action is held
+    action: Action = "force"  # N, or "velocity", m/s
+    reward: Reward = "shared"  # see `shares`; in units of `reference_distance` of the whole team
+    contact_penalty: float = 0.1  # for each second in contact with a wall or another robot
+    lattice: int = 32  # of the coverage cost that is rewarded: exact distances, from few sites
+    reward_every: int = 1  # after so many actions, and the last, the cost is evaluated and rewarded
     observation: ObservationLayout = field(default_factory=ObservationLayout)
-    conditions: Conditions | None = None
-    recording: bool = False
+    conditions: Conditions | None = None  # their seed is drawn anew for each episode
+    recording: bool = False  # keep what `Episode.record` needs: some 2 MB a minute for six robots
 
     def __post_init__(self) -> None:
         check_dt(self.dt)
