@@ -24,25 +24,14 @@ from robocov.errors import MapError, OutputError
 from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
 
-FOLDER = "ROBOCOV_DRAFTS"
-"""Environment variable with another folder to keep work in; empty for none."""
+FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
 
 _FILE = "draft.json"
-
-_PAUSE = 0.25
-"""Seconds between two writings."""
-
-_SHARE = 10.0
-"""The pause is at least so many times as long as the last writing took: large work does not stutter."""
-
-_PATIENCE = 2.0
-"""Seconds until it is tried again when work could not be written."""
-
-_TRIES = 3
-"""Folders that are tried to work in."""
-
-_YOUNG = 60.0
-"""Seconds in which a folder without work may be one that a program is just making."""
+_PAUSE = 0.25  # seconds between two writings
+_SHARE = 10.0  # times as long as the last writing took: large work does not stutter
+_PATIENCE = 2.0  # seconds until it is tried again when work could not be written
+_TRIES = 3  # folders that are tried to work in
+_YOUNG = 60.0  # seconds in which a folder without work may be one that a program is just making
 
 _Found = TypeVar("_Found")
 _Content = Callable[[], Mapping[str, Any]]
@@ -50,31 +39,25 @@ _Content = Callable[[], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class Record:
-    """What the folder of a document holds.
-
-    `path`: the file that the document belongs to; None if it never had one. `when`: local time of writing.
-    `content`: the work, as `Autosaver.keep` was given it; without it where everything was saved.
-    """
+    """What the folder of a document holds."""
 
     folder: Path
-    path: Path | None
-    when: datetime
-    content: Mapping[str, Any]
+    path: Path | None  # the document's file; None if it never had one
+    when: datetime  # of writing, in local time
+    content: Mapping[str, Any]  # the work, as `Autosaver.keep` was given it; empty where all was saved
 
 
 class Autosaver:
     """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk.
 
-    `folder`: `autosave_folder()`; None keeps nothing. `kind`: the format that its records name, such as
-    ``robocov-draft``. `path`: the document's file. `resumed`: the folder of a record whose work goes on;
-    OutputError when another program has taken it over.
+    Without a `folder` it keeps nothing. `kind` is the format that records name, `resumed` the folder of one
+    whose work goes on; OutputError when another program has taken it over.
     """
 
     def __init__(
         self, folder: Path | None, kind: str, path: Path | None = None, resumed: Path | None = None
     ) -> None:
-        self.trouble = ""
-        """Why work cannot be kept, in words; empty if it can."""
+        self.trouble = ""  # why work cannot be kept, in words
         self._kind, self._path = kind, path
         self._lock = ExitStack()
         self._changed = threading.Condition()
@@ -137,9 +120,9 @@ class Autosaver:
             except (OSError, OutputError) as error:
                 # perhaps another program looks for what was left behind in just this moment
                 self.trouble = f"work is not kept aside: {error}"
-            else:
-                self.trouble = ""
-                return place
+                continue
+            self.trouble = ""
+            return place
         return None
 
     def _want(self, content: _Content | None) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import pygame
 
@@ -26,51 +27,28 @@ from robocov.errors import InputError, unknown_name
 from robocov_app.toolkit.input import key_of, key_words
 
 
-def _always() -> str:
-    return ""
-
-
-def _nothing() -> Iterable[str]:
-    return ()
-
-
-def _as_typed(text: str) -> object:
-    return text
-
-
 @dataclass(frozen=True)
 class Takes:
-    """What is typed after a command's name.
+    """What is typed after a command's name."""
 
-    `name`: what it is, for the palette: ``number of robots``. `read`: makes a value of what was typed, or
-    raises an InputError. `options`: returns the words that can be typed, if they can be listed.
-    """
-
-    name: str
-    read: Callable[[str], object] = _as_typed
-    options: Callable[[], Iterable[str]] = _nothing
+    name: str  # for the palette: "number of robots"
+    read: Callable[[str], object] = str  # makes a value of what was typed; InputError
+    options: Callable[[], Iterable[str]] = tuple  # the words that can be typed, if they can be listed
 
 
 @dataclass(frozen=True)
 class Command:
-    """Something that can be done in a window.
+    """Something that can be done in a window."""
 
-    `name`: unique; what is typed where it takes something, ``kind:what`` otherwise. `title`, `group`: what
-    people read, and under which heading. `run`: does it; called with what was typed where it takes something.
-    Returned words are told. `keys`: as ``ctrl+shift+z``; the last part is what pygame calls the key. `when`:
-    returns why it cannot be done now, an empty text where it can. `repeats`: whether it is done again and
-    again while its key is held down. `hidden`: left out of palette and help.
-    """
-
-    name: str
+    name: str  # unique; what is typed where it takes something, "kind:what" otherwise
     title: str
-    group: str
-    run: Callable[..., object]
-    keys: tuple[str, ...] = ()
-    when: Callable[[], str] = _always
+    group: str  # the heading under which people read of it
+    run: Callable[..., object]  # called with what was typed where it takes something; returned words are told
+    keys: tuple[str, ...] = ()  # as "ctrl+shift+z"; the last part is what pygame calls the key
+    when: Callable[[], str] = str  # returns why it cannot be done now, an empty text where it can
     takes: Takes | None = None
-    repeats: bool = False
-    hidden: bool = False
+    repeats: bool = False  # whether it is done again and again while its key is held down
+    hidden: bool = False  # left out of palette and help
 
     @property
     def tip(self) -> str:
@@ -81,24 +59,20 @@ class Command:
 
 @dataclass(frozen=True)
 class Offer:
-    """A line of the palette.
-
-    `text`, `aside`: what it says, and its keys or what it takes. `fills`: what completion makes of what was
-    typed. `call`: does it; None where more is to be typed first. `why`: why it cannot be done now.
-    """
+    """A line of the palette."""
 
     text: str
-    aside: str
-    fills: str
-    call: Callable[[], object] | None
-    why: str = ""
+    aside: str  # its keys, or what it takes
+    fills: str  # what completion makes of what was typed
+    call: Callable[[], object] | None  # does it; None where more is to be typed first
+    why: str = ""  # it cannot be done now
 
 
 class Commands:
     """The list of a window's commands.
 
-    `attempt`: calls what it is given, and tells returned words or the error. `more`: returns commands that
-    come and go, such as the gains of the controller in use.
+    `attempt` calls what it is given, and tells returned words or the error; `more` returns commands that come
+    and go, such as the gains of the controller in use.
     """
 
     def __init__(
@@ -123,13 +97,8 @@ class Commands:
         """Do a command, or tell why it cannot be done."""
         self._do(self._named[name])
 
-    def _do(self, command: Command, *given: object) -> None:
-        def done() -> object:
-            if why := command.when():
-                raise InputError(why)
-            return command.run(*given)
-
-        self._attempt(done)
+    def _do(self, command: Command) -> None:
+        self._attempt(lambda: _done(command))
 
     # keys
 
@@ -173,42 +142,42 @@ class Commands:
         known = self._typable()
         if word not in known:
             raise InputError(unknown_name("command", word, list(known)))
-        command = known[word]
-        if why := command.when():
-            raise InputError(why)
-        assert command.takes is not None
-        return command.run(command.takes.read(rest))
+        return _done(known[word], rest)
 
     def offered(self, text: str, most: int = 9) -> list[Offer]:
         """Return what the palette lists for a text: commands, or completions of what one takes."""
         word, rest = parted(text)
         command = self._typable().get(word)
-        if command is not None and (rest or text.rstrip() != text):
-            return self._completions(command, rest, text)[:most]
-        commands = [
-            each for each in [*self.listed, *(self._more() if text.strip() else ())] if not each.hidden
-        ]
-        return [self._offer(each) for each in matching(commands, text)[:most]]
+        if command is not None and command.takes is not None and (rest or text.rstrip() != text):
+            return self._completions(command, command.takes, rest, text)[:most]
+        commands = [*self.listed, *(self._more() if text.strip() else ())]
+        found = matching([each for each in commands if not each.hidden], text)
+        return [self._offer(each) for each in found[:most]]
 
-    def _completions(self, command: Command, rest: str, text: str) -> list[Offer]:
-        assert command.takes is not None
-        options = list(command.takes.options())
-        begun = [each for each in options if each.lower().startswith(rest.lower())]
-        begun += [each for each in options if rest.lower() in each.lower() and each not in begun]
+    def _completions(self, command: Command, takes: Takes, rest: str, text: str) -> list[Offer]:
+        options, low, why = list(takes.options()), rest.lower(), command.when()
+        begun = [each for each in options if each.lower().startswith(low)]
+        begun += [each for each in options if low in each.lower() and each not in begun]
+        found = []
         if rest in options or not begun:
-            whole = Offer(text.strip(), command.takes.name, text, lambda: self.typed(text), command.when())
-            return [whole, *(self._completed(command, each) for each in begun if each != rest)]
-        return [self._completed(command, each) for each in begun]
-
-    def _completed(self, command: Command, option: str) -> Offer:
-        whole = f"{command.name} {option}"
-        return Offer(whole, "", whole, lambda: self.typed(whole), command.when())
+            found.append(Offer(text.strip(), takes.name, text, lambda: self.typed(text), why))
+        for option in begun:
+            if option != rest:
+                whole = f"{command.name} {option}"
+                found.append(Offer(whole, "", whole, partial(self.typed, whole), why))
+        return found
 
     def _offer(self, command: Command) -> Offer:
         if command.takes is not None:
             return Offer(command.title, f"{command.name} …", f"{command.name} ", None, command.when())
         keys = " or ".join(key_words(key) for key in command.keys[:2])
         return Offer(command.title, keys, command.title, lambda: self._do(command), command.when())
+
+
+def _done(command: Command, *typed: str) -> object:
+    if why := command.when():
+        raise InputError(why)
+    return command.run(*(command.takes.read(text) for text in typed if command.takes is not None))
 
 
 def parted(text: str) -> tuple[str, str]:

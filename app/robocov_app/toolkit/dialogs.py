@@ -12,50 +12,49 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from typing import Protocol
 
 import pygame
 
 from robocov.errors import InputError, RobocovError
-from robocov_app.render.fonts import label
+from robocov_app.render.fonts import text_width
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.overlay import card, dim, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import TEXT, Ui
 
-MOST_LISTED = 5000
-"""Names of a folder that are looked at."""
-
-ROWS = 9
-"""Lines of a list that are in sight."""
-
-_NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
+MOST_LISTED = 5000  # names of a folder that are looked at
+ROWS = 9  # lines of a list that are in sight
 _MOST_LINES = 14
 _MARGIN = 20.0
 
+_NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 
-class Dialog(Protocol):
+
+class Dialog(ABC):
     """Something that is asked, in a card over the window."""
 
-    width: float
-    done: bool
+    width = 560.0
+    done = False
 
+    @abstractmethod
     def page(self, ui: Ui) -> None:
         """Show it."""
 
+    @abstractmethod
     def key(self, name: str, ui: Ui) -> bool:
         """Take a key; return whether it meant something."""
 
-    def wheel(self, notches: float) -> None:
+    def wheel(self, notches: float) -> None:  # noqa: B027 - most have nothing to scroll
         """Take a turn of the wheel."""
 
-    def cancelled(self) -> None:
+    def cancelled(self) -> None:  # noqa: B027 - most need not know
         """Take note that it was given up."""
 
 
@@ -69,16 +68,14 @@ class Answer:
 
 
 @dataclass
-class Question:
+class Question(Dialog):
     """A question with answers as buttons; the first is chosen by Enter, `on_cancel` done by Escape."""
 
     title: str
     words: str
     answers: Sequence[Answer]
     on_cancel: Callable[[], object] = lambda: None
-    width: float = 560.0
     chosen: int = 0
-    done: bool = False
 
     def page(self, ui: Ui) -> None:
         """Show title, words and buttons."""
@@ -93,10 +90,7 @@ class Question:
         if len(lines) > _MOST_LINES:
             ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, colour=ui.theme.faint)
         ui.space(12)
-        widths = [
-            label(each.text, ui.px(TEXT), (0, 0, 0), True).get_width() / ui.scale + 36
-            for each in self.answers
-        ]
+        widths = [text_width(each.text, ui.px(TEXT), True) / ui.scale + 36 for each in self.answers]
         room = ui.wide - sum(widths) - 8 * len(widths)
         ui.row(max(room, 1.0), *widths, height=30, gap=8, below=0)
         ui.cell()
@@ -120,9 +114,6 @@ class Question:
             self._give(own)
         return True
 
-    def wheel(self, notches: float) -> None:
-        """Do nothing."""
-
     def cancelled(self) -> None:
         """Do what Escape does."""
         self.on_cancel()
@@ -130,37 +121,35 @@ class Question:
 
 @dataclass(frozen=True)
 class Option:
-    """A line to choose: its words, what stands at its right end, what completion makes of it."""
+    """A line to choose."""
 
     text: str
-    aside: str = ""
-    fills: str = ""
-    why: str = ""
+    aside: str = ""  # at its right end
+    fills: str = ""  # what completion makes of it
+    why: str = ""  # it cannot be chosen
     value: object = None
 
 
 @dataclass
-class Choice:
+class Choice(Dialog):
     """A list that typing narrows down.
 
-    `options`: returns the lines for what is typed. `accept`: called with what is typed and the chosen line,
-    None where there is none; an error it raises is told below the field, and nothing typed is lost. What it
-    returns is typed in place, if it is a text. `ghost`, `hint`: in the empty field, and at the foot.
+    `accept` is called with what is typed and the chosen line, None where there is none; an error it raises is
+    told below the field, and nothing typed is lost. What it returns is typed in place, if it is a text.
     """
 
+    width = 620.0
+
     title: str
-    options: Callable[[str], Sequence[Option]]
+    options: Callable[[str], Sequence[Option]]  # the lines for what is typed
     accept: Callable[[str, Option | None], object]
-    ghost: str = ""
+    ghost: str = ""  # in the empty field
     hint: str = "↑ ↓ choose · Enter does it · Esc closes"
     none: str = "nothing of that name"
     text: str = ""
-    width: float = 620.0
     chosen: int = 0
     top: int = 0
     trouble: str = ""
-    done: bool = False
-    _moved: bool = field(default=False, repr=False)
 
     def page(self, ui: Ui) -> None:
         """Show the field and the lines below it."""
@@ -188,7 +177,10 @@ class Choice:
     def typed(self, ui: Ui) -> None:
         """Take note of what the field holds: letters and Enter may come within one frame."""
         if ui.focus == "text" and ui.edit is not None and ui.edit.text != self.text:
-            self.text, self.chosen, self.top, self.trouble = ui.edit.text, 0, 0, ""
+            self._begin(ui.edit.text)
+
+    def _begin(self, text: str) -> None:
+        self.text, self.chosen, self.top, self.trouble = text, 0, 0, ""
 
     def _accept(self, option: Option | None, ui: Ui) -> None:
         try:
@@ -202,7 +194,7 @@ class Choice:
             self.done = True
 
     def _fill(self, text: str, ui: Ui) -> None:
-        self.text, self.chosen, self.top, self.trouble = text, 0, 0, ""
+        self._begin(text)
         ui.edit = TextEdit(text, len(text), len(text))
 
     def key(self, name: str, ui: Ui) -> bool:
@@ -228,9 +220,6 @@ class Choice:
         self.chosen = max(self.chosen - round(notches), 0)
         self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
 
-    def cancelled(self) -> None:
-        """Do nothing."""
-
 
 def list_choice(
     title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
@@ -238,10 +227,11 @@ def list_choice(
     """Return a choice of one of some lines: those that hold all words typed."""
 
     def found(typed: str) -> list[Option]:
-        words = typed.lower().split()
-        return [
-            each for each in options() if all(word in f"{each.text} {each.aside}".lower() for word in words)
-        ]
+        words, lines = (
+            typed.lower().split(),
+            [(each, f"{each.text} {each.aside}".lower()) for each in options()],
+        )
+        return [each for each, line in lines if all(word in line for word in words)]
 
     def chosen(typed: str, option: Option | None) -> None:
         if option is None:
@@ -274,21 +264,16 @@ def file_choice(
         before, slash, begun = typed.rpartition("/")
         place, prefix = path_of(before + slash), before + slash
         try:
-            there = sorted(
-                islice(place.iterdir(), MOST_LISTED), key=lambda each: (not each.is_dir(), each.name.lower())
-            )
+            there = [(not each.is_dir(), each) for each in islice(place.iterdir(), MOST_LISTED)]
         except (OSError, ValueError):
             return []
         found = [Option(str(each), "recent", str(each), value=each) for each in recent if not typed]
-        for each in there:
+        for is_file, each in sorted(there, key=lambda pair: (pair[0], pair[1].name.lower())):
             hidden = each.name.startswith(".") and not begun.startswith(".")
-            fits = begun.lower() in each.name.lower()
-            if hidden or not fits or not (each.is_dir() or not endings or each.suffix.lower() in endings):
-                continue
-            slash = "/" if each.is_dir() else ""
-            found.append(
-                Option(each.name + slash, "folder" if slash else "", prefix + each.name + slash, value=each)
-            )
+            wanted = not (is_file and endings) or each.suffix.lower() in endings
+            if wanted and not hidden and begun.lower() in each.name.lower():
+                name, kind = (each.name, "") if is_file else (f"{each.name}/", "folder")
+                found.append(Option(name, kind, prefix + name, value=each))
         if not begun:
             found.append(Option("../", "folder", f"{place.resolve().parent.as_posix().rstrip('/')}/"))
         return found
@@ -317,7 +302,7 @@ class Dialogs:
         self._ui: Ui | None = None
         self._high = 0.0
         self._swallow = ""
-        self._drawn = False
+        self._drawn = False  # whether it was, since it is asked
 
     @property
     def open(self) -> bool:
@@ -326,8 +311,7 @@ class Dialogs:
 
     def ask(self, dialog: Dialog) -> None:
         """Ask something."""
-        self.asked, self._ui, self._swallow = dialog, None, ""
-        self._drawn = False
+        self.asked, self._ui, self._swallow, self._drawn = dialog, None, "", False
 
     def swallow(self, letter: str) -> None:
         """Take note that the letter of the key that has opened it is still to come, and not meant for it."""

@@ -6,17 +6,10 @@ from contextlib import suppress
 
 import pygame
 
-KEY_REPEAT = (350, 40)
-"""Milliseconds after which a key that is held down is pressed again, the first time and from then on."""
-
-DOUBLE = 0.35
-"""Seconds between the two clicks of a double click, at most."""
-
-SLIP = 5.0
-"""Pixels that a click may move."""
-
-WHEEL = 1.15
-"""Magnification of one notch of the wheel."""
+KEY_REPEAT = (350, 40)  # milliseconds until a held key is pressed again, the first time and from then on
+DOUBLE = 0.35  # seconds between the two clicks of a double click, at most
+SLIP = 5.0  # pixels that a click may move
+WHEEL = 1.15  # magnification of one notch of the wheel
 
 OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
 """Types of events that the mouse makes."""
@@ -27,14 +20,9 @@ def key_of(event: pygame.event.Event) -> str:
     name = pygame.key.name(event.key)
     if name.startswith("[") and name.endswith("]") and len(name) > 2:
         name = name[1:-1]  # of the key pad
-    parts = []
-    if event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META):
-        parts.append("ctrl")
-    if event.mod & pygame.KMOD_ALT:
-        parts.append("alt")
-    if event.mod & pygame.KMOD_SHIFT:
-        parts.append("shift")
-    return "+".join([*parts, name])
+    ctrl = pygame.KMOD_CTRL | pygame.KMOD_META
+    modifiers = {"ctrl": ctrl, "alt": pygame.KMOD_ALT, "shift": pygame.KMOD_SHIFT}
+    return "+".join([*(held for held, mask in modifiers.items() if event.mod & mask), name])
 
 
 def key_words(key: str) -> str:

@@ -6,13 +6,12 @@ import os
 from pathlib import Path
 from typing import TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
 from robocov.errors import OutputError
 from robocov.files.atomic import written
 
-FOLDER = "ROBOCOV_SETTINGS"
-"""Environment variable with another folder for the settings; empty for none."""
+FOLDER = "ROBOCOV_SETTINGS"  # environment variable with another folder for the settings; empty for none
 
 Kept = TypeVar("Kept", bound=BaseModel)
 
@@ -29,14 +28,14 @@ def settings_file(name: str = "window.json") -> Path | None:
 
 def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
     """Return settings of a kind, and what to tell if they could not be read: the defaults are used then."""
-    if file is None:
-        return kind(), ""
     try:
-        return kind.model_validate_json(file.read_bytes()), ""
+        if file is not None:
+            return kind.model_validate_json(file.read_bytes()), ""
     except FileNotFoundError:
-        return kind(), ""
-    except (OSError, ValidationError, ValueError):
+        pass
+    except (OSError, ValueError):
         return kind(), f"{file} could not be read: default settings"
+    return kind(), ""
 
 
 def changed_settings(before: Kept, opened: Kept, closed: Kept) -> Kept:

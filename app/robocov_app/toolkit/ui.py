@@ -44,24 +44,16 @@ from robocov_app.toolkit.input import DOUBLE, key_of, wheel_notches
 from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 
-TEXT = 12.0
-"""Size of a widget's text."""
-
-SMALL = 11.0
-"""Size of the text of small buttons, headings and units."""
-
-BAR = 10.0
-"""Width of a scroll bar."""
-
-LONGEST_LIST = 268.0
-"""Greatest height of an open list."""
-
+# pixels at scale 1
+TEXT = 12.0  # a widget's text
+SMALL = 11.0  # the text of small buttons, headings and units
+BAR = 10.0  # width of a scroll bar
+LONGEST_LIST = 268.0  # greatest height of an open list
 LIST_ROW = 24.0
-TIP_AFTER = 0.6
-"""Seconds for which the mouse rests before a tool tip appears."""
-
 _KNOB, _TALLEST = 12.0, 32.0  # a slider's knob, a button in a row that is higher
 _NOTCH = 40.0
+
+TIP_AFTER = 0.6  # seconds for which the mouse rests before a tool tip appears
 _ENTER = ("return", "enter")
 
 
@@ -76,6 +68,10 @@ class Shown:
     value: object = None
     tip: str = ""
     enabled: bool = True
+
+
+def _is_function_key(name: str) -> bool:
+    return name[:1] == "f" and name[1:].isdigit()
 
 
 @dataclass
@@ -112,27 +108,22 @@ class _List:
 
 
 class Ui:
-    """Runs a page in a box of the window.
-
-    `box`: where the page is, px. `stale`: whether what was drawn is not what there is any more; otherwise
-    `draw` copies its last picture. `shown`: the widgets of the last run. `surface`: what a page may draw on
-    in its cells; None while it runs for an event.
-    """
+    """Runs a page in a box of the window."""
 
     def __init__(self, page: Callable[[Ui], None], theme: Theme, scale: float = 1.0) -> None:
         self.page, self.theme, self.scale = page, theme, scale
-        self.box = pygame.Rect(0, 0, 1, 1)
+        self.box = pygame.Rect(0, 0, 1, 1)  # where the page is, px
         self.background: Colour | None = theme.panel
-        self.stale = True
+        self.stale = True  # whether what was drawn is not what there is any more
         self.at = (-1, -1)
         self.focus: str | None = None
         self.active: str | None = None
         self.edit: TextEdit | None = None
-        self.shown: dict[str, Shown] = {}
+        self.shown: dict[str, Shown] = {}  # the widgets of the last run
         self.open_list: _List | None = None
         self._open_key = ""
         self._event: pygame.event.Event | None = None
-        self.surface: pygame.Surface | None = None
+        self.surface: pygame.Surface | None = None  # to draw on in cells; None in a run for an event
         self._picture: pygame.Surface | None = None
         self._folded: set[str] = set()
         self._scrolled: dict[str, float] = {}
@@ -168,10 +159,9 @@ class Ui:
 
     def take(self, event: pygame.event.Event) -> bool:
         """Give an event to the widgets; return whether it was meant for one of them."""
-        kind = event.type
+        kind, held = event.type, self.active
         if kind in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
             self.at = event.pos
-        held = self.active
         if kind == pygame.MOUSEMOTION:
             return self._moved(event)
         if kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
@@ -186,8 +176,10 @@ class Ui:
             return self._letters(event)
         if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
             return False
-        if kind == pygame.MOUSEBUTTONDOWN:
-            self._leave_unless(event.pos)
+        if kind == pygame.MOUSEBUTTONDOWN and self.focus is not None:
+            pressed = [each.key for each in self.shown.values() if each.rect.collidepoint(event.pos)]
+            if self.focus not in pressed:
+                self.stop_typing()
         self.stale = True
         self.run(event, None)
         if kind == pygame.MOUSEBUTTONUP:
@@ -210,24 +202,17 @@ class Ui:
         if self.open_list is None and self.box.collidepoint(self.at):
             yield from (each for each in self.shown.values() if each.rect.collidepoint(self.at))
 
-    def _leave_unless(self, pixel: tuple[int, int]) -> None:
-        """Give the focus up when something else than its widget is pressed."""
-        there = next((each for each in self.shown.values() if each.key == self.focus), None)
-        if self.focus is not None and (there is None or not there.rect.collidepoint(pixel)):
-            self.stop_typing()
-
     def _key_is_ours(self, name: str) -> bool:
         if self.focus is None:
             return False
         if name in ("tab", "shift+tab"):
             self.move_focus(-1 if "shift" in name else 1)
-            self.stale = True
             return True
         if name == "escape":
             self.stop_typing()
             return True
         if self.edit is not None:
-            return not (len(name) in (2, 3) and name[0] == "f" and name[1:].isdigit())
+            return not _is_function_key(name)
         return name in (*_ENTER, "space", "left", "right", "up", "down")
 
     def _letters(self, event: pygame.event.Event) -> bool:
@@ -285,7 +270,7 @@ class Ui:
             box.bottom = tipped.rect.top - self.px(5)
         box.clamp_ip(screen.get_rect())
         fill = mix(theme.panel, theme.ink, 0.92 if theme is LIGHT else 0.2)
-        rounded(screen, box, fill, mix(theme.panel, theme.ink, 0.24), self.px(4))
+        rounded(screen, box, fill, self._shade(0.24), self.px(4))
         for k, line in enumerate(lines):
             picture = label(line, size, (245, 247, 250))
             screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
@@ -433,85 +418,94 @@ class Ui:
         if event is not None and event.type == pygame.MOUSEWHEEL and rect.collidepoint(self.at):
             top -= wheel_notches(event) * _NOTCH
             self._event = None
-        elif self._pressed(track):
-            self.active, self._event = name, None
-            inside = knob.collidepoint(self.at)
-            self._grabbed = self.at[1] - knob.top if inside else knob.height / 2
+        elif (pressed := self._pressed(track)) or (self.active == name and self._is(pygame.MOUSEMOTION)):
+            inside = pressed and knob.collidepoint(self.at)
+            if pressed:
+                self.active, self._event = name, None
+                self._grabbed = self.at[1] - knob.top if inside else knob.height / 2
             if not inside:
                 top = (self.at[1] - self._grabbed - track.top) / free * (needed - room)
-        elif self.active == name and event is not None and event.type == pygame.MOUSEMOTION:
-            top = (self.at[1] - self._grabbed - track.top) / free * (needed - room)
         top = self._scrolled[key] = min(max(top, 0.0), needed - room)
         self.shown[name] = Shown("bar", key, knob, value=top)
-        if self.surface is not None:
-            strength = 0.55 if self.active == name else 0.45 if self._hovers(track) else 0.3
-            fill = mix(self.theme.panel, self.theme.ink, strength)
-            rounded(self.surface, knob.inflate(-self.px(4), -self.px(2)), fill, fill, self.px(BAR / 2))
+        fill = self._shade(0.55 if self.active == name else 0.45 if self._hovers(track) else 0.3)
+        self._round(knob.inflate(-self.px(4), -self.px(2)), fill, radius=BAR / 2)
         return top
 
     # what widgets share
 
-    def _visible(self, rect: pygame.Rect) -> bool:
-        return bool(rect.colliderect(self._clip))
+    def _shade(self, part: float) -> Colour:
+        """Return the panel's colour with a part of the ink's."""
+        return mix(self.theme.panel, self.theme.ink, part)
+
+    def _draws(self, rect: pygame.Rect) -> bool:
+        return self.surface is not None and bool(rect.colliderect(self._clip))
 
     def _hovers(self, rect: pygame.Rect) -> bool:
         free = self.open_list is None and self.active is None
         return free and rect.collidepoint(self.at) and self._clip.collidepoint(self.at)
 
-    def _pressed(self, rect: pygame.Rect) -> bool:
-        event = self._event
-        return event is not None and event.type == pygame.MOUSEBUTTONDOWN and self._hovers(rect)
+    def _is(self, kind: int) -> bool:
+        """Return whether this is a run for an event of a kind."""
+        return self._event is not None and self._event.type == kind
 
-    def _noted(
-        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str, why: str
+    def _pressed(self, rect: pygame.Rect) -> bool:
+        return self._is(pygame.MOUSEBUTTONDOWN) and self._hovers(rect)
+
+    def _key(self, key: str) -> str:
+        """Return the name of the key that is pressed for a widget; empty if none is."""
+        event = self._event
+        for_it = event is not None and event.type == pygame.KEYDOWN and self.focus == key
+        return key_of(event) if event is not None and for_it else ""
+
+    def _note(
+        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str = "", why: str = ""
     ) -> None:
         tip = f"{tip}: {why}" if tip and why else tip or why
         self.shown[f"{kind}:{key}"] = Shown(kind, key, rect.clip(self._clip), text, value, tip, not why)
 
-    def _clicks(self, key: str, rect: pygame.Rect, why: str) -> bool:
-        """Return whether a widget was clicked in this run, or pressed by a key."""
+    def _clicks(
+        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str = "", why: str = ""
+    ) -> bool:
+        """Show a widget; return whether it was clicked in this run, or pressed by a key."""
+        self._note(kind, key, rect, text, value, tip, why)
         if why:
             return False
         self._order.append(key)
-        event = self._event
         if self._pressed(rect):
             self.active, self._event = key, None
-        elif event is not None and event.type == pygame.MOUSEBUTTONUP and self.active == key:
+        elif self._is(pygame.MOUSEBUTTONUP) and self.active == key:
             self._event = self.active = None
             return rect.collidepoint(self.at) and self._clip.collidepoint(self.at)
-        elif event is not None and event.type == pygame.KEYDOWN and self.focus == key:
-            if key_of(event) not in (*_ENTER, "space"):
-                return False
+        elif self._key(key) in (*_ENTER, "space"):
             self._event = None
             return True
         return False
 
+    def _round(
+        self, rect: pygame.Rect, fill: Colour, edge: Colour | None = None, radius: float = 4, width: int = 1
+    ) -> None:
+        if self.surface is not None:
+            rounded(self.surface, rect, fill, edge or fill, self.px(radius), width)
+
     def _face(self, rect: pygame.Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
         """Draw the box of something to press; return the colour of what is on it."""
-        theme = self.theme
-        field, line = field_colour(theme), mix(theme.panel, theme.ink, 0.24)
-        hovered, held = self._hovers(rect), self.active == key and rect.collidepoint(self.at)
-        ink = theme.ink
+        theme, hovered = self.theme, self._hovers(rect)
+        held = self.active == key and rect.collidepoint(self.at)
         if why:
-            fill, edge, ink = (
-                theme.panel,
-                mix(theme.panel, theme.ink, 0.14),
-                mix(theme.panel, theme.ink, 0.45),
-            )
+            fill, edge, ink = theme.panel, self._shade(0.14), self._shade(0.45)
         elif chosen:
             fill = mix(theme.final, theme.ink, 0.25 if held else 0.15 if hovered else 0.0)
             edge, ink = fill, on_accent(theme)
         else:
-            fill = mix(field, theme.final, 0.28 if held else 0.14 if hovered else 0.0)
-            edge = theme.final if held or hovered else line
-        if self.surface is not None:
-            rounded(self.surface, rect, fill, edge, self.px(4), max(1, self.px(0.75)))
-            if self.focus == key:
-                self._ring(rect)
+            fill = mix(field_colour(theme), theme.final, 0.28 if held else 0.14 if hovered else 0.0)
+            edge, ink = theme.final if held or hovered else self._shade(0.24), theme.ink
+        self._round(rect, fill, edge, width=max(1, self.px(0.75)))
+        self._ring(key, rect)
         return ink
 
-    def _ring(self, rect: pygame.Rect) -> None:
-        if self.surface is not None:
+    def _ring(self, key: str, rect: pygame.Rect) -> None:
+        """Draw a ring around what has the focus."""
+        if self.surface is not None and self.focus == key:
             width = max(2, self.px(1.5))
             pygame.draw.rect(self.surface, self.theme.final, rect, width, border_radius=self.px(4))
 
@@ -525,7 +519,7 @@ class Ui:
         bold: bool = False,
         at: str = "left",
     ) -> None:
-        if self.surface is not None and text and self._visible(rect):
+        if self.surface is not None and text and self._draws(rect):
             words = shortened(text, self.px(size), rect.width, bold)
             picture = label(words, self.px(size), colour, bold)
             side = "center" if at == "center" else f"mid{at}"
@@ -542,7 +536,7 @@ class Ui:
     def label(self, text: str, *, key: str = "", style: str = "", tip: str = "", at: str = "left") -> None:
         """Write a word; `style` is ``header``, ``unit`` or ``bold``, `at` is ``center`` or ``right``."""
         rect = self.cell()
-        self._noted("label", key or text, rect, text, None, tip, "")
+        self._note("label", key or text, rect, text, None, tip)
         faint, bold = style in ("header", "unit"), style in ("header", "bold")
         colour = self.theme.faint if faint else self.theme.ink
         self._write(text, rect, colour, SMALL if faint else TEXT, bold=bold, at=at)
@@ -577,11 +571,9 @@ class Ui:
         """Show a button; return whether it was pressed."""
         key, rect = key or text, self.cell()
         rect.height = min(rect.height, self.px(_TALLEST))
-        self._noted("button", key, rect, text, chosen, tip, why)
-        clicked = self._clicks(key, rect, why)
-        if self.surface is not None and self._visible(rect):
-            ink = self._face(rect, key, why, chosen=chosen)
-            size = SMALL if small else TEXT
+        clicked = self._clicks("button", key, rect, text, chosen, tip, why)
+        if self._draws(rect):
+            ink, size = self._face(rect, key, why, chosen=chosen), SMALL if small else TEXT
             self._write(text, rect.inflate(-self.px(6), 0), ink, size, bold=chosen and not small, at="center")
         return clicked
 
@@ -590,29 +582,23 @@ class Ui:
     ) -> bool:
         """Show a line of a list, with words at its right end; return whether it was clicked."""
         key, rect = key or text, self.cell()
-        self._noted("option", key, rect, text, chosen, "", why)
-        clicked = self._clicks(key, rect, why)
-        if self.surface is not None and self._visible(rect):
+        clicked = self._clicks("option", key, rect, text, chosen, "", why)
+        if self._draws(rect):
             if chosen or self._hovers(rect):
-                strength = 0.2 if chosen else 0.08
-                fill = mix(self.theme.panel, self.theme.final, strength)
-                rounded(self.surface, rect, fill, fill, self.px(4))
+                self._round(rect, mix(self.theme.panel, self.theme.final, 0.2 if chosen else 0.08))
             inner = rect.inflate(-self.px(16), 0)
             self._write(aside, inner, self.theme.faint, SMALL, at="right")
             inner.width -= text_width(aside, self.px(SMALL)) + self.px(12) if aside else 0
-            faint = mix(self.theme.panel, self.theme.ink, 0.45)
-            lines = text.split("\n")
+            lines, ink = text.split("\n"), self._shade(0.45) if why else self.theme.ink
             inner.top -= self.px((TEXT + 5) * (len(lines) - 1) / 2)
             for k, line in enumerate(lines):
-                at = inner.move(0, self.px((TEXT + 5) * k))
-                self._write(line, at, faint if why else self.theme.ink, TEXT)
+                self._write(line, inner.move(0, self.px((TEXT + 5) * k)), ink, TEXT)
         return clicked
 
     def area(self, key: str) -> tuple[pygame.Rect, bool]:
         """Take the next cell for a picture; return where it is, px, and whether it was clicked."""
         rect = self.cell()
-        self._noted("area", key, rect, "", None, "", "")
-        return rect, self._clicks(key, rect, "")
+        return rect, self._clicks("area", key, rect, "", None)
 
     def tabs(self, key: str, names: Sequence[str], now: str, *widths: float) -> str | None:
         """Show buttons side by side of which one is chosen; return another one that was."""
@@ -633,50 +619,45 @@ class Ui:
         self._heights[key] = 0.0
         self.row(height=20, below=4)
         rect = self.cell()
-        if self._clicks(key, rect, ""):
+        if self._clicks("section", key, rect, title, None):
             self._folded ^= {key}
             self.stale = True
         is_open = key not in self._folded
-        self._noted("section", key, rect, title, is_open, "", "")
-        if self._hovers(rect) and self.surface is not None:
-            fill = mix(self.theme.panel, self.theme.ink, 0.06)
-            rounded(self.surface, rect, fill, fill, self.px(4))
+        self.shown[f"section:{key}"].value = is_open
+        if self._hovers(rect):
+            self._round(rect, self._shade(0.06))
         self._write(f"{'▾' if is_open else '▸'} {title}", rect, self.theme.faint, SMALL, bold=True)
-        if self.focus == key:
-            self._ring(rect)
+        self._ring(key, rect)
         self.row()
         return is_open
 
     def check(self, text: str, *, now: bool, key: str = "", tip: str = "", why: str = "") -> bool | None:
         """Show a check box and its words; return its new state once it was clicked."""
         key, rect = key or text, self.cell()
-        self._noted("check", key, rect, text, now, tip, why)
-        clicked = self._clicks(key, rect, why)
-        if self.surface is not None and self._visible(rect):
+        clicked = self._clicks("check", key, rect, text, now, tip, why)
+        if self._draws(rect):
             box = pygame.Rect(0, 0, self.px(16), self.px(16))
             box.midleft = rect.midleft
             theme, hovered = self.theme, self._hovers(rect) and not why
             field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
-            on = mix(theme.panel, theme.ink, 0.35) if why else theme.final
-            edge = on if now or hovered else mix(theme.panel, theme.ink, 0.35)
-            rounded(self.surface, box, on if now else field, edge, self.px(3), max(1, self.px(0.75)))
+            on = self._shade(0.35) if why else theme.final
+            edge = on if now or hovered else self._shade(0.35)
+            self._round(box, on if now else field, edge, 3, max(1, self.px(0.75)))
             if now:
                 self._tick(box)
             words = rect.move(self.px(23), 0)
             words.width -= self.px(23)
-            self._write(text, words, mix(theme.panel, theme.ink, 0.45) if why else theme.ink, TEXT)
-            if self.focus == key:
-                self._ring(rect)
+            self._write(text, words, self._shade(0.45) if why else theme.ink, TEXT)
+            self._ring(key, rect)
         return (not now) if clicked else None
 
     def _tick(self, box: pygame.Rect) -> None:
         assert self.surface is not None
-        side = box.width
-        points = [(0.22, 0.52), (0.42, 0.72), (0.78, 0.28)]
-        large = pygame.Surface((side * 4, side * 4), pygame.SRCALPHA, 32)
-        corners = [(x * side * 4, y * side * 4) for x, y in points]
+        side = 4 * box.width
+        large = pygame.Surface((side, side), pygame.SRCALPHA, 32)
+        corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
         for start, end in pairwise(corners):
-            pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side * 0.5)))
+            pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side / 8)))
         picture = pygame.transform.smoothscale(large.premul_alpha(), box.size)
         self.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
@@ -696,84 +677,77 @@ class Ui:
         track = pygame.Rect(rect.left, 0, rect.width, self.px(14))
         track.centery = rect.centery
         knob_wide = self.px(_KNOB)
-        free = max(track.width - knob_wide, 1)
-        span = max(high - low, 1e-300)
+        free, span = max(track.width - knob_wide, 1), max(high - low, 1e-300)
         value: float | None = None
-        event = self._event
         if not why:
             self._order.append(key)
             place = track.left + free * min(max((now - low) / span, 0.0), 1.0)
-            if self._pressed(track):
+            pressed = self._pressed(track)
+            on_knob = pressed and place <= self.at[0] <= place + knob_wide
+            if pressed:
                 self.active, self._event = key, None
-                on_knob = place <= self.at[0] <= place + knob_wide
                 self._grabbed = self.at[0] - place if on_knob else knob_wide / 2
-                value = None if on_knob else low + span * (self.at[0] - self._grabbed - track.left) / free
-            elif self.active == key and event is not None and event.type == pygame.MOUSEMOTION:
+            if (pressed and not on_knob) or (self.active == key and self._is(pygame.MOUSEMOTION)):
                 value = low + span * (self.at[0] - self._grabbed - track.left) / free
-            elif self.focus == key and event is not None and event.type == pygame.KEYDOWN:
-                by = {"left": -1, "down": -1, "right": 1, "up": 1}.get(key_of(event), 0)
-                value = now + by * (step or span / 50) if by else None
+            elif by := {"left": -1, "down": -1, "right": 1, "up": 1}.get(self._key(key), 0):
+                value = now + by * (step or span / 50)
         if value is not None:
             value = min(max(value, low), high)
             if step:
                 value = min(max(low + round((value - low) / step) * step, low), high)
             value = value if value != now else None
-        part = min(max(((now if value is None else value) - low) / span, 0.0), 1.0)
-        self._noted("slider", key, track, "", now if value is None else value, tip, why)
-        if self.surface is not None and self._visible(rect):
-            self._draw_slider(key, track, part, why)
+        shown = now if value is None else value
+        self._note("slider", key, track, "", shown, tip, why)
+        if self._draws(rect):
+            self._draw_slider(key, track, min(max((shown - low) / span, 0.0), 1.0), why)
         return value
 
     def _draw_slider(self, key: str, track: pygame.Rect, part: float, why: str) -> None:
-        assert self.surface is not None
         theme, groove = self.theme, track.inflate(0, -self.px(8))
-        quiet = mix(theme.panel, theme.ink, 0.18)
-        rounded(self.surface, groove, quiet, quiet, groove.height // 2)
+        half = groove.height // 2 / self.scale
+        self._round(groove, self._shade(0.18), radius=half)
         filled = groove.copy()
         filled.width = max(round(part * (track.width - self.px(_KNOB))) + self.px(_KNOB / 2), groove.height)
-        accent = mix(theme.panel, theme.ink, 0.35) if why else theme.final
-        pale = mix(theme.panel, accent, 0.6)
-        rounded(self.surface, filled, pale, pale, groove.height // 2)
+        accent = self._shade(0.35) if why else theme.final
+        self._round(filled, mix(theme.panel, accent, 0.6), radius=half)
         strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
-        fill = mix(accent, theme.ink, strength)
         knob = pygame.Rect(0, 0, self.px(_KNOB), self.px(14))
         knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
-        rounded(self.surface, knob, fill, fill, self.px(5))
-        if self.focus == key:
-            self._ring(track)
+        self._round(knob, mix(accent, theme.ink, strength), radius=5)
+        self._ring(key, track)
 
     def text_entry(
         self, key: str, text: str, *, ghost: str = "", tip: str = "", why: str = "", live: bool = False
     ) -> str | None:
         """Show a field; return its text after Enter, with `live` after each letter."""
-        rect, event = self.cell(), self._event
+        rect = self.cell()
         given: str | None = None
         if not why:
             self._order.append(key)
-        if not why and self._pressed(rect):
-            self._event = None
-            self._press_field(key, text, rect)
+            if self._pressed(rect):
+                self._press_field(key, text, rect)
         edit = self.edit if self.focus == key else None
-        if edit is not None and event is not None:
-            if event.type == pygame.MOUSEMOTION and self.active == key:
+        if edit is not None:
+            if self._is(pygame.MOUSEMOTION) and self.active == key:
                 edit.place(self._caret_at(edit, rect), extend=True)
-            elif event.type == pygame.KEYDOWN:
+            elif name := self._key(key):
                 self._event = None
-                if key_of(event) in _ENTER and not edit.composed:
+                if name in _ENTER and not edit.composed:
                     given = edit.text
                     self.stop_typing()
                     edit = None
                 elif not edit.composed:
-                    edit.key(key_of(event))
+                    edit.key(name)
         if live and edit is not None and edit.text != text:
             given = edit.text
         shown = edit.text if edit is not None else text
-        self._noted("entry", key, rect, shown, text, tip, why)
-        if self.surface is not None and self._visible(rect):
+        self._note("entry", key, rect, shown, text, tip, why)
+        if self._draws(rect):
             self._draw_field(rect, edit, shown, ghost, why)
         return given
 
     def _press_field(self, key: str, text: str, rect: pygame.Rect) -> None:
+        self._event = None
         now = perf_counter()
         double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
         self._clicked = now, key
@@ -800,14 +774,14 @@ class Ui:
     def _draw_field(self, rect: pygame.Rect, edit: TextEdit | None, text: str, ghost: str, why: str) -> None:
         screen, theme, size = self.surface, self.theme, self.px(TEXT)
         assert screen is not None
-        line = mix(theme.panel, theme.ink, 0.14 if why else 0.24)
-        edge = theme.final if edit is not None or (self._hovers(rect) and not why) else line
+        stands_out = edit is not None or (self._hovers(rect) and not why)
+        edge = theme.final if stands_out else self._shade(0.14 if why else 0.24)
         width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
-        rounded(screen, rect, theme.panel if why else field_colour(theme), edge, self.px(4), width)
+        self._round(rect, theme.panel if why else field_colour(theme), edge, width=width)
         inner = rect.inflate(-self.px(12), -self.px(4))
         if edit is None:
-            faint = mix(theme.panel, theme.ink, 0.45) if why else theme.ink
-            self._write(text or ghost, inner, faint if text else theme.faint, TEXT)
+            ink = theme.faint if not text else self._shade(0.45) if why else theme.ink
+            self._write(text or ghost, inner, ink, TEXT)
             return
         clip = screen.get_clip()
         screen.set_clip(inner.inflate(self.px(4), 0).clip(clip))
@@ -835,26 +809,22 @@ class Ui:
         self, key: str, options: Sequence[str], now: str, *, tip: str = "", why: str = ""
     ) -> str | None:
         """Show a menu that drops down; return what was chosen of it, if that is another."""
-        rect, event = self.cell(), self._event
-        picked: str | None = None
-        if self._open_key == key and self.open_list is not None:
-            picked = self.open_list.picked
-            if picked is not None:
-                self.open_list = None
-        arrow = event is not None and event.type == pygame.KEYDOWN and self.focus == key
-        opened = self._clicks(key, rect, why) or (arrow and event is not None and key_of(event) == "down")
+        rect = self.cell()
+        picked = self.open_list.picked if self.open_list is not None and self._open_key == key else None
+        if picked is not None:
+            self.open_list = None
+        opened = self._clicks("menu", key, rect, now, now, tip, why) or self._key(key) == "down"
         if opened and picked is None:
             self._event = None
             self._unfold(key, rect, list(options), now)
-        self._noted("menu", key, rect, now, now, tip, why)
-        if self.surface is not None and self._visible(rect):
+        if self.surface is not None and self._draws(rect):
             ink = self._face(rect, key, why)
             words = rect.inflate(-self.px(18), 0)
             words.width -= self.px(12)
             self._write(now, words, ink, TEXT)
-            middle, side = (rect.right - self.px(13), rect.centery + self.px(1)), self.px(4)
-            corners = [(middle[0] - side, middle[1] - side // 2), (middle[0] + side, middle[1] - side // 2)]
-            pygame.draw.polygon(self.surface, ink, [*corners, (middle[0], middle[1] + side // 2 + 1)])
+            x, y, side = rect.right - self.px(13), rect.centery + self.px(1), self.px(4)
+            corners = [(x - side, y - side // 2), (x + side, y - side // 2), (x, y + side // 2 + 1)]
+            pygame.draw.polygon(self.surface, ink, corners)
         return picked if picked != now else None
 
     def _unfold(self, key: str, rect: pygame.Rect, options: list[str], now: str) -> None:
@@ -894,7 +864,7 @@ class Ui:
                 self._pick(found, found.chosen)
             elif len(name) == 1 and begun:
                 found.show(next((k for k in begun if k > found.chosen), begun[0]))
-            elif len(name) > 1 and name.startswith("f") and name[1:].isdigit():
+            elif _is_function_key(name):
                 return False
             else:
                 self.stop_typing()
@@ -910,8 +880,7 @@ class Ui:
 
     def _draw_list(self, screen: pygame.Surface, found: _List) -> None:
         theme, field = self.theme, field_colour(self.theme)
-        edge = mix(theme.panel, theme.ink, 0.4)
-        rounded(screen, found.rect, field, edge, self.px(4))
+        rounded(screen, found.rect, field, self._shade(0.4), self.px(4))
         inner = found.rect.inflate(-2, -2)
         screen.set_clip(inner)
         for k, option in enumerate(found.options):
@@ -927,8 +896,7 @@ class Ui:
             whole = inner.height + found.beyond
             bar = pygame.Rect(0, 0, self.px(6), round(inner.height * inner.height / whole))
             bar.topright = inner.right - self.px(2), inner.top + round(found.top * inner.height / whole)
-            fill = mix(theme.panel, theme.ink, 0.3)
-            rounded(screen, bar, fill, fill, self.px(3))
+            rounded(screen, bar, self._shade(0.3), self._shade(0.3), self.px(3))
         screen.set_clip(None)
 
     def find(self, kind: str, key: str) -> Shown | None:

@@ -22,21 +22,13 @@ from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.input import KEY_REPEAT
 from robocov_app.toolkit.layout import SMALLEST
 
-FPS = 60
-"""Frames per second while something moves."""
-
-CALM = 0.8
-"""Seconds without events and movement after which the loop waits for events; tool tips appear earlier."""
-
-PAUSE = 0.1
-"""Seconds between two looks for something new, at most, while it waits."""
+FPS = 60  # frames per second while something moves
+CALM = 0.8  # seconds of peace after which the loop waits for events; tool tips appear earlier
+PAUSE = 0.1  # seconds between two looks for something new, at most, while it waits
 
 
 class BaseWindow(ABC):
-    """A window that is drawn while something moves, and otherwise only when something is different.
-
-    A window of its own kind has `take`, `update`, `draw` and `look`.
-    """
+    """A window that is drawn while something moves, and otherwise only when something is different."""
 
     def __init__(self, size: tuple[int, int], screen: pygame.Surface | None = None) -> None:
         self.screen = screen or open_window(size)
@@ -135,11 +127,10 @@ class BaseWindow(ABC):
 def display(*, headless: bool, otherwise: str = "no display") -> Iterator[None]:
     """Start pygame's display, real or not; InputError with the words `otherwise` when there is none."""
     # SDL would silently open a window that nobody sees, and run for ever
+    named = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
     if headless:
         os.environ["SDL_VIDEODRIVER"] = "dummy"
-    elif sys.platform == "linux" and not any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    ):
+    elif sys.platform == "linux" and not any(os.environ.get(name) for name in named):
         raise InputError(otherwise)
     try:
         pygame.display.init()

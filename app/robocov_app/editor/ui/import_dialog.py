@@ -20,30 +20,25 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import Colour, Theme
+from robocov_app.toolkit.dialogs import Dialog
+from robocov_app.toolkit.latest import Latest
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import SMALL, Ui
 from robocov_app.toolkit.worker import Worker
 
+# pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
-"""Pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map."""
 
-_FEWEST_LINES = 7
-"""Of the report there is room for so many, and for more below maps that are wide."""
-
-_MARK = 150
-"""Opacity of what is marked, of 255."""
+_FEWEST_LINES = 7  # of the report; more below maps that are wide
+_MARK = 150  # opacity of what is marked, of 255
 
 _HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
 _DEFAULT = "default"
 
 
-class ImportDialog:
-    """Asks how a file is to be imported, with a live preview; `call` gets what is accepted.
-
-    `given`: what was typed or chosen, by the names of options. `imported`: of the newest settings that could
-    be imported. `accepted`: whether it is wanted as it is set, as soon as it is there.
-    """
+class ImportDialog(Dialog):
+    """Asks how a file is to be imported, with a live preview; `call` gets what is accepted."""
 
     width = 10_000.0  # all that the window has
 
@@ -52,14 +47,14 @@ class ImportDialog:
     ) -> None:
         self.path, self.importer, self.call = path, importer, call
         self.options = options_of(importer)
-        self.given: dict[str, str] = {}
-        self.imported: Imported | None = None
-        self.accepted = self.done = False
+        self.given: dict[str, str] = {}  # what was typed or chosen, by the names of options
+        self.imported: Imported | None = None  # of the newest settings that could be imported
+        self.accepted = False  # whether it is wanted as it is set, as soon as it is there
         self.cameras: list[Camera] = []
         self._seen: Ui | None = None
         self._worker = worker
         self._mistake = ""
-        self._picture: tuple[tuple[object, ...], pygame.Surface] | None = None
+        self._picture: Latest[pygame.Surface] = Latest()
         self._ask()
 
     # what is set
@@ -80,8 +75,9 @@ class ImportDialog:
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
         """Return what is set."""
-        options = [option for option in self.options if option.name in self.given]
-        values = {option.name: option.value(self.given[option.name]) for option in options}
+        values = {
+            each.name: each.value(self.given[each.name]) for each in self.options if each.name in self.given
+        }
         of_reading = {field.name for field in fields(ReadOptions)}
         read = {name: value for name, value in values.items() if name in of_reading}
         return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
@@ -130,9 +126,6 @@ class ImportDialog:
             self.accepted = True
             return True
         return False
-
-    def wheel(self, notches: float) -> None:
-        """Do nothing."""
 
     def cancelled(self) -> None:
         """End what works on it."""
@@ -239,10 +232,9 @@ class ImportDialog:
         return corners[1][1] + above + high - box.top
 
     def _draw_maps(self, screen: pygame.Surface, imported: Imported, scale: float, theme: Theme) -> None:
-        key = (imported, tuple(camera.view for camera in self.cameras), scale, theme)
-        if self._picture is None or self._picture[0] != key:
-            self._picture = key, _maps(screen.get_size(), imported, self.cameras, scale, theme)
-        screen.blit(self._picture[1], (0, 0))
+        size, look = screen.get_size(), (*(camera.view for camera in self.cameras), scale, theme)
+        maps = self._picture.of(imported, look, lambda: _maps(size, imported, self.cameras, scale, theme))
+        screen.blit(maps, (0, 0))
         self._draw_captions(screen, imported, scale, theme)
         inside = next(option for option in self.options if option.name == "inside")
         if inside.name in self.given and not self.trouble:

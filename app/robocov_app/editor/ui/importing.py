@@ -4,40 +4,30 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
-from robocov_app.formats import ForeignMap, ImportReport, ReadOptions, Shaping, read_map, shaped
+from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions, Shaping, read_map, shaped
 from robocov_app.formats.geometry.shaping import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov_app.formats import Importer
-
 Kind = Literal["number", "place", "words", "text", "choice"]
 
-ON = "yes"
-"""A switch that is on."""
+ON = "yes"  # a switch that is on
 
 
 @dataclass(frozen=True)
 class Option:
-    """An option of an import.
+    """An option of an import."""
 
-    `name`: as of the field of `ReadOptions` or `Shaping`. `kind`: what is typed: a number, two for a place,
-    words between commas, any text; or one of the choices. `choices`: the first is the default. `default`:
-    what stands where nothing was given.
-    """
-
-    name: str
-    kind: Kind
-    choices: tuple[str, ...]
-    default: str
+    name: str  # as of the field of `ReadOptions` or `Shaping`
+    kind: Kind  # a number, two for a place, words between commas, any text; or one of the choices
+    choices: tuple[str, ...]  # the first is the default
+    default: str  # what stands where nothing was given
     help: str
 
     def value(self, text: str) -> Any:
