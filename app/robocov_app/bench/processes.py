@@ -69,13 +69,9 @@ def start_cases(*, quick: bool = False) -> list[Case]:
 
 
 def _start_rows(quick: bool) -> Iterator[Row]:
+    silent = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
     words = {NUMPY: ("-c", NUMPY), **WORDS}
-    taken = InTurn({name: partial(_started, *given) for name, given in words.items()}).rounds(
-        3 if quick else 15
-    )
+    calls = {name: partial(silent, [sys.executable, *given]) for name, given in words.items()}
+    taken = InTurn(calls).rounds(3 if quick else 15)
     for name in WORDS:
         yield Row("start", name, {}, taken[name], NUMPY, taken[NUMPY], GOALS.get(name))
-
-
-def _started(*words: str) -> None:
-    subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=True)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from robocov.errors import ParameterError, checked
-from robocov_app.runs.options import ConditionOptions, LayerOptions, WindowOptions, robots_of
+from robocov_app.runs.options import LayerOptions, ScenarioOptions, WindowOptions, robots_of
 from robocov_app.terminal.arguments import parsed_gains, window_size
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Arguments(WindowOptions, LayerOptions):
+class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
     """The interactive window: watch a team cover a map, touch it, compare controllers, go back in time.
 
     Everything has a key: press F1. Settings of the look are remembered.
@@ -31,22 +31,10 @@ class Arguments(WindowOptions, LayerOptions):
     Example: robocov demo museum --controllers rapf rpf lloyd --robots 8
     """
 
-    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
-    """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
     controllers: tuple[str, ...] = ("rapf",)
     """Up to four, side by side: names, or mine.py:MyController."""
     gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
     """Gains of the first controller, as in --set k_rep=0.3."""
-    robots: int = 6
-    """Number of robots."""
-    start: str | None = None
-    """Named start of the map; the map's first by default."""
-    seed: int = 0
-    """Seed of the starting positions."""
-    dt: float = 1 / 60
-    """Control period in seconds."""
-    radius: float = 0.1
-    """Radius of a robot in metres."""
     speed: float = 1.0
     """Simulated seconds per second at the beginning."""
     paused: bool = False
@@ -55,17 +43,12 @@ class Arguments(WindowOptions, LayerOptions):
     """Play the lesson that comes with robocov, in eleven short chapters."""
     lesson: Path | None = None
     """Play a lesson of your own, see `robocov lesson`."""
-    lattice: int = 128
-    """The live coverage cost is evaluated on a lattice of N x N sites."""
     frames: int | None = None
     """Render so many frames of the window without a display, 30 a second, and end; needs --out or --video."""
     out: Path | None = None
     """Folder for these frames: 000000.png, 000001.png, ..."""
-    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
     video: Path | None = None
     """Render the window without a display to this film; with --tour, all of the tour."""
-    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
-    """Robots that differ: a TOML or JSON file of groups, as for `robocov run`; it says how many there are."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

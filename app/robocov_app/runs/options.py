@@ -165,28 +165,40 @@ class FilmOptions(LayerOptions):
         return theme_named(self.theme or "light")
 
 
-@dataclass
-class RunOptions(JsonOption):
-    """What a run is made of, and what is made of it."""
+@dataclass(kw_only=True)
+class ScenarioOptions:
+    """A map, a team at its start, and what goes wrong."""
 
     map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
     """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
-    gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
-    """Gains, as in --set k_rep=0.3 target=median attraction_limit=null (see `robocov controllers`)."""
     robots: int = 6
     """Number of robots."""
     start: str | None = None
     """Named start of the map; the map's first by default."""
     seed: int = 0
     """Seed of the starting positions; every controller gets the same."""
-    duration: float = 60.0
-    """Simulated seconds."""
     dt: float = 1 / 60
     """Control period in seconds."""
-    record_hz: float | None = None
-    """Moments a second that the record keeps, about; by default all, of large teams what makes 320 MB."""
     radius: float = 0.1
     """Radius of a robot in metres."""
+    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
+    """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
+    says how many there are, and what a group leaves open is as the options say."""
+    lattice: int = 128
+    """The coverage cost is evaluated on a lattice of N x N sites over the map."""
+    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
+
+
+@dataclass(kw_only=True)
+class RunOptions(ScenarioOptions, JsonOption):
+    """What a run is made of, and what is made of it."""
+
+    gains: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="GAIN=VALUE ...")] = ()
+    """Gains, as in --set k_rep=0.3 target=median attraction_limit=null (see `robocov controllers`)."""
+    duration: float = 60.0
+    """Simulated seconds."""
+    record_hz: float | None = None
+    """Moments a second that the record keeps, about; by default all, of large teams what makes 320 MB."""
     max_speed: float = 1.0
     """Largest speed in m/s."""
     max_acceleration: float = 2.0
@@ -197,17 +209,11 @@ class RunOptions(JsonOption):
     """How far the range sensor reaches, in metres from the robot's centre."""
     communication_range: float | None = None
     """How far robots hear each other, in metres; without limit by default."""
-    team: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.toml")] = None
-    """Robots that differ: a TOML or JSON file of groups, [[group]] with count, max_speed, radius, ...; it
-    says how many there are, and what a group leaves open is as the options above say."""
-    lattice: int = 128
-    """The coverage cost is evaluated on a lattice of N x N sites over the map."""
     out: Path | None = None
     """Folder for the results."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
     film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
-    conditions: tyro.conf.OmitArgPrefixes[ConditionOptions] = field(default_factory=ConditionOptions)
 
     def __post_init__(self) -> None:
         if self.team is not None:

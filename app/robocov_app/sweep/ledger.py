@@ -19,9 +19,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
-from robocov.files.atomic import locked, on_disk, written
+from robocov.files.atomic import locked, on_disk
 from robocov_app.sweep.performing import FIGURES, Outcome, made_with
 from robocov_app.sweep.study import Task
+from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders
 
@@ -211,18 +212,12 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
             ledger._tidy()
             # first: it says that the folder is ours
             if not (folder / "results.parquet").exists():
-                with written(folder / STUDY) as part:
-                    part.write_bytes(study_bytes(study))
+                write_json(folder / STUDY, study)
             (folder / RUNS).mkdir(exist_ok=True)
         except OSError as error:
             at = error.filename or folder
             raise OutputError(f"{at}: cannot be used for results: {error.strerror or error}") from error
         yield ledger
-
-
-def study_bytes(study: Mapping[str, Any]) -> bytes:
-    """Return the content of the file ``study.json``."""
-    return (json.dumps(study, allow_nan=False, indent=1) + "\n").encode()
 
 
 def is_sweep(folder: Path) -> bool:

@@ -25,7 +25,7 @@ from robocov.record import ARRAYS, Record, versions
 from robocov_app.runs.run import cost_table
 from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
-from robocov_app.terminal.output import csv_text, finite
+from robocov_app.terminal.output import csv_text, finite, json_text
 from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
@@ -65,7 +65,11 @@ class Outcome:
 def perform(task: Task) -> Outcome:
     """Do a run; what goes wrong in it is a part of the outcome."""
     with _undisturbed():
-        return _caught(task)
+        try:
+            return _performed(task)
+        except (Exception, SystemExit) as error:
+            message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
+            return failed(message, traceback.format_exc())
 
 
 class Performing:
@@ -78,20 +82,12 @@ class Performing:
         return perform(questions[-1])
 
 
-def _caught(task: Task) -> Outcome:
-    try:
-        return _performed(task)
-    except (Exception, SystemExit) as error:
-        message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
-        return failed(message, traceback.format_exc())
-
-
 def failed(message: str, details: str) -> Outcome:
     """Return the outcome of a run that failed."""
     # one line of what files can hold, whatever a controller of a user's says
     message = " ".join(message.split()).encode(errors="replace").decode()
     content = {"error": message, "traceback": details}
-    return Outcome({"error.json": _json(content)}, {}, message)
+    return Outcome({"error.json": json_text(content).encode()}, {}, message)
 
 
 def simulated(task: Task, environment: Environment) -> Record:
@@ -178,11 +174,7 @@ def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[st
     arrays = io.BytesIO()
     np.savez_compressed(arrays, **{name: getattr(kept, name) for name in ARRAYS})
     return {
-        "run.json": _json(content),
+        "run.json": json_text(content).encode(),
         "record.npz": arrays.getvalue(),
         "cost.csv": csv_text(*cost_table(history)).encode(),
     }
-
-
-def _json(content: object) -> bytes:
-    return (json.dumps(content, indent=1, allow_nan=False) + "\n").encode()

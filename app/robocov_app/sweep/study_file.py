@@ -143,7 +143,11 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         raise InputError(f"{where}: {mistakes[0]}{more}")
     try:
         if isinstance(given.get("seeds"), int):
-            given["seeds"] = _first_seeds(given["seeds"])
+            count = given["seeds"]
+            if not 1 <= count <= MOST_RUNS:
+                wanted = f"a whole number from 1 to {MOST_RUNS}"
+                raise InputError(f"seeds: {shown(count)}, but {wanted} was wanted")
+            given["seeds"] = range(count)
         for name in ("maps", "controllers", "robots", "starts"):
             if name in given and not isinstance(given[name], list):
                 given[name] = [given[name]]
@@ -155,12 +159,6 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
         return Study(**given.pop("team", {}), **given, folder=folder)
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
-
-
-def _first_seeds(count: int) -> range:
-    if not 1 <= count <= MOST_RUNS:
-        raise InputError(f"seeds: {shown(count)}, but a whole number from 1 to {MOST_RUNS} was wanted")
-    return range(count)
 
 
 def _maps(entries: list[str], folder: Path) -> list[StudyMap]:

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
 from robocov_app.sweep.executors import Executor, LocalPool, processors
-from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened, study_bytes
+from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened
 from robocov_app.sweep.performing import Outcome, perform, prepared
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.output import json_text
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -180,7 +181,7 @@ def sweep(
         stopped = stack.enter_context(Interruption()) if stop is None else stop
         content = study.to_json()
         ledger = stack.enter_context(opened(folder, content))
-        table = stack.enter_context(Table(folder, columns_of(study), study_bytes(content)))
+        table = stack.enter_context(Table(folder, columns_of(study), json_text(content).encode()))
         count = Count(len(study))
         tell = stack.enter_context(sweep_progress(title, count, quiet=quiet))
         looked = takewhile(lambda _: not stopped.requested, tasks_of(study))

@@ -40,7 +40,12 @@ def listed(folder: Path) -> str:
 def write_json(path: Path, content: Any) -> None:
     """Write `content` as JSON; whole or not at all."""
     with written(path) as part:
-        part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        part.write_text(json_text(content), encoding="utf-8")
+
+
+def json_text(content: Any) -> str:
+    """Return what `write_json` writes."""
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None:

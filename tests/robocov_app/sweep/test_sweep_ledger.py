@@ -301,7 +301,7 @@ def test_a_study_that_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pyt
     def full(self: Path, *_: object, **__: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(ledger_module.Path, "write_bytes", full)
+    monkeypatch.setattr(ledger_module.Path, "write_text", full)
     with (
         pytest.raises(OutputError, match=r"study.json: cannot be written: No space left"),
         opened(tmp_path, STUDY),

@@ -154,9 +154,8 @@ def test_bad_options_are_told_in_one_line(
 
 
 def test_the_options_are_what_the_session_begins_with() -> None:
-    options = Arguments(
-        "rooms", ("rpf", "lloyd"), ("k_rep=2",), 4, "kitchen", 7, dt=0.05, radius=0.15, speed=2.0, paused=True
-    )
+    given = {"robots": 4, "start": "kitchen", "seed": 7, "dt": 0.05, "radius": 0.15, "speed": 2.0}
+    options = Arguments(controllers=("rpf", "lloyd"), gains=("k_rep=2",), paused=True, **given)
     session = session_of(options)
     assert [pane.law.name for pane in session.panes] == ["rpf", "lloyd"]
     assert session.panes[0].law.value("k_rep") == 2.0
