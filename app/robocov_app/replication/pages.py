@@ -152,10 +152,7 @@ def paper_page(
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
         "replay_script": Markup(script(f"{replay_js()}startReplays();")),
-        "settled": (SETTLED_DISTANCE, SETTLED_WINDOW),
         "versions": versions(),
-        "resamples": RESAMPLES,
-        "least_maps": LEAST_MAPS,
         "all_bundled": len(plan.bundled) == len(NON_CONVEX),
     }
     if results is not None:
@@ -223,6 +220,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
+    known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=LEAST_MAPS)
     known(page=PAGE, beyond_page=BEYOND_PAGE, version=__version__, plan=plan, quick=plan.name == "quick")
     own = (ASSETS / "paper.css").read_text("utf-8")
     style = Markup(theme_rules(":root") + replay_css() + asset("report.css") + own)

@@ -73,7 +73,6 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     choice = grouped.chosen(result, grouped.MOST_RUNS, MOST_PANES)
     compared, chosen_gains = grouped.compared_groups(result)
     pairs = grouped.comparisons(compared)
-    every = grouped.settings(result)
     labels = grouped.labels(result)
     replayed = [
         ReplayRun(
@@ -89,22 +88,14 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
     changing = [run.record for run in replayed if run.record.conditions is not None]
     return {
         "key": key,
+        "result": result,
         "looks": looks,
         "title": facts.title_of(result),
         "lede": facts.lede(result, pairs),
         "in_pairs": result.kind == "sweep" and any(each.pairs > 1 for each in pairs),
         "gaps": facts.gaps(result),
-        "troubles": facts.troubles(result),
-        "facts": facts.facts(result),
-        "maps": [(name, map_picture(result.maps[name])) for name in list(result.maps)[:MOST_MAPS]],
-        "more_maps": len(result.maps) - MOST_MAPS,
-        "controllers": tables.controllers_table(result),
-        "meanings": facts.meanings(result),
-        "gains": tables.gains_table(result),
         "summaries": tables.summary_tables(result),
-        "runs": tables.runs_table(result),
         "costs": list(plots.cost_plots(result, looks, f"{key}c")),
-        "weighed": facts.weighed_text(result),
         "medians": any(len(group.entries) > 1 for group in grouped.variants(result)),
         "measures": plots.measure_plots(result, replayed, choice.entries, looks, f"{key}m"),
         "finals": list(plots.final_plots(result, looks, f"{key}f")),
@@ -115,8 +106,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
         "chosen_gains": chosen_gains,
         "dependences": list(plots.dependence_plots(result, f"{key}d")),
         "failures": tables.failures_table(result),
-        "settings": len(every),
-        "too_many": len(every) > plots.MOST_PANELS,
+        "settings": len(grouped.settings(result)),
         "choice": choice.words if len(replayed) > 1 else "",
         "sparse": any(not has_path(run.record) for run in replayed),
         "moving": any(run.record.environment.moves for run in replayed),
@@ -142,7 +132,9 @@ def template(name: str) -> Template:
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)
     environment.filters["short"] = _shortened
-    environment.globals |= {"few_maps": grouped.FEW_MAPS, "negligible": grouped.NEGLIGIBLE}
+    limits = {"most_maps": MOST_MAPS, "most_panels": plots.MOST_PANELS, "few_maps": grouped.FEW_MAPS}
+    environment.globals |= {**limits, "negligible": grouped.NEGLIGIBLE}
+    environment.globals |= {"facts": facts, "tables": tables, "map_picture": map_picture}
     return environment.get_template(name)
 
 
