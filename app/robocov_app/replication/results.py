@@ -183,52 +183,34 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
     Most are so small that starting processes would take longer than they do. What came of a run stands in the
     folder of its sweep, as if each had been done alone, and each then writes its table.
     """
-    if options.scheduler is None:
-        with ExitStack() as stack:
-            ledgers = {
-                name: stack.enter_context(opened(folder / "studies" / name, study.to_json()))
-                for name, study in sweeps.items()
-            }
-            _fill(sweeps, ledgers, options, title, stack)
-        if options.stop.requested:
-            raise Interrupted
-        options = replace(options, quiet=True)  # all has been told
-    for name, study in sweeps.items():
-        run_study(study, folder, name, options)
-
-
-def _fill(
-    sweeps: Mapping[str, Study],
-    ledgers: Mapping[str, Ledger],
-    options: RunnerOptions,
-    title: str,
-    stack: ExitStack,
-) -> None:
     homes: dict[str, list[Ledger]] = {}  # two sweeps may have a task in common
     tasks: dict[str, Task] = {}
     notes = []
-    for name, study in sweeps.items():
-        survey = ledgers[name].survey(tasks_of(study), keep_versions=options.keep_versions)
-        for task in compress(tasks_of(study), survey.todo):
-            tasks[task.digest] = task
-            homes.setdefault(task.digest, []).append(ledgers[name])
-        notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]
-    if not tasks and not notes:
-        return
-    count = Count(len(tasks))
-    tell = stack.enter_context(sweep_progress(title, count, quiet=options.quiet))
-    for note in notes:
-        tell.say(note)
 
     def keep(task: Task, outcome: performing.Outcome) -> None:
         for ledger in homes[task.digest]:
             ledger.keep(task, outcome)
 
-    def pool() -> LocalPool:
-        return LocalPool(min(options.workers, len(tasks)))
-
-    for _ in worked_off(tasks.values(), pool, count, options.stop, keep):
-        tell(count)
+    with ExitStack() as stack:
+        for name, study in sweeps.items() if options.scheduler is None else ():
+            ledger = stack.enter_context(opened(folder / "studies" / name, study.to_json()))
+            survey = ledger.survey(tasks_of(study), keep_versions=options.keep_versions)
+            for task in compress(tasks_of(study), survey.todo):
+                tasks[task.digest] = task
+                homes.setdefault(task.digest, []).append(ledger)
+            notes += [f"{name}: {line}" for line in survey.words(keep_versions=options.keep_versions)]
+        if tasks or notes:
+            count, workers = Count(len(tasks)), min(options.workers, len(tasks))
+            tell = stack.enter_context(sweep_progress(title, count, quiet=options.quiet))
+            for note in notes:
+                tell.say(note)
+            for _ in worked_off(tasks.values(), lambda: LocalPool(workers), count, options.stop, keep):
+                tell(count)
+    if options.stop.requested:
+        raise Interrupted
+    quiet = options.quiet or options.scheduler is None  # then all has been told
+    for name, study in sweeps.items():
+        run_study(study, folder, name, replace(options, quiet=quiet))
 
 
 def references_of(

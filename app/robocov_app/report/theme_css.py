@@ -5,7 +5,7 @@ Every colour has one name in both themes: what is drawn with names is right in l
 
 from __future__ import annotations
 
-from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on
+from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on, theme_named
 
 
 def hex_code(colour: Colour) -> str:
@@ -51,8 +51,6 @@ def theme_rules(scope: str, theme: str = "auto") -> str:
     """Return CSS that gives a selector its colours; "auto" follows notebook or browser, paper is white."""
     light, dark = variables(LIGHT), variables(DARK)
     if theme != "auto":
-        from robocov_app.render.theme import theme_named
-
         return f"{scope}{{{variables(theme_named(theme))}}}@media print{{{scope}{{{light}}}}}\n"
     notebook = f':is([data-jp-theme-light="{{}}"],[data-vscode-theme-kind$="{{}}"]) {scope}'
     return (
