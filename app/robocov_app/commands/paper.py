@@ -16,8 +16,8 @@ from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
+    from robocov_app.replication.claims import Claim
     from robocov_app.replication.results import Forecast, RunnerOptions
-    from robocov_app.replication.verdicts import Claim
 
 _MOST_WORKERS = 1024
 

@@ -20,12 +20,12 @@ from robocov.arrays import Array, IntArray
 from robocov.controllers import controller_kind, information_of
 from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by
 from robocov_app.replication import claims
+from robocov_app.replication.claims import Claim, Criterion, amount
 from robocov_app.replication.contenders import OURS, OWN, PAPER, TARGETS, TEAMS, Contender, strongest
 from robocov_app.replication.outcomes import Outcomes
 from robocov_app.replication.plan import Plan
 from robocov_app.replication.results import BeyondResults, Degradation
 from robocov_app.replication.step_times import StepTimes
-from robocov_app.replication.verdicts import Claim, Criterion, amount
 
 # which questions the claims beyond the paper belong to; those of the paper are 1 to 6
 GOALS, RIVALS, EXTENSIONS = 7, 8, 9

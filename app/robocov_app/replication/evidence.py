@@ -15,11 +15,10 @@ from robocov.controllers import controller_kind, gain_values, information_of, ma
 from robocov.controllers.gains import value_text
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.beyond_claims import capitalised
-from robocov_app.replication.claims import share_above_zero
+from robocov_app.replication.claims import amount, share_above_zero
 from robocov_app.replication.contenders import OURS, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes, Scenario
 from robocov_app.replication.results import BeyondResults
-from robocov_app.replication.verdicts import amount
 
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
 OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs

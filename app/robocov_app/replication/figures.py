@@ -21,9 +21,9 @@ from robocov_app.figures.page import SMALL, TITLE, Page, tone
 from robocov_app.render.layout import united
 from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+from robocov_app.replication.claims import amount
 from robocov_app.replication.outcomes import FIRST_MINUTE, matched_distance, mean_until
 from robocov_app.replication.results import FigureRun
-from robocov_app.replication.verdicts import amount
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

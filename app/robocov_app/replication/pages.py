@@ -25,13 +25,13 @@ from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
 from robocov_app.replication import beyond_claims, claims, contenders, evidence, step_times, studies
+from robocov_app.replication.claims import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
 from robocov_app.replication.contenders import LABELS, OURS
 from robocov_app.replication.evidence import ASSETS, Evidence
 from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
 from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
-from robocov_app.replication.verdicts import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
 from robocov_app.report.theme_css import theme_rules

@@ -9,14 +9,22 @@ from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
 from robocov_app.replication import claims
-from robocov_app.replication.claims import gains_choice, gains_result, regrets, same_scenarios
+from robocov_app.replication.claims import (
+    Claim,
+    Criterion,
+    amount,
+    gains_choice,
+    gains_result,
+    regrets,
+    same_scenarios,
+    verdict_counts,
+)
 from robocov_app.replication.outcomes import (
     GainOutcomes,
     Outcomes,
     Scenario,
     matched_distance,
 )
-from robocov_app.replication.verdicts import Claim, Criterion, amount, verdict_counts
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 

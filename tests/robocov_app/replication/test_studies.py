@@ -10,6 +10,7 @@ from robocov.environment import CircleObstacle, DiscStart, Environment, PolygonO
 from robocov.errors import StartError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.replication import studies
+from robocov_app.replication.claims import LEAST_MAPS
 from robocov_app.replication.contenders import (
     GRIDS,
     LLOYD,
@@ -24,7 +25,6 @@ from robocov_app.replication.contenders import (
 )
 from robocov_app.replication.evidence import account_of
 from robocov_app.replication.plan import CONVEX, CONVEX_KINDS, FULL, KINDS, NON_CONVEX, QUICK, TEAM
-from robocov_app.replication.verdicts import LEAST_MAPS
 from robocov_app.sweep.study import TEAM as TEAM_PARAMETERS
 from robocov_app.sweep.study import tasks_of
 

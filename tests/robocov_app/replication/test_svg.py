@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.figures.statistics import Interval
+from robocov_app.replication.claims import Criterion, amount
 from robocov_app.replication.pages import Strip, interval_bar, strips
-from robocov_app.replication.verdicts import Criterion, amount
 
 gaps = st.dictionaries(
     st.text("abc<&", min_size=1, max_size=4), st.floats(-0.05, 3.0), min_size=1, max_size=9

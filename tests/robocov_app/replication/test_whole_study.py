@@ -25,13 +25,13 @@ from robocov.metrics.results import read_results
 from robocov_app.cli import main
 from robocov_app.replication import beyond_claims, claims, contenders, pages, results, step_times, studies
 from robocov_app.replication import plan as planned
+from robocov_app.replication.claims import amount
 from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
 from robocov_app.replication.figures import arrival, describe_figure
 from robocov_app.replication.pages import Image
 from robocov_app.replication.plots import WORDS, beyond_plots, gap_samples
 from robocov_app.replication.results import Interrupted, forecast, open_folder
-from robocov_app.replication.verdicts import amount
 from robocov_app.sweep.study import Study, tasks_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("tiny-paper")]
