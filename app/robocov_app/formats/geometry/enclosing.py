@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -26,13 +26,11 @@ AROUND = 1.0
 _MOST = 0.5
 """A boundary holds more than this part of the other shapes; walls that are one leave so much of it open."""
 
-
 _FARTHEST_PARTS = 10.0 * LARGEST
 """Shapes that are farther from each other, in metres, are of no map: unions of such take seconds."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Enclosure:
+class _Enclosure(NamedTuple):
     """A boundary that was found: its area with whatever holes it has, and the shapes that made it."""
 
     area: MultiPolygon
@@ -75,25 +73,19 @@ def foreign_map(
     if world is None and not shapes.outlines and not shapes.lines:
         dropped = f" ({'; '.join(shapes.dropped)} left out)" if shapes.dropped else ""
         raise MapError(f"{shapes.where}: no closed outline and no line{dropped}, but a drawing was wanted")
-    everything: list[BaseGeometry] = [] if world is None else [world]
-    everything += [o.area for o in shapes.outlines]
-    everything += [shapely.linestrings(line.points) for line in shapes.lines]
+    everything = [*shapes.areas, *shapes.paths, *([] if world is None else [world])]
     # one of many parts may be a map, if they are not all too far from each other
     _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
     shapes.require_untangled()
     asked = shapes.options.outlines
-    if world is not None:
-        boundary: _Enclosure | None = _Enclosure(world, "")
-    else:
-        boundary = _named(shapes)
-        if boundary is None and asked != "free":
-            boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
-    if asked is None and not solid:
-        solid = not shapes.outlines or (
-            boundary is not None and len(shapes.outlines) > len(boundary.outlines)
-        )
-    elif asked is not None:
+    boundary = _named(shapes) if world is None else _Enclosure(world, "")
+    if boundary is None and asked != "free":
+        boundary = _largest(shapes, solid or asked == "solid", wholly=accessible and asked is None)
+    if asked is not None:
         solid = asked == "solid"
+    elif not solid:
+        others = boundary is not None and len(shapes.outlines) > len(boundary.outlines)
+        solid = not shapes.outlines or others
     if solid:
         boundary = boundary or _walled(shapes) or _rectangle(shapes)
         area = boundary.area
@@ -107,21 +99,27 @@ def foreign_map(
     used = boundary or _Enclosure(area, "")
     inner = [outline for outline in shapes.outlines if solid and outline not in used.outlines]
     walls = [line for line in shapes.lines if line not in used.lines]
-    blocks = [outline.area for outline in inner]
-    solids = [*(line.solid for line in walls), *(pillar.polygon for pillar in shapes.pillars)]
+    blocks = np.array([outline.area for outline in inner], dtype=object)
     shapely.prepare(area)
-    around = np.zeros(0, dtype=bool) if not blocks else shapely.covered_by(area, blocks)
-    blocks = [block for block, outer in zip(blocks, around, strict=True) if not outer]
-    outside = int((~shapely.intersects(area, [*blocks, *solids])).sum() + around.sum())
+    around = shapely.covered_by(area, blocks)
+    obstacles = [
+        *blocks[~around],
+        *(line.solid for line in walls),
+        *(each.polygon for each in shapes.pillars),
+    ]
+    outside = int((~shapely.intersects(area, obstacles)).sum() + around.sum())
     if outside:
         shapes.leave_out("shape", "outside of the boundary", outside)
-    free = _without(area, [*blocks, *solids])
+    free = area
+    if obstacles:
+        free = polygons_of(shapely.difference(area, united(obstacles), grid_size=GRID))
     outer = None
     # what is free of a grid has its own outline
     plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
     if boundary is not None and (solid or boundary.area is not area) and plain:
         outer = Polygon(boundary.area.geoms[0].exterior)
-    elif solids and len(area.geoms) == len(free.geoms) == 1:  # walls that begin at the edge are no part of it
+    elif (walls or shapes.pillars) and len(area.geoms) == len(free.geoms) == 1:
+        # walls that begin at the edge are no part of it
         outer = Polygon(area.geoms[0].exterior)
     return ForeignMap(
         name=name,
@@ -139,7 +137,7 @@ def foreign_map(
         robots=tuple(shapes.robots),
         repaired=shapes.repaired,
         dropped=shapes.dropped,
-        notes=(*shapes.notes, *_words(shapes, solid, boundary, len(blocks))),
+        notes=(*shapes.notes, *_words(shapes, solid, boundary, int((~around).sum()))),
     )
 
 
@@ -160,17 +158,12 @@ def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) ->
 
 def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
     """Return how the shapes were taken."""
-    if boundary is not None and not boundary.words:  # the format says what all of it is
-        blocks, told = 0, []
-    else:
-        told = [f"the boundary is {boundary.words}"] if boundary is not None and solid else []
-    if blocks:
+    told = [f"the boundary is {boundary.words}"] if boundary and boundary.words and solid else []
+    if blocks and (boundary is None or boundary.words):  # else the format says what all of it is
         told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
     elif not solid and len(shapes.outlines) > 1:
-        told.append(
-            f"{counted(len(shapes.outlines), 'closed outline')} taken as free space "
-            f"(--outlines solid: as obstacles)"
-        )
+        many = counted(len(shapes.outlines), "closed outline")
+        told.append(f"{many} taken as free space (--outlines solid: as obstacles)")
     used = boundary.lines if boundary is not None else ()
     widths = sorted(line.width for line in shapes.lines if line not in used)
     if widths:
@@ -203,10 +196,9 @@ def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
     if not shapes.outlines:
         return None
     outline = max(shapes.outlines, key=_filled)
-    inner: list[BaseGeometry] = [o.area for o in shapes.outlines if o is not outline]
+    inner = [area for area in shapes.areas if area is not outline.area]
     if solid:
-        inner += [*(shapely.linestrings(line.points) for line in shapes.lines)]
-        inner += [pillar.polygon for pillar in shapes.pillars]
+        inner += [*shapes.paths, *(pillar.polygon for pillar in shapes.pillars)]
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None
@@ -228,7 +220,7 @@ def _filled(outline: Outline) -> float:
 
 def _walled(shapes: Shapes) -> _Enclosure | None:
     """Return the outer edge of the walls if they close."""
-    solid = _together([*(o.area for o in shapes.outlines), *(line.solid for line in shapes.lines)])
+    solid = _together([*shapes.areas, *(line.solid for line in shapes.lines)])
     fills = [Polygon(part.exterior) for part in solid.geoms]
     if not fills:  # what there is is thinner than the grid
         return None
@@ -241,14 +233,10 @@ def _walled(shapes: Shapes) -> _Enclosure | None:
 def _rectangle(shapes: Shapes) -> _Enclosure:
     """Return a rectangle around everything."""
     around = AROUND if shapes.options.around is None else shapes.options.around
-    low_x, low_y, high_x, high_y = shapely.total_bounds(
-        [*(o.area for o in shapes.outlines), *(line.solid for line in shapes.lines)]
-    )
-    box = shapely.box(low_x - around, low_y - around, high_x + around, high_y + around)
-    return _Enclosure(
-        MultiPolygon([box]),
-        f"a rectangle {around:g} m around everything (--around): no shape holds the others",
-    )
+    x, y, right, top = shapely.total_bounds([*shapes.areas, *(line.solid for line in shapes.lines)])
+    box = shapely.box(x - around, y - around, right + around, top + around)
+    words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
+    return _Enclosure(MultiPolygon([box]), words)
 
 
 def _holds(outer: BaseGeometry, inner: Sequence[BaseGeometry]) -> bool:
@@ -264,9 +252,3 @@ def _together(areas: Sequence[BaseGeometry]) -> MultiPolygon:
         return polygons_of(areas[0])
     # to unite first and round then takes a tenth of the time
     return polygons_of(shapely.set_precision(united(areas), GRID))
-
-
-def _without(area: MultiPolygon, blocks: Sequence[BaseGeometry]) -> MultiPolygon:
-    if not blocks:
-        return area
-    return polygons_of(shapely.difference(area, united(blocks), grid_size=GRID))

@@ -230,6 +230,16 @@ class Shapes:
         return THICKNESS if self.options.thickness is None else self.options.thickness
 
     @property
+    def areas(self) -> list[BaseGeometry]:
+        """What the outlines enclose."""
+        return [outline.area for outline in self.outlines]
+
+    @property
+    def paths(self) -> list[BaseGeometry]:
+        """The lines without their width."""
+        return [shapely.linestrings(line.points) for line in self.lines]
+
+    @property
     def repaired(self) -> tuple[str, ...]:
         """What had to be put right."""
         told = [f"{counted(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())]
@@ -263,8 +273,7 @@ class Shapes:
 
     def require_untangled(self) -> None:
         """Raise MapError when the shapes cross each other too often to compute what is free among them."""
-        rings = shapely.get_rings(shapely.get_parts([outline.area for outline in self.outlines]))
-        Crossings(self.where).add([*rings, *(shapely.linestrings(line.points) for line in self.lines)])
+        Crossings(self.where).add([*shapely.get_rings(shapely.get_parts(self.areas)), *self.paths])
 
     def count(self, vertices: int) -> None:
         """Count vertices that were read. Raises MapError when there are too many."""

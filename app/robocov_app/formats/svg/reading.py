@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.errors import MapError, one_line
@@ -100,8 +99,7 @@ def _page(root: Element, scale: float | None) -> tuple[Array, float, float]:
 
 def _require_size(shapes: Shapes) -> None:
     """Refuse a plan that is as small as the paper it is on, before a robot finds no room in it."""
-    everything: list[BaseGeometry] = [outline.area for outline in shapes.outlines]
-    everything += [shapely.linestrings(line.points) for line in shapes.lines]
+    everything = [*shapes.areas, *shapes.paths]
     x, y, right, top = shapely.total_bounds(everything) if everything else (0.0, 0.0, np.inf, np.inf)
     if max(right - x, top - y) < _SMALLEST:
         raise MapError(
