@@ -1,11 +1,8 @@
 """Pictures: dark is an obstacle.
 
-The size in the header is looked at before anything is unpacked. PGM and PPM are read here: Pillow rounds what
-has another largest value than 255 to it, which the thresholds of ROS notice, and takes half a second for a
-million of pixels.
-
-A picture that `robocov export` wrote says in a text chunk what a pixel is in metres and where its lower
-left corner is, and so comes back to its place.
+PGM and PPM are read here: Pillow rounds what has another largest value than 255 to it, which the thresholds
+of ROS notice, and takes half a second for a million of pixels. A picture that `robocov export` wrote says in
+a text chunk what a pixel is in metres and where its lower left corner is, and so comes back to its place.
 """
 
 from __future__ import annotations

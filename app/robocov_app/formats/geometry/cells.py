@@ -36,10 +36,7 @@ _DIGITS = 6
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """A grid over a map, with one cell to spare on each side.
-
-    `cell` in m. `origin`, (x, y) m: lower left corner of the lower left cell.
-    """
+    """A grid over a map, one cell to spare on each side; `origin`, m, is its lower left corner."""
 
     rows: int
     columns: int
@@ -47,10 +44,7 @@ class Grid:
     origin: tuple[float, float]
 
     def covered(self, geometry: BaseGeometry, finer: int = 1) -> BoolArray:
-        """Return which cells have their centre in polygons, (rows, columns), the lowest row first.
-
-        With `finer` each cell is so many by so many, all of which are returned.
-        """
+        """Return which cells, or `finer` ones, have their centre in polygons, the lowest row first."""
         rows, columns = self.rows * finer, self.columns * finer
         row, at = self._crossings(geometry, finer)
         inside = (row >= 0) & (row < rows)
@@ -65,8 +59,7 @@ class Grid:
 
         The grid-intersection digitization of thin things (Klette and Rosenfeld 2004, Digital Geometry,
         chapter 2): of each interval outside of the polygons on a line of centres, along rows and along
-        columns, one cell. These and the cells with their centre outside hang together, over their corners,
-        where what is outside does.
+        columns, one cell. With those whose centre is outside they hang together where what is outside does.
         """
         found = np.zeros((self.rows, self.columns), dtype=bool)
         for cells, across in ((found, False), (found.T, True)):
@@ -91,10 +84,7 @@ class Grid:
     def _crossings(
         self, geometry: BaseGeometry, finer: int = 1, *, across: bool = False
     ) -> tuple[IntArray, Array]:
-        """Return where sides of polygons cross the lines of centres: the line, and the place on it in cells.
-
-        Lines are rows, or with `across` columns; centres are at whole numbers.
-        """
+        """Return where sides cross lines of centres, rows or columns: which one, and where on it."""
         sides = (sides_of(geometry) - self.origin) / (self.cell / finer) - 0.5
         if across:
             sides = sides[..., ::-1]
@@ -109,10 +99,9 @@ class Grid:
 
 
 def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
-    """Return a grid over the boundary of `environment`; what was made of cells of that size meets them again.
+    """Return a grid over the boundary; what was made of cells of that size meets them again.
 
-    `cell`, m: side of a cell; `CELL` by default. `most`: cells. Raises ParameterError when there are more
-    than `most`.
+    Raises ParameterError when there are more than `most` cells.
     """
     cell = CELL if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
@@ -131,8 +120,8 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
     """Return which cells of `grid` are free, (rows, columns), the lowest row first.
 
     A cell is free if its centre is, and if nothing solid would be lost: no wall is too thin, and no pillar
-    too small, to block a cell. Where one can drive from cell to cell through their sides one can drive on the
-    map. Raises ParameterError when none is.
+    too small, to block a cell: where robots drive from side to side of cells they drive on the map. Raises
+    ParameterError when none is.
     """
     free = grid.covered(environment.free) & ~grid.between(environment.free)
     # what is smaller than a cell may lie between all lines of centres
@@ -146,7 +135,7 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
 
 
 def lost_passages(environment: Environment, grid: Grid, free: BoolArray) -> tuple[str, ...]:
-    """Return what part of its free space is lost in cells, or falls apart, and which cells would keep it."""
+    """Return what free space is lost in cells, or falls apart, and which cells would keep it."""
     lost = _lost(environment, grid, free)
     if not lost:
         return ()
@@ -162,7 +151,7 @@ def lost_passages(environment: Environment, grid: Grid, free: BoolArray) -> tupl
 
 
 def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
-    """Return what parts of the free space, with room for a robot, are not in one piece in free cells."""
+    """Return which parts of the free space, with room for a robot, are not in one piece in free cells."""
     parts = np.array(environment.free.geoms)
     parts = parts[shapely.area(parts) >= _LEAST]
     islands, _ = ndimage.label(free)
@@ -219,7 +208,7 @@ def grid_report(
     dropped: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> ExportReport:
-    """Return the report of a map that was written as the free cells of a grid, in the format `name`."""
+    """Return the report of a map that was written as the free cells of a grid."""
     return ExportReport(
         name,
         files,

@@ -26,13 +26,12 @@ MOST_POINTS = 250_000
 
 
 def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[Array, IntArray]:
-    """Return points of cubic Bézier curves: all of the first one without its begin, then of the next.
+    """Return points, (k, 2), of cubic Bézier curves, (n, 4, 2), without their begins; and how many each has.
 
     The number of equal steps of the parameter is that of Wang's formula: the second differences of the
     control points bound the curvature. (G. Wang, The subdivision method for finding the intersection between
-    two Bézier curves or surfaces, Zhejiang University Journal, 1984.) `control`: (n, 4, 2). `tolerance`: in
-    the same unit. `most`: so many points are made at most. Returns: `points`, (k, 2). `count`, (n,): points
-    of each. Raises ValueError when there would be more.
+    two Bézier curves or surfaces, Zhejiang University Journal, 1984.) Raises ValueError when there would be
+    more than `most`.
 
     Examples
     --------
@@ -52,11 +51,9 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
 def arcs(
     centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MOST_POINTS
 ) -> tuple[Array, IntArray]:
-    """Return points of elliptic arcs: all of the first one without its begin, then of the next.
+    """Return points and counts as `beziers` for n elliptic arcs: centre + u cos(angle) + v sin(angle).
 
-    `centre`, `u`, `v`, (n, 2): a point of an arc is centre + u cos(angle) + v sin(angle). `begin`, `sweep`,
-    (n,) rad: first angle, and how far it goes on, either way. `tolerance`: in the same unit. Returns: points,
-    count: as of `beziers`. Raises ValueError as `beziers`.
+    `begin`, `sweep`, (n,) rad: first angle, and how far it goes on, either way.
     """
     # the longer half axis: the greater singular value of [u v]
     square, area = (u**2 + v**2).sum(axis=1), u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
@@ -79,8 +76,7 @@ def arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance
 def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
     """Return points of any smooth curve, (k, 2): steps are halved until their middles are near their chords.
 
-    `curve`: takes parameters (k,) to points (k, 2). `breaks`, (b,): growing parameters, from the curve's
-    begin to its end; smooth between one and the next. `tolerance`: in the unit of the points.
+    `curve` takes parameters to points; it is smooth between one of the growing `breaks` and the next.
     """
     part = np.arange(_FIRST) / _FIRST
     t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])

@@ -31,19 +31,16 @@ _CLEARLY = 1 + 1e-6
 
 
 def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
-    """Return where the centre of a robot may be, one polygon for each place that it cannot leave.
-
-    Places smaller than a quarter of the radius squared are none: it hardly moves there.
-    """
+    """Return where the centre of a robot may be, each place that it cannot leave, but for tiny ones."""
     inner = free.buffer(-radius, quad_segs=4)
     return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
 
 
 def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[Point, float]:
-    """Return the place farthest from the walls, and how far that is, m; or any that is far enough.
+    """Return the place farthest from the walls, and how far that is, m; or any that is far `enough`.
 
-    Squares that may hold a place that is better by `tolerance` are cut into four, `_SQUARES` of them, the
-    most promising: where there are more, as in a long hall, a place may be a bit better than what is found.
+    Squares that may hold a place better by `tolerance` are cut into four, `_SQUARES` of the most promising:
+    where there are more, as in a long hall, another place may be a bit better.
     """
     sides = shapely.linestrings(sides_of(free))
     walls = STRtree(sides)
@@ -91,13 +88,11 @@ def _rays(sides: Array, y: Array) -> int:
 def closed_gaps(
     sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
 ) -> tuple[IntArray, Array] | None:
-    """Return which gaps have become too narrow; None where there are too many to look at.
+    """Return the (p, 2) sides and the middles of gaps that are too narrow now; None if they are too many.
 
-    A gap is where two sides face each other across the free space. It was wide enough if what these sides
-    stand for is further apart there. `sides`, (m, 2, 2) m: the sides of walls as they are now, from point to
-    point. `paths`, (m,) linestrings m: what each stands for: the wall as it was. `free`, m: the free space
-    now. `width`, m: a robot's diameter. `moved`, m: no wall has moved further. Returns: `pairs`, (p, 2): the
-    two sides. `places`, (p, 2) m: the middle of the gap.
+    A gap is where two `sides`, (m, 2, 2), of walls as they are now face each other across the `free` space.
+    It was wide enough for a robot of diameter `width` if the walls as they were, `paths`, (m,) linestrings,
+    are further apart there; none has `moved` further than so many metres.
     """
     lines = shapely.linestrings(sides)
     tree = STRtree(lines)
@@ -133,9 +128,8 @@ def closed_gaps(
 def paths_of(points: Array, begin: IntArray, size: IntArray, first: IntArray, last: IntArray) -> Array:
     """Return runs of vertices of rings as linestrings, (m,).
 
-    `points`, (k, 2) m: vertices of rings, ring after ring. `begin`, `size`, (m,): where each run's ring
-    begins, and how many vertices it has. `first`, `last`, (m,): the first and the last vertex of each run,
-    along the ring; the same for all of a ring.
+    `begin`, `size`, (m,): where each run's ring begins among `points`, and how many vertices it has. `first`,
+    `last`, (m,): the first and the last vertex of each run, along the ring; the same for all of a ring.
     """
     count = (last - first - 1) % size + 2
     at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)

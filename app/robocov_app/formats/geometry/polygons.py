@@ -48,10 +48,7 @@ class Crossings:
     count: float = 0.0
 
     def add(self, lines: Iterable[BaseGeometry]) -> None:
-        """Count how often the edges of lines and rings cross each other, but for ends and what they share.
-
-        Where edges are many, some are looked at. Raises MapError when there are more than `MAX_CROSSINGS`.
-        """
+        """Count how often edges cross, not how they meet; MapError at more than `MAX_CROSSINGS`."""
         edges = shapely.linestrings(edges_of(lines))
         n = len(edges)
         if n <= _FEW:
@@ -100,12 +97,9 @@ def enclosed(
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
     """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
 
-    `rings`, (k, 2) m: closed or not; repeated vertices do no harm. `rule`: ``holes``: the first ring
-    without the others. ``evenodd``, ``nonzero``: what a ray from there crosses an odd number of times, or
-    what the rings wind around (SVG 2, 13.3.3). `crossings`: of the file so far. Returns: `area`: the
-    largest part first; empty where nothing is enclosed. `reason`: where a ring meets itself or another one,
-    of polygons with holes; fills may. `lost`: how many holes of a polygon take nothing out of it, by the
-    reason. Raises MapError when the rings cross each other too often.
+    `rings`, (k, 2) m: closed or not. `crossings`: of the file so far; MapError when they are too many.
+    Returns the area, the largest part first; where rings of a polygon with holes meet, in words; and how many
+    holes take nothing out of it, by the reason.
 
     Examples
     --------
@@ -134,7 +128,7 @@ def united(areas: Sequence[BaseGeometry]) -> BaseGeometry:
     """Return the union of areas, m.
 
     GEOS unites without a grid ten times as fast as on one, but may lose a part, without a word, where edges
-    are almost on each other. So it is looked whether each corner of what was united is still there.
+    are almost on each other: so each corner is looked for.
     """
     union = shapely.union_all(areas)
     corners = shapely.points(shapely.get_coordinates(areas))
@@ -181,7 +175,7 @@ def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
 
 
 def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array, Array]:
-    """Return how often edges wind around each of (m, 2) points, and how many a ray to the right crosses."""
+    """Return how often edges wind around (m, 2) points, and how many a ray to the right crosses."""
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     which, near = tree.query(shapely.linestrings(np.stack([points, far], axis=1)))
     p, a, b = points[which], edges[near, 0], edges[near, 1]
@@ -232,12 +226,10 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
 def bounded(
     free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
 ) -> tuple[Polygon, list[Polygon]]:
-    """Return a boundary around `free`, and what is solid in it.
+    """Return a boundary around `free`, whose coordinates have so many `digits`, and what is solid in it.
 
-    `free`, m: with coordinates of so many `digits`. `given`, m: a boundary without holes, which may run along
-    the free space as it was before walls moved. None: the outline of the free space, or its convex hull where
-    it is of several parts. `hull`: whether the convex hull of that is wanted. `margin`, m: so much is solid
-    around it. `digits`: decimals of the coordinates.
+    It is `given`, m, without holes, or else the outline of `free`, or of several parts the convex hull; or
+    the `hull` of that; with so much `margin`, m, around it.
 
     Examples
     --------
@@ -266,10 +258,7 @@ def bounded(
 
 
 def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
-    """Return the polygons of a valid geometry with coordinates of so many decimals, valid, the largest first.
-
-    Outer rings run counter-clockwise, holes clockwise. What has no area any more is not there.
-    """
+    """Return the `polygons` of a valid geometry with coordinates of so many decimals, still valid."""
     near = shapely.set_precision(geometry, 10.0**-digits)
     return polygons(shapely.transform(near, lambda points: np.round(points, digits)))
 

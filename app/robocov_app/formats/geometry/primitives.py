@@ -35,10 +35,7 @@ def with_primitives(
     A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
     twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
     along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
-    where there would be more places for a robot, apart from each other. `solid` in m. `primitives`: as the
-    file draws them; they may overlap and stick out of the boundary. `boundary` in m. `tolerance`, m: by so
-    much walls were allowed to move. `digits`: decimals of the coordinates. `places`: so many separate places
-    a robot may be at, as of `passages.rooms`. `radius`, m: of the robot.
+    where a robot of that radius would have more than so many `places`, apart from each other.
 
     Examples
     --------

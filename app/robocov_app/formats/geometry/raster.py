@@ -45,14 +45,12 @@ def foreign_map(
     repaired: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> ForeignMap:
-    """Return `cells` as a map.
+    """Return `cells`, (rows, columns), as a map.
 
-    `cells`: (rows, columns). `cell`, m: side of a cell. `origin`, (x, y) m: lower left corner of the lower
-    left cell. `yaw`, rad: by so much the grid is turned about that corner, counter-clockwise. `unknown`: what
-    unknown cells are; ``cut``: outside of the map, which ends around the known ones. `called`: what the
-    report calls unknown cells. `noise`: obstacles of fewer cells are noise. `where`: what messages call the
-    file. `repaired`, `notes`: what the report says besides. Raises MapError when no cell is free, or the grid
-    is too rough or too far away.
+    `cell`, m: side of a cell. `origin`, m: lower left corner of the lower left one, about which the grid is
+    turned by `yaw`, rad. `unknown`: what unknown cells are, which the report calls `called`; with ``cut`` the
+    map ends around the known ones. `noise`: obstacles of fewer cells are noise. Raises MapError when no cell
+    is free, or the grid is too rough or too far away.
     """
     rows, columns = cells.shape
     corners = _placed(np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float), cell, origin, yaw)
@@ -100,11 +98,10 @@ def foreign_map(
 def free_area(
     free: BoolArray, cell: tuple[float, float], origin: tuple[float, float], where: str
 ) -> MultiPolygon:
-    """Return the free cells as polygons, in metres.
+    """Return the free cells, (rows, columns), the top row first, as polygons in metres.
 
-    `free`, (rows, columns): the top row first. `cell`, (width, height) m: sides of a cell. `origin`, (x, y)
-    m: lower left corner of the lower left cell. `where`: what messages call the file. Raises MapError when no
-    cell is free, or their outline is too rough.
+    `cell`, m: width and height of one. `origin`, m: lower left corner of all. Raises MapError as
+    `foreign_map`.
     """
     if not free.any():
         raise MapError(f"{where}: no cell is free, but some were wanted")

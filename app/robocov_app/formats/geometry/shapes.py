@@ -105,10 +105,9 @@ class Line:
 class Shapes:
     """What a reader has found in the file `where`, as it finds it: checked, counted, chosen by name.
 
-    `pillars`: obstacles whatever outlines are. `vertices`: all that were read. `left_out`, `mended`: things
-    that are no part of the map, with the reason where it needs one, or had to be put right, with what was
-    done, and how many there are. `labels`: all of them, as they are compared and as they are written.
-    `robots`, `notes`, `cell`: as of a `ForeignMap`.
+    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: how many of which things are no part
+    of the map, and why, or had to be put right, and how. `labels`: as they are compared and as they are
+    written. `robots`, `notes`, `cell`: as of a `ForeignMap`.
     """
 
     where: str
@@ -161,10 +160,7 @@ class Shapes:
     def add_outline(
         self, rings: Sequence[Array], labels: Sequence[str] = (), *, rule: Rule = "holes", at: str = ""
     ) -> bool:
-        """Add the area that rings, each (k, 2) m, enclose; return whether there is any.
-
-        Raises MapError when a coordinate is out of range, or there are too many vertices or crossings.
-        """
+        """Add the area that rings, (k, 2) m, enclose, if any; MapError where one is out of range."""
         rings = self._checked(rings, at)
         area, reason, lost = enclosed(rings, rule, self._crossings)
         for why, count in lost.items():

@@ -112,8 +112,7 @@ class Shaping:
 def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
     """Return the environment that `foreign` stands for, and what was done to it.
 
-    `where`: what messages call the map: a file's name. Raises MapError when nothing is free, no place is wide
-    enough for a robot, or the map breaks another rule.
+    Raises MapError when nothing is free, no place is wide enough for a robot, or the map breaks another rule.
     """
     return _Shaper(foreign, shaping, where).shaped()
 
@@ -434,8 +433,7 @@ def _squared(parts: list[Polygon]) -> str:
 def _without_slivers(solid: list[Polygon], before: BaseGeometry, tolerance: float) -> list[Polygon]:
     """Return `solid` without what lies between a boundary and a free space that ran along it.
 
-    Walls of the two have moved apart there: such a sliver was not solid `before`, and is no thicker than
-    they may move.
+    Walls of the two have moved apart there: it is thinner than they may move, and was not solid `before`.
     """
     if not solid or tolerance == 0.0:
         return solid
@@ -456,11 +454,9 @@ def _ring(ring: BaseGeometry, digits: int) -> Ring:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Free space as it was read and as it became, and what differs; all in metres.
+    """Free space as it was read and as it became, m; what is `lost` and `opened`, but for walls that moved.
 
-    `lost`, `opened`: what is free in the first alone, and in the second alone, without the slivers along
-    walls that moved. `region`: convex, around all of it. `gap`: the narrowest passage of the second, if that
-    is soon known.
+    `region`: convex, around all of it. `gap`: the narrowest passage that is left, if that is soon known.
     """
 
     before: BaseGeometry

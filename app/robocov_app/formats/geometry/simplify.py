@@ -73,11 +73,10 @@ class Simplified(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rings:
-    """The k vertices of the rings of polygons, ring after ring, no first one repeated.
+    """The k vertices, (k, 2) m, of the rings of polygons, ring after ring, no first one repeated.
 
-    `points`: (k, 2) m. `begin`, (r,): where each ring begins. `source`, (k,): the vertex of the outline that
-    each one is; with a half added, the middle of the side after it. Along a ring they grow, but for one step
-    back to the ring's lowest.
+    `begin`, (r,): where each ring begins. `source`, (k,): the vertex of the outline that each one is; with a
+    half added, the middle of the side after it. Along a ring they grow, but for one step back to its lowest.
     """
 
     points: Array
@@ -126,11 +125,10 @@ class Rings:
 
 @dataclass(frozen=True, eq=False)
 class Outline(Rings):
-    """All vertices of polygons.
+    """All vertices of polygons, and the polygon that each ring belongs to; its outer ring comes first.
 
-    `owner`, (r,): the polygon that each ring belongs to; its outer ring comes first. `neck`, (k,): whether
-    two obstacles touch there: the vertex stands for a neck as `tracing` makes them. `cell`, m: side of the
-    cells that it is the outline of, the longer one.
+    `neck`, (k,): where the vertex stands for a neck of `tracing`. `cell`, m: the longer side of the cells
+    that it is the outline of.
     """
 
     owner: IntArray
@@ -139,11 +137,10 @@ class Outline(Rings):
 
 
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
-    """Return `free` with fewer vertices.
+    """Return `free`, m, valid, with fewer vertices; walls move by the tolerance, m, at most.
 
-    `free`, m: valid; of a raster as `tracing.traced` makes it. `tolerance`, m: walls may move by so much; 0
-    changes nothing. `cell`, m: side of the cells that it is the outline of. `radius`, m: of a robot: where it
-    passes, it still passes.
+    `cell`, m: side of the cells that it is the outline of. `radius`, m: of a robot: where it passes, it still
+    does.
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)
@@ -194,8 +191,7 @@ def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
 class _Check:
     """What is wrong with a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
 
-    `allowed`, (k,) m: the tolerance at each vertex, `tolerance` at first. `width`, m: of a robot. `found`:
-    counts what is wrong where the tolerance is still whole.
+    `allowed`, (k,) m: the tolerance at each. `found` counts what is wrong where that is still the whole one.
     """
 
     outline: Outline
@@ -216,10 +212,7 @@ class _Check:
         return np.asarray(order[np.where(place < drawing.begin[ring], end[ring], place)])
 
     def misdrawn(self) -> tuple[BoolArray, BoolArray]:
-        """Return what belongs to a ring of another size, and what is drawn too far off.
-
-        Of those that one side stands for it is the one that is furthest.
-        """
+        """Return what is in a ring of another size, and what a side stands for from furthest off."""
         allowed, distance = self.allowed, self._distance()
         furthest = np.lexsort((-distance, self.side))
         furthest = furthest[beginnings(self.side[furthest])]
@@ -323,10 +316,9 @@ def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:
 
 
 def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Rings:
-    """Return `outline` with what is within the tolerance left out.
+    """Return `outline` with what is within the tolerance of each vertex, (k,) m, left out.
 
-    `tolerance`, (k,) m: of each of its vertices; where it is 0 they all stay. `fixed`, (k,): which of them
-    stay besides, or the middles that stand for them. Rings may have fewer than three vertices then.
+    Where that is 0 vertices stay, and where they are `fixed`, (k,), or the middles that stand for them.
     """
     path = _without_stairs(outline, tolerance)
     if not len(path.points):
@@ -343,10 +335,7 @@ def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Rings:
 
 
 def _kept(path: Rings, allowed: Array, stays: BoolArray, most: Array) -> tuple[IntArray, IntArray]:
-    """Return the vertices of `path` that are kept, ring after ring, and where each ring begins among them.
-
-    Those that stay are, and in each ring no more than `most` (r,) m is left out.
-    """
+    """Return which vertices of `path` are kept: those that stay, and all but `most` (r,) m of a ring."""
     begin, count = path.begin, path.size
     changes = allowed != allowed[path.after]
     stays |= changes
@@ -450,8 +439,8 @@ def with_necks(outline: Outline, drawing: Rings) -> Rings:
 def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
     """Return `drawing` with rings of the area that they had, where they lost or won much of it.
 
-    All sides of such a ring move by the same distance, of at most half the `tolerance` (k,) at its
-    vertices. Small round things need it: with few corners, each on their rim, they get smaller.
+    All sides of such a ring move by the same distance, of at most half the tolerance at its vertices. Small
+    round things need it: with few corners, each on their rim, they get smaller.
     """
     points, was, now = drawing.points, outline.areas, drawing.areas
     some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))
@@ -524,9 +513,8 @@ def _dot(a: Array, b: Array) -> Array:
 def sharpened(plan: Polygon, tolerance: float) -> Polygon:
     """Return `plan`, m, with its cut corners made whole, or as it is where that would break it.
 
-    A run of edges of at most 1.5 `tolerance`, m, becomes the point where the long edges before and after it
-    meet when they are drawn on, if all of the run is within 2 `tolerance` of that point: unlike a plain
-    simplification, it keeps the directions of the walls.
+    A run of short edges becomes the point where the long edges before and after it meet, if all of the run is
+    near that: unlike a plain simplification, it keeps the directions of the walls.
 
     Examples
     --------

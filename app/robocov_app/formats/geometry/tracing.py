@@ -24,13 +24,11 @@ _STRIP = 512
 
 
 def traced(free: BoolArray, where: str) -> MultiPolygon:
-    """Return the union of the free cells, one polygon for each of their connected parts.
+    """Return the union of the free cells, (rows, columns), one polygon for each of their connected parts.
 
-    Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row): the lowest row
-    comes first. It is exact but for the necks between obstacles that touch at a corner, `NECK` squared for
-    each. Every vertex is a true corner, none lies within a straight wall, and no two rings touch. `free`:
-    (rows, columns) bool. `where`: what messages call the grid. Raises MapError when the outline has more
-    vertices than `files.MAX_VERTICES`.
+    Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row). Every vertex is a
+    true corner, none lies within a straight wall, and no two rings touch: necks join obstacles that touch at
+    a corner. Raises MapError when there are more than `files.MAX_VERTICES`.
 
     Examples
     --------
@@ -82,12 +80,10 @@ def _corners(free: BoolArray, where: str) -> tuple[IntArray, IntArray, BoolArray
 def _links(
     free: BoolArray, column: IntArray, row: IntArray, twin: BoolArray
 ) -> tuple[NDArray[np.int32], IntArray, Array]:
-    """Return what the outline is made of, corner by corner.
+    """Return what the outline is made of: the part of each corner, the corner after it, and its points.
 
     Where two corners meet, each is one of a free cell, and the one with the side to the west stands first.
-    The free cells are on the left of the outline. Returns: `part`, (k,): the part of the free cells that the
-    corner belongs to. `following`, (k,): the corner that follows it. `points`, (k, 2, 2): where the outline
-    comes to it, and where it leaves it: the same but for necks.
+    The free cells are on the left. The points, (k, 2, 2): where the outline comes and where it leaves.
     """
     labels = ndimage.label(free)[0]
 
@@ -122,10 +118,7 @@ def _links(
 
 
 def _rings(following: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the corners ring by ring, and where in that order each ring begins.
-
-    Rings are ordered by their first corner, which is where they begin.
-    """
+    """Return the corners ring by ring, and where each begins: at its first corner, which orders them."""
     after = following.tolist()
     fresh = bytearray(b"\x01") * len(after)
     order: list[int] = []

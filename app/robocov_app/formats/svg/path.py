@@ -29,10 +29,7 @@ PIXEL = 0.0254 / 96
 
 
 def number(text: str) -> float:
-    """Return a number; what is next to nothing is nothing.
-
-    Raises ValueError when it is so large that calculating with it would go wrong.
-    """
+    """Return a number, next to nothing as nothing; ValueError when it is too large to calculate with."""
     value = float(text)
     if not abs(value) <= _LARGEST:
         raise ValueError(f"{text[:20]}, but a number up to {_LARGEST:g} was wanted")
@@ -40,10 +37,7 @@ def number(text: str) -> float:
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers of a list as that of ``points``.
-
-    Raises ValueError when there is something else in it.
-    """
+    """Return the numbers of a list as that of ``points``; ValueError when something else is in it."""
     found, at = [], 0
     while match := NUMBER.match(text, at):
         found.append(number(match[1]))
@@ -54,11 +48,7 @@ def numbers(text: str) -> list[float]:
 
 
 def length(text: str, whole: float | None = None) -> float:
-    """Return a length in user units.
-
-    `whole`: what a percentage is of; None allows none. Raises ValueError when it is no length, or of a unit
-    that depends on a font.
-    """
+    """Return a length in user units; `whole`: what a percentage is of. ValueError when it is none."""
     match = _LENGTH.fullmatch(text)
     unit = match[2].lower() if match else ""
     if match is None or not (unit in _PIXELS or (unit == "%" and whole is not None)):
@@ -75,10 +65,7 @@ def affine(
 
 
 def composed(outer: Array, inner: Array) -> Array:
-    """Return the matrix of both, the inner one first.
-
-    Raises ValueError when it makes things so large that calculating with them would go wrong.
-    """
+    """Return the matrix of both, the inner one first; ValueError when it makes things too large."""
     both = outer @ inner
     if not (np.abs(both) <= _LARGEST).all():
         raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}, but smaller ones were wanted")
@@ -99,10 +86,7 @@ def stretch(matrix: Array) -> tuple[float, float]:
 
 
 def transform(text: str) -> Array:
-    """Return the matrix of a ``transform``; the last of its functions comes first.
-
-    Raises ValueError when there is something else in it.
-    """
+    """Return the matrix of a ``transform``, whose last function comes first; ValueError on anything else."""
     matrix, at = affine(), 0
     while match := _FUNCTION.match(text, at):
         function = _FUNCTIONS.get(match[1].lower())
@@ -138,10 +122,9 @@ _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
 
 
 def fitted(box: tuple[float, float, float, float], width: float, height: float, how: str = "") -> Array:
-    """Return the matrix that fits a ``viewBox`` into a viewport (SVG 2, section 8.2).
+    """Return the matrix that fits a ``viewBox`` into a viewport from [0, 0] on (SVG 2, section 8.2).
 
-    `box`: of positive size. `width`, `height`: of the viewport, whose corner is [0, 0]. `how`:
-    ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
+    `how`: ``preserveAspectRatio``; empty is the default, ``xMidYMid meet``.
     """
     align, _, rule = how.strip().partition(" ")
     x, y = width / box[2], height / box[3]
@@ -166,12 +149,10 @@ _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A
 def subpaths(
     text: str, tolerance: float, most: int, draws: int = MOST_DRAWS
 ) -> tuple[list[tuple[Array, bool]], int]:
-    """Return the subpaths of path data: points (k, 2), and whether they were closed.
+    """Return the subpaths of path data, (k, 2) points and whether they were closed; and how many commands.
 
-    `text`: the attribute ``d``. `tolerance`: largest distance of a curve from its points, in the unit of the
-    path. `most`, `draws`: so many points are made at most, and so many commands carried out. Returns:
-    `subpaths`. `draws`: how many commands were carried out. Raises ValueError where it is no path data, or
-    where it has more; the message says which character.
+    `tolerance`: largest distance of a curve from its points. `most`, `draws`: points and commands at most.
+    Raises ValueError where it is no path data, or has more; the message says which character.
 
     Examples
     --------
@@ -207,8 +188,8 @@ def subpaths(
 class _Pen:
     """What is drawn, and where the pen is.
 
-    All vertices of all subpaths are in one list. A curve is kept with the index of the vertex that it ends
-    at, and all of them become points together: one by one that takes long.
+    A curve is kept with the index of the vertex that it ends at: all become points together, which is
+    quicker.
     """
 
     def __init__(self) -> None:

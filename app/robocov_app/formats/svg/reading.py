@@ -46,18 +46,15 @@ def is_svg(path: Path, head: bytes) -> bool:
 def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that an SVG file draws.
 
-    Filled shapes are areas, by their fill rule: solid, but for the boundary (see
-    `enclosing.foreign_map`, whose names are ids, classes and the labels of Inkscape's
-    layers, of the shape and the groups around it). Shapes that are only stroked are walls as wide as the
-    stroke, or as the option ``thickness``. Colours mean nothing. What is hidden, text and pictures are left
-    out. Curves become lines that stay within a millimetre; where a stroke turns more sharply than its mitre
-    limit allows, its point is cut at the limit, as of all walls, and not bevelled.
+    Filled shapes are areas, by their fill rule: solid, but for the boundary (see `enclosing.foreign_map`;
+    names are ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes
+    that are only stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn
+    more sharply than their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
 
     Without the option ``scale``, metres a user unit of the root, the drawing has its own size: 96 px are an
     inch, mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an
-    attribute ``data-origin`` of the root says.
-
-    Raises MapError when the file cannot be read or understood, or is smaller than a metre at its own scale.
+    attribute ``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own
+    scale.
     """
     root, where = read_svg_tree(path)
     shapes = Shapes(where, options)
@@ -129,8 +126,8 @@ def _labels(element: Element) -> list[str]:
 class _Place:
     """Where an element stands, and what it has from the groups around it.
 
-    `matrix`, (3, 3): from its units to metres. `labels`: of the groups, the innermost first. `width`,
-    `height`: of the innermost viewport, in its units.
+    `matrix`, (3, 3): from its units to metres. `labels`: the innermost first. `width`, `height`: of the
+    viewport.
     """
 
     matrix: Array
@@ -159,10 +156,7 @@ class _Place:
 
 
 class _Drawing:
-    """Goes through the elements as they are drawn and adds them to the shapes.
-
-    Groups, uses and nested pictures are carried out; a MapError says what cannot be understood.
-    """
+    """Goes through the elements as they are drawn, uses and nested pictures too, and adds the shapes."""
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
         self.root = root

@@ -50,10 +50,7 @@ class _Rule(NamedTuple):
 
 @dataclass
 class StyleSheet:
-    """The rules of all ``style`` elements of the file `where`, of selectors of tags, classes and ids.
-
-    `strange`: rules that are left out: of other selectors, or within @supports and the like.
-    """
+    """The rules of the file `where`, of tags, classes and ids; others, as in @supports, are `strange`."""
 
     where: str
     strange: int = 0
@@ -81,10 +78,7 @@ class StyleSheet:
                 self._add(selector.strip(), properties)
 
     def of(self, element: Element) -> dict[str, str]:
-        """Return the properties that an element has of itself: attributes, then rules, then its own style.
-
-        Raises MapError when there are too many elements with too many rules each.
-        """
+        """Return an element's own properties; MapError when there are too many rules for too many."""
         attributes = element.attributes
         found = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
         classes = set(attributes.get("class", "").split())
