@@ -2,42 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-import numpy as np
 import pygame
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
+from robocov.errors import counted
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits.density import density_label
 from robocov_app.editor.edits.fixes import TITLES
-from robocov_app.editor.model.selection import Selection, Vertex, numbered_name, place_of, points_of
+from robocov_app.editor.model.selection import Selection, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.ui.commands import fix_problem, whole
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.fields import FIELDS
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
-from robocov_app.render.canvas import Canvas
 from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.layout import Layout
-from robocov_app.toolkit.overlay import FLAT, wrapped
+from robocov_app.toolkit.overlay import flat_canvas, wrapped
 from robocov_app.toolkit.ui import SMALL, TEXT, Ui
 
 TABS = ("map", "object", "snap", "problems", "history")
 
-ROW = 20.0
-"""Height of a line of a list, px at scale 1."""
-
-MOST_PROBLEMS = 200
-"""Problems that are listed."""
-
+ROW = 20.0  # height of a line of a list, px at scale 1
+MOST_PROBLEMS = 200  # that are listed
 _NAME = 62.0
-
-_FILE = (
-    (("New", "new"), ("Open", "open"), ("Save", "save"), ("Try it", "try")),
-    (("Undo", "undo"), ("Redo", "redo"), ("Keys", "help"), ("Commands", "palette")),
-)
 
 _FACTS = {
     "Size": "Width and height of the boundary",
@@ -53,62 +43,40 @@ _NOTHING = (
     "Tab goes on to the next; Ctrl A takes all."
 )
 
-_Buttons = tuple[tuple[str, str], ...]
-_TURNS = (
-    ("Turn ↺", "rotate:left"),
-    ("Turn ↻", "rotate:right"),
-    ("Flip ↔", "mirror:x"),
-    ("Flip ↕", "mirror:y"),
-)
-_ONE: tuple[_Buttons, ...] = (
-    _TURNS,
-    (("Path", "tool:path"), ("Loop ↺", "path:repeat"), ("Play", "path:play"), ("No path", "path:none")),
-)
-_START: tuple[_Buttons, ...] = ((("Delete", "delete"), ("Copy", "duplicate"), ("Default", "start:default")),)
-
-_BUTTONS: dict[str, tuple[_Buttons, ...]] = {
-    "vertex": ((("Delete", "delete"), ("Cut off", "bevel"), ("Round", "round"), ("Split", "split")),),
-    "vertices": ((("Delete", "delete"), ("Cut off", "bevel"), ("Round", "round"), ("Align", "align:left")),),
-    "boundary": ((("Simplify", "simplify"), ("Straighten", "straighten"), ("Repair", "repair")),),
-    "disc": _START,
-    "start": _START,
-    "polygon": _ONE,
-    "circle": _ONE,
-    "wall": _ONE,
+# rows of buttons: their words, and after them the name of the command
+_FILE = ("New new|Open open|Save save|Try it try", "Undo undo|Redo redo|Keys help|Commands palette")
+_STARTS = "Disc tool:disc|Points tool:places|Anywhere start:uniform|Next start:next"
+_PICTURE = "Choose… background|Scale, move tool:picture|Remove background:none"
+_PROBLEMS = "Next problem:next|Repair repair|Clip clip|Mend problem:fix"
+_TURNS = "Turn ↺ rotate:left|Turn ↻ rotate:right|Flip ↔ mirror:x|Flip ↕ mirror:y"
+_ONE = (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none")
+_START = ("Delete delete|Copy duplicate|Default start:default",)
+_BUTTONS = {
+    "vertex": ("Delete delete|Cut off bevel|Round round|Split split",),
+    "vertices": ("Delete delete|Cut off bevel|Round round|Align align:left",),
+    "boundary": ("Simplify simplify|Straighten straighten|Repair repair",),
+    **dict.fromkeys(("disc", "start"), _START),
+    **dict.fromkeys(("polygon", "circle", "wall"), _ONE),
     "several": (
         _TURNS,
-        (("Unite", "unite"), ("Subtract", "subtract"), ("Intersect", "intersect"), ("Divide", "divide")),
-        (
-            ("Left", "align:left"),
-            ("Centre", "align:centre"),
-            ("Right", "align:right"),
-            ("Gaps ↔", "distribute:x"),
-        ),
-        (
-            ("Top", "align:top"),
-            ("Middle", "align:middle"),
-            ("Bottom", "align:bottom"),
-            ("Gaps ↕", "distribute:y"),
-        ),
-        (("Join", "join"), ("Polygons", "polygons"), ("Simplify", "simplify"), ("Delete", "delete")),
+        "Unite unite|Subtract subtract|Intersect intersect|Divide divide",
+        "Left align:left|Centre align:centre|Right align:right|Gaps ↔ distribute:x",
+        "Top align:top|Middle align:middle|Bottom align:bottom|Gaps ↕ distribute:y",
+        "Join join|Polygons polygons|Simplify simplify|Delete delete",
     ),
 }
 """Buttons of the page Object, by what is selected."""
 
 
 class Panel:
-    """Shows the editor, and lets it be edited.
-
-    `tab`: the page that is open. `covered`: something else takes the events. `picked`: called when a problem
-    was clicked.
-    """
+    """Shows the editor, and lets it be edited; `picked` is called when a problem was clicked."""
 
     def __init__(
         self, editor: Editor, commands: Commands, do: Callable[[str], object], picked: Callable[[], object]
     ) -> None:
         self.editor, self._commands, self._do, self._picked = editor, commands, do, picked
-        self.tab = TABS[0]
-        self.covered = self.hidden = False
+        self.tab = TABS[0]  # the page that is open
+        self.covered = self.hidden = False  # whether something else takes the events
         self.ui = Ui(self._page, LIGHT)
         self._drawn: tuple[object, ...] = ()
 
@@ -129,15 +97,8 @@ class Panel:
     def update(self) -> None:
         """Let the page be drawn anew when something that it shows is different."""
         editor = self.editor
-        sketch, selection = editor.preview
-        shows = (
-            editor.version,
-            self.tab,
-            id(sketch),
-            selection,
-            id(editor.measurement),
-            editor.document.unsaved,
-        )
+        (sketch, selection), unsaved = editor.preview, editor.document.unsaved
+        shows = (editor.version, self.tab, id(sketch), selection, id(editor.measurement), unsaved)
         if shows != self._drawn:
             self._drawn, self.ui.stale = shows, True
 
@@ -164,9 +125,9 @@ class Panel:
         for row in _FILE:
             self._buttons(ui, row)
         ui.header("TOOLS")
-        tools = [(tool.title, f"tool:{tool.name}") for tool in self.editor.tools.values()]
-        for k in range(0, len(tools), 4):
-            self._buttons(ui, tools[k : k + 4], columns=4, chosen=f"tool:{self.editor.tool.name}")
+        ui.row(0, 0, 0, 0, below=4)
+        for tool in self.editor.tools.values():
+            self._does(ui, tool.title, f"tool:{tool.name}", chosen=tool is self.editor.tool)
         count = len(self.editor.problems)
         titles = {name: name.capitalize() for name in TABS}
         titles["problems"] += f" {min(count, 99)}" if count else ""
@@ -179,15 +140,16 @@ class Panel:
         pages = (self._map, self._object, self._snap, self._problems, self._history)
         pages[TABS.index(self.tab)](ui)
 
-    def _does(self, ui: Ui, text: str, action: str, chosen: str = "") -> None:
+    def _does(self, ui: Ui, text: str, action: str, *, chosen: bool = False) -> None:
         key = action if ui.find("button", action) is None else f"{action}:again"
-        if ui.button(text, key=key, tip=self._commands[action].tip, chosen=action == chosen, small=True):
+        if ui.button(text, key=key, tip=self._commands[action].tip, chosen=chosen, small=True):
             self._do(action)
 
-    def _buttons(self, ui: Ui, row: Sequence[tuple[str, str]], columns: int = 0, chosen: str = "") -> None:
-        ui.row(*[0.0] * (columns or len(row)), below=4)
-        for text, action in row:
-            self._does(ui, text, action, chosen)
+    def _buttons(self, ui: Ui, row: str) -> None:
+        buttons = [each.rsplit(" ", 1) for each in row.split("|")]
+        ui.row(*[0.0] * len(buttons), below=4)
+        for text, action in buttons:
+            self._does(ui, text, action)
         ui.row()
 
     def _check(self, ui: Ui, kind: str, name: str, title: str) -> None:
@@ -239,13 +201,7 @@ class Panel:
             self._does(ui, "−", "fewer")
             self._does(ui, "+", "more")
             ui.header("STARTS")
-            row = (
-                ("Disc", "tool:disc"),
-                ("Points", "tool:places"),
-                ("Anywhere", "start:uniform"),
-                ("Next", "start:next"),
-            )
-            self._buttons(ui, row)
+            self._buttons(ui, _STARTS)
             ui.row()
             self._check(ui, "show", "robots", "Show the team there")
 
@@ -291,8 +247,7 @@ class Panel:
                 if name != "robots":  # which has its check box beside the starts
                     self._check(ui, "show", name, title)
             ui.header("PICTURE UNDER THE MAP")
-            row = (("Choose…", "background"), ("Scale, move", "tool:picture"), ("Remove", "background:none"))
-            self._buttons(ui, row)
+            self._buttons(ui, _PICTURE)
             self._pair(ui, ("picture:scale", "Pixel", "m"), ("picture:turn", "Turn", "°"))
             ui.row(_NAME, 0)
             ui.label("Opacity")
@@ -305,15 +260,11 @@ class Panel:
 
     def _problems(self, ui: Ui) -> None:
         editor, problems = self.editor, self.editor.problems
-        row = (("Next", "problem:next"), ("Repair", "repair"), ("Clip", "clip"), ("Mend", "problem:fix"))
-        self._buttons(ui, row)
+        self._buttons(ui, _PROBLEMS)
         with ui.scroll("problems"):
             if not problems:
-                said = (
-                    "Nothing is wrong with the map."
-                    if editor.measurement is not None
-                    else "Being looked at …"
-                )
+                seen = editor.measurement is not None
+                said = "Nothing is wrong with the map." if seen else "Being looked at …"
                 ui.words(said, colour=ui.theme.faint)
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
@@ -323,7 +274,7 @@ class Panel:
                 ui.row(20, 0, *([54] if mends else []), height=high, below=2)
                 badge = ui.cell()
                 if ui.surface is not None:
-                    canvas = Canvas(ui.surface, FLAT, ui.theme, ui.scale, np.zeros(1, dtype=np.intp))
+                    canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
                     draw_badge(canvas, badge.centerx, badge.top + ui.px(13), grave=problem.grave)
                 if ui.option("\n".join(lines), key=f"problem:{k}", chosen=problem is editor.problem):
                     editor.problem = problem
@@ -340,7 +291,7 @@ class Panel:
 
     def _history(self, ui: Ui) -> None:
         history = self.editor.document.history
-        self._buttons(ui, (("Undo", "undo"), ("Redo", "redo")))
+        self._buttons(ui, "Undo undo|Redo redo")
         steps = [(words, k - len(history.future)) for k, words in enumerate(reversed(history.future))]
         steps += [(words, k) for k, words in enumerate(history.past)]
         steps.append(("as it was opened", len(history.past)))
@@ -367,9 +318,7 @@ class Panel:
                 owner, said = things[k]
                 chosen = owner in editor.selection.owners
                 if ui.option(numbered_name(sketch, owner), said, key=f"thing:{owner}", chosen=chosen):
-                    own = Selection.of(owner)
-                    before = editor.selection.without_vertices()
-                    editor.select(before.toggled(own) if _added() else own)
+                    self._pick(Selection.of(owner), editor.selection.without_vertices())
 
     def _vertices(self, ui: Ui) -> None:
         """Show the vertices of what is selected, with their coordinates; in a drag, where they are by now."""
@@ -377,18 +326,17 @@ class Panel:
         found = [vertex for owner in editor.handled for vertex, _ in points_of(editor.sketch, owner)]
         with ui.scroll("vertices"):
             for k in ui.visible_rows(len(found), ROW):
-                vertex: Vertex = found[k]
+                vertex = found[k]
                 x, y = place_of(editor.preview[0], vertex)
                 chosen = vertex in editor.selection.vertices
                 if ui.option(f"{k + 1}", f"{x:.3f}      {y:.3f}  m", key=f"vertex:{k}", chosen=chosen):
-                    own = Selection(vertices=frozenset({vertex}))
                     before = Selection(vertices=editor.selection.vertices)
-                    editor.select(before.toggled(own) if _added() else own)
+                    self._pick(Selection(vertices=frozenset({vertex})), before)
 
-
-def _added() -> bool:
-    """Whether Shift adds to what is selected."""
-    return bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
+    def _pick(self, own: Selection, before: Selection) -> None:
+        """Select something; with Shift besides what was before."""
+        shift = pygame.key.get_mods() & pygame.KMOD_SHIFT
+        self.editor.select(before.toggled(own) if shift else own)
 
 
 def object_kind(editor: Editor) -> str:
@@ -428,20 +376,19 @@ def facts(editor: Editor) -> tuple[str, ...]:
     sketch, measurement = editor.sketch, editor.measurement
     size, ring = "no boundary yet: B draws one", sketch.boundary
     if ring:
-        xs, ys = [x for x, _ in ring], [y for _, y in ring]
+        xs, ys = zip(*ring, strict=True)
         size = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
     if measurement is None:
         return (size, "…", "…", "…", "…", density_label(sketch.density))
     parts, reached = len(measurement.components), len(measurement.reached)
-    gap, diameter = measurement.gap, 2 * measurement.radius
-    count = len(sketch.obstacles)
+    narrowest, gap, diameter = "none", measurement.gap, 2 * measurement.radius
+    if gap is not None:
+        narrowest = f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m"
     return (
         size,
         f"{measurement.free_area:.2f} m²",
         f"{parts}" if parts == reached else f"{parts}; {reached} for a robot",
-        "none"
-        if gap is None
-        else f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m",
-        f"{count} obstacle{'' if count == 1 else 's'}, {measurement.vertices} vertices",
+        narrowest,
+        f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices",
         density_label(sketch.density),
     )

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from math import dist
 
-import numpy as np
 import pygame
 
+from robocov_app.editor.canvas.canvas import EditorCanvas
+from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import PointerEvent
+from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.panel import Panel
 from robocov_app.toolkit.input import DOUBLE, WHEEL, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import inside
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov_app.editor.canvas.canvas import EditorCanvas
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.editor.ui.panel import Panel
-
-SLIP = 4.0
-"""Pixels at scale 1 that a click may move."""
+SLIP = 4.0  # pixels at scale 1 that a click may move
 
 _SHAPES = {
     "arrow": pygame.SYSTEM_CURSOR_ARROW,
@@ -41,8 +37,7 @@ class Pointer:
     ) -> None:
         self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
         self.at = (0, 0)
-        self.held = False
-        """Whether the sheet is panned by the left button, for as long as a key is held."""
+        self.held = False  # whether the left button pans, for as long as a key is held
         self._drag = ""
         self._button = 0
         self._pressed_at = (0, 0)
@@ -75,22 +70,17 @@ class Pointer:
     def aim(self, pixel: tuple[int, int]) -> PointerEvent:
         """Return where a pixel means, with what is held down on the keyboard."""
         raw, reach = self._canvas.to_world(pixel), self._canvas.reach
-        held = pygame.key.get_mods()
+        held, tool, point = pygame.key.get_mods(), self._editor.tool, raw
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
-        tool = self._editor.tool
-        point, tool_guides = raw, tool.guides
         if tool.snaps:
-            snap = None if ctrl else self._editor.snap(raw, reach)
-            point, tool_guides = (raw, ()) if snap is None else (snap.point, snap.guides)
-            tool.guides = tool_guides
+            snap = Snap(raw) if ctrl else self._editor.snap(raw, reach)
+            point, tool.guides = snap.point, snap.guides
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
         return PointerEvent(point, raw, reach, shift, alt, ctrl)
 
     def leave(self) -> None:
         """The mouse is not in the window any more."""
-        self._editor.cursor = None
-        self._canvas.at = None
-        self._canvas.hovered = None
+        self._editor.cursor = self._canvas.at = self._canvas.hovered = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         editor = self._editor
@@ -107,7 +97,7 @@ class Pointer:
             editor.version += 1
             return
         then, where = self._last_click
-        double = now - then < DOUBLE and _far(where, event.pos) < SLIP * self._canvas.layout.scale
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self._canvas.layout.scale
         self._last_click = (-1.0 if double else now), event.pos
         self._drag = "tool"
         aim = self.aim(event.pos)
@@ -121,22 +111,17 @@ class Pointer:
         editor.cursor = canvas.to_world(event.pos) if aimed else None
         canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
         canvas.hovered = canvas.problem_at(event.pos) if over and not self._drag else None
-        far = _far(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
+        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
         self._moved_off = self._moved_off or (bool(self._drag) and far)
         if self._drag == "pan":
             if self._moved_off:
                 canvas.pan(*event.rel)
         elif aimed:
-            aim = self.aim(event.pos)
-            self._quietly(lambda: editor.tool.move(editor, aim))
+            aim, version = self.aim(event.pos), editor.version
+            editor.attempt(lambda: editor.tool.move(editor, aim))
+            editor.version = version  # the panel need not look again at every move of the mouse
         else:
             editor.tool.guides = ()
-
-    def _quietly(self, action: Callable[[], object]) -> None:
-        """Do something for every move of the mouse: the panel need not look again each time."""
-        version = self._editor.version
-        self._editor.attempt(action)
-        self._editor.version = version
 
     def _released(self, event: pygame.event.Event) -> None:
         editor, drag = self._editor, self._drag
@@ -166,7 +151,3 @@ class Pointer:
         if _SHAPES[shape] != self._shape:
             self._shape = _SHAPES[shape]
             show_cursor(self._shape)
-
-
-def _far(a: tuple[int, int], b: tuple[int, int]) -> float:
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pygame
 
+from robocov.environment import Environment
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.panel import TABS, Panel
@@ -28,19 +30,11 @@ from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import BaseWindow
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov.environment import Environment
-    from robocov_app.editor.ui.editor import Editor
-
-_PAN = 60
-"""Pixels that a key pans."""
-
+_PAN = 60  # pixels that a key pans
 _CAPTION = "robocov edit"
 
+# what numbers are typed with, and what may follow in one
 _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
-"""What numbers are typed with, and what may follow in one."""
 
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
@@ -204,24 +198,25 @@ class EditorWindow(BaseWindow):
         self.dialogs.ask(asked)
 
     def _what_to_do(self) -> dict[str, Callable[[], object]]:
+        editor, canvas = self.editor, self.canvas
         return {
-            "fit": self.canvas.fit,
-            "fit:selection": self.canvas.fit_selection,
-            "zoom:in": lambda: self.canvas.zoom(1.25, self._middle()),
-            "zoom:out": lambda: self.canvas.zoom(0.8, self._middle()),
-            "pan:left": lambda: self.canvas.pan(_PAN, 0),
-            "pan:right": lambda: self.canvas.pan(-_PAN, 0),
-            "pan:up": lambda: self.canvas.pan(0, _PAN),
-            "pan:down": lambda: self.canvas.pan(0, -_PAN),
+            "fit": canvas.fit,
+            "fit:selection": canvas.fit_selection,
+            "zoom:in": lambda: canvas.zoom(1.25, self._middle()),
+            "zoom:out": lambda: canvas.zoom(0.8, self._middle()),
+            "pan:left": lambda: canvas.pan(_PAN, 0),
+            "pan:right": lambda: canvas.pan(-_PAN, 0),
+            "pan:up": lambda: canvas.pan(0, _PAN),
+            "pan:down": lambda: canvas.pan(0, -_PAN),
             "pan:hold": lambda: setattr(self.pointer, "held", True),
-            "theme": self._switch_theme,
-            "panel": self._switch_panel,
-            "tab": self._next_tab,
+            "theme": lambda: setattr(editor, "theme", "dark" if editor.theme == "light" else "light"),
+            "panel": lambda: setattr(editor, "panel", not editor.panel),
+            "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
             "name": self._name,
             "menu": lambda: self.open_menu(self.pointer.at),
             "fullscreen": self.toggle_fullscreen,
-            "screenshot": lambda: self.save_screenshot(self.editor.folder),
-            "help": self._toggle_help,
+            "screenshot": lambda: self.save_screenshot(editor.folder),
+            "help": lambda: setattr(self, "help", not self.help),
             "palette": self.open_palette,
             "try": self.try_it,
         }
@@ -232,15 +227,6 @@ class EditorWindow(BaseWindow):
         left, top, width, height = self.canvas.camera.view
         return left + width / 2, top + height / 2
 
-    def _switch_theme(self) -> None:
-        self.editor.theme = "dark" if self.editor.theme == "light" else "light"
-
-    def _switch_panel(self) -> None:
-        self.editor.panel = not self.editor.panel
-
-    def _next_tab(self) -> None:
-        self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
-
     def _name(self) -> None:
         """Go to the field with the name of what is selected, or of the map."""
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
@@ -248,9 +234,6 @@ class EditorWindow(BaseWindow):
         self._arrange()
         self.panel.show_tab(tab)
         self.panel.focus(field)
-
-    def _toggle_help(self) -> None:
-        self.help = not self.help
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
         """Open the menu for what is at a pixel; what is not selected yet is selected then."""
