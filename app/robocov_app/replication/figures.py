@@ -64,11 +64,36 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
     """Return what a figure shows here, in words with numbers; parameters as for `draw_figure`."""
     if number == 1:
-        return _partition_text(first)
-    pair = _pair(runs, number)
+        places = first.positions[0]
+        away = np.hypot(*(partition(places, first.environment.region).centroid - places).T)
+        return (
+            f"The robots stand anywhere in “{first.environment.name}”, on average "
+            f"{amount(float(away.mean()), 'm')} from the centres of mass of their cells."
+        )
+    ours, other = pair = _pair(runs, number)
+    label, costs = other.record.label, [run.history.mean_distance for run in pair]
     if number in COSTS:
-        return _motion_text(*pair)
-    return f"{_ends_text(*pair)} {_moved_text(runs)}" if number == 8 else _ends_text(*pair)
+        early, shared = [mean_until(run.history, FIRST_MINUTE) for run in pair], min(map(len, costs))
+        below, at_rest = costs[0][1:shared] < costs[1][1:shared], [arrival(run.history) for run in pair]
+        return (
+            f"Averaged over the first {FIRST_MINUTE:g} s RAPF has {early[0]:.3f} m, {label} "
+            f"{early[1]:.3f} m: {_difference_text(*early)}. RAPF's is the lower one "
+            f"{amount(float(below.mean()), '%')} of the time. RAPF stays within 5 % of its last value from "
+            f"{at_rest[0]:.0f} s on, {label} from {at_rest[1]:.0f} s on."
+        )
+    mine, theirs = (float(cost[-1]) for cost in costs)
+    words = (
+        f"On “{ours.record.environment.name}” RAPF ends with a mean distance of {mine:.3f} m, {label} with "
+        f"{theirs:.3f} m: {_difference_text(mine, theirs)}."
+    )
+    if number == 8:
+        ends = {name: run.record.positions[-1] for name, run in runs.items()}
+        moved = [matched_distance(ends[f"b/{law}"], ends[f"other/{law}"]) for law in ("rapf", "rpf")]
+        words += (
+            f" Between the ends of figure 6 and these, robots are {amount(moved[0], 'm')} apart with RAPF "
+            f"and {amount(moved[1], 'm')} with RPF (matched with the least sum of distances)."
+        )
+    return words
 
 
 @plain_style()
@@ -172,44 +197,6 @@ def arrival(history: CostHistory) -> float:
 def _pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
     case, _ = FIGURES[number]
     return runs[f"{case}/rapf"], runs[f"{case}/{'lloyd' if case == 'convex' else 'rpf'}"]
-
-
-def _partition_text(first: Record) -> str:
-    places = first.positions[0]
-    away = np.hypot(*(partition(places, first.environment.region).centroid - places).T)
-    return (
-        f"The robots stand anywhere in “{first.environment.name}”, on average "
-        f"{amount(float(away.mean()), 'm')} from the centres of mass of their cells."
-    )
-
-
-def _ends_text(ours: FigureRun, other: FigureRun) -> str:
-    mine, theirs = (float(each.history.mean_distance[-1]) for each in (ours, other))
-    return (
-        f"On “{ours.record.environment.name}” RAPF ends with a mean distance of {mine:.3f} m, "
-        f"{other.record.label} with {theirs:.3f} m: {_difference_text(mine, theirs)}."
-    )
-
-
-def _motion_text(ours: FigureRun, other: FigureRun) -> str:
-    early = [mean_until(each.history, FIRST_MINUTE) for each in (ours, other)]
-    shared = min(len(ours.history.time), len(other.history.time))
-    below = ours.history.mean_distance[1:shared] < other.history.mean_distance[1:shared]
-    return (
-        f"Averaged over the first {FIRST_MINUTE:g} s RAPF has {early[0]:.3f} m, {other.record.label} "
-        f"{early[1]:.3f} m: {_difference_text(*early)}. RAPF's is the lower one "
-        f"{amount(float(below.mean()), '%')} of the time. RAPF stays within 5 % of its last value from "
-        f"{arrival(ours.history):.0f} s on, {other.record.label} from {arrival(other.history):.0f} s on."
-    )
-
-
-def _moved_text(runs: Mapping[str, FigureRun]) -> str:
-    ends = {name: run.record.positions[-1] for name, run in runs.items()}
-    apart = [amount(matched_distance(ends[f"b/{law}"], ends[f"other/{law}"]), "m") for law in ("rapf", "rpf")]
-    return (
-        f"Between the ends of figure 6 and these, robots are {apart[0]} apart with RAPF and {apart[1]} with "
-        f"RPF (matched with the least sum of distances)."
-    )
 
 
 def _difference_text(mine: float, theirs: float) -> str:

@@ -215,7 +215,12 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
 
     loader, undefined = jinja2.FileSystemLoader(ASSETS), jinja2.StrictUndefined
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=undefined, finalize=_unbroken)
-    environment.filters |= {"span": span, "g": "{:g}".format, "amount": amount, "unbroken": _unbroken_markup}
+    environment.filters |= {
+        "span": span,
+        "g": "{:g}".format,
+        "amount": amount,
+        "unbroken": lambda text: Markup(_unbroken(str(text))),
+    }
     known = environment.globals.update
     known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
@@ -238,15 +243,9 @@ def span(numbers: Sequence[int]) -> str:
     return ", ".join(str(number) for number in numbers)
 
 
-def _unbroken(value: object) -> object:
+def _unbroken(value: Any) -> Any:
     """Return a text in which no line breaks between a number and its unit."""
-    if isinstance(value, str) and not hasattr(value, "__html__"):
-        return _UNIT.sub("\N{NO-BREAK SPACE}", value)
-    return value
-
-
-def _unbroken_markup(value: Markup) -> Markup:
-    return Markup(_UNIT.sub("\N{NO-BREAK SPACE}", str(value)))
+    return _UNIT.sub("\N{NO-BREAK SPACE}", value) if type(value) is str else value
 
 
 def _picture(record: Record) -> Markup:

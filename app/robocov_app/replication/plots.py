@@ -23,7 +23,7 @@ from robocov_app.replication.contenders import LABELS, OURS, OWN, TARGETS, TEAMS
 from robocov_app.replication.evidence import ranked_rows
 from robocov_app.replication.figures import DOTS, WIDE, side_by_side
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
-from robocov_app.replication.results import BeyondResults, Degradation, DensityResults, PaperResults
+from robocov_app.replication.results import BeyondResults, Degradation, PaperResults
 from robocov_app.sweep.study import UNITS
 
 if TYPE_CHECKING:
@@ -125,6 +125,10 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
         for other, law in zip(TEAMS[::2], TEAMS[1::2], strict=True)
     ]
     samples, size = gap_samples(results), (WIDE, round(0.41 * WIDE))
+    # both over the density
+    weighed = results.density.pictures[0].record.environment
+    pictures = [replace(each.record, environment=weighed) for each in results.density.pictures]
+    finals = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
     known = any(np.isfinite(each.ratio.estimate) for each in results.degradations)
     return _drawn(
         {
@@ -132,7 +136,7 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
             "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
             "beyond-heights": partial(plot_heights, theme=theme, size=size, title="", scale=0.68 * DOTS),
             "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
-            "beyond-density": partial(density_plot, results.density, theme),
+            "beyond-density": partial(side_by_side, pictures, ("knows φ", "ignores φ"), finals, theme),
             "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
             "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
         }
@@ -200,17 +204,6 @@ def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter("{x:g}")
     return figure
-
-
-def density_plot(density: DensityResults, theme: Theme) -> Figure:
-    """Draw the run that knew the density beside the one that did not, both over the density."""
-    environment = density.pictures[0].record.environment
-    return side_by_side(
-        [replace(each.record, environment=environment) for each in density.pictures],
-        ("knows φ", "ignores φ"),
-        [f"mean distance by φ {cost:.3f} m" for cost in density.costs],
-        theme,
-    )
 
 
 @plain_style()

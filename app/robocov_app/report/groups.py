@@ -371,7 +371,9 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
         words = f"{len(entries)} of {every}: {words}"
         if not found:
             words = f"The first {most} of {every}: none has a final cost."
-    return Choice(entries, words, _side_by_side(result, entries, panes))
+    # of as many controllers as there are, from the same starts if possible
+    middle = _middle_case(_best_variants(result, entries, panes), medians(result)) or entries[:1]
+    return Choice(entries, words, tuple(entries.index(entry) for entry in middle[:panes]))
 
 
 def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
@@ -409,9 +411,3 @@ def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
     if not ranks:
         return ()
     return tuple(runs[min(ranks, key=lambda case: (-len(ranks[case]), sum(ranks[case])))])
-
-
-def _side_by_side(result: Result, entries: Sequence[Entry], panes: int) -> tuple[int, ...]:
-    """Return runs of as many controllers as there are, from the same starts if possible."""
-    middle = _middle_case(_best_variants(result, entries, panes), medians(result)) or entries[:1]
-    return tuple(entries.index(entry) for entry in middle[:panes])
