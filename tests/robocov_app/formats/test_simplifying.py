@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
 from robocov_app.formats.geometry.passages import closed_gaps, rooms
+from robocov_app.formats.geometry.raster import traced
 from robocov_app.formats.geometry.simplify import (
     KEPT_OUTLINE,
     drawn,
@@ -16,7 +17,6 @@ from robocov_app.formats.geometry.simplify import (
     simplified,
     with_necks,
 )
-from robocov_app.formats.geometry.tracing import traced
 
 CELL = 0.05
 

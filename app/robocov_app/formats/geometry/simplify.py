@@ -27,7 +27,7 @@ from shapely import MultiPolygon, Polygon, STRtree
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
 from robocov_app.formats.geometry.passages import closed_gaps, paths_of
-from robocov_app.formats.geometry.tracing import NECK
+from robocov_app.formats.geometry.raster import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
 """By so much of it the area of an outline may change, of an obstacle or a part of the free space; and the
@@ -127,7 +127,7 @@ class Rings:
 class Outline(Rings):
     """All vertices of polygons, and the polygon that each ring belongs to; its outer ring comes first.
 
-    `neck`, (k,): where the vertex stands for a neck of `tracing`. `cell`, m: the longer side of the cells
+    `neck`, (k,): where the vertex stands for a neck of `raster`. `cell`, m: the longer side of the cells
     that it is the outline of.
     """
 
