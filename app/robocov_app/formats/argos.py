@@ -29,12 +29,11 @@ _UPRIGHT = 1e-6
 """Bodies that are turned about other axes than z by more are tilted, in degrees."""
 
 
-def is_argos(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like an experiment of ARGoS."""
+def _sniff(path: Path, head: bytes) -> bool:
     return b"<argos-configuration" in head
 
 
-def read_argos(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the arena of an ARGoS experiment.
 
     Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places
@@ -121,10 +120,6 @@ def _lengths(element: Element, name: str, where: str, count: int = 3) -> Array:
 
 
 IMPORTER = Importer(
-    name="argos",
-    title="ARGoS: the arena of an experiment (.argos)",
-    suffixes=(".argos",),
-    sniff=is_argos,
-    read=read_argos,
+    "argos", "ARGoS: the arena of an experiment (.argos)", (".argos",), _sniff, _read,
     options=frozenset({"only", "skip"}),
-)
+)  # fmt: skip

@@ -346,12 +346,11 @@ _ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
 _POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
 
 
-def is_dxf(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like DXF."""
+def _sniff(path: Path, head: bytes) -> bool:
     return head.startswith(_BINARY) or _TEXT.match(head) is not None
 
 
-def read_dxf(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that the model space of a DXF file draws.
 
     Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
@@ -420,12 +419,8 @@ def _document(path: Path, where: str) -> Any:
 
 
 IMPORTER = Importer(
-    name="dxf",
-    title="DXF drawings (with ezdxf): closed outlines, lines as walls, blocks",
-    suffixes=(".dxf",),
-    sniff=is_dxf,
-    read=read_dxf,
+    "dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",), _sniff, _read,
     options=frozenset(
         {"scale", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip", "hatches"}
     ),
-)
+)  # fmt: skip

@@ -35,12 +35,11 @@ _NAMES = ("name", "kind", "id")
 """Properties of a feature that name its shapes; its own id does too."""
 
 
-def is_geojson(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like GeoJSON."""
+def _sniff(path: Path, head: bytes) -> bool:
     return begins_with(head, b"{") and _TYPE.search(head) is not None
 
 
-def read_geojson(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that a FeatureCollection, a Feature or a geometry stands for.
 
     What polygons and lines are is found out as in `enclosing.foreign_map`; shapes
@@ -198,15 +197,12 @@ def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:
 
 
 IMPORTER = Importer(
-    name="geojson",
-    title="GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points",
-    suffixes=(".geojson",),
-    sniff=is_geojson,
-    read=read_geojson,
+    "geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
+    _sniff, _read,
     options=frozenset(
         {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
     ),
-)
+)  # fmt: skip
 
 
 _FINER = 6
@@ -290,9 +286,6 @@ def _text(environment: Environment, options: WriteOptions, features: list[dict[s
 
 
 EXPORTER = Exporter(
-    name="geojson",
-    title="GeoJSON: boundary and obstacles as features, in metres or degrees",
-    suffixes=(".geojson",),
-    write=_write,
+    "geojson", "GeoJSON: boundary and obstacles as features, in metres or degrees", (".geojson",), _write,
     options=frozenset({"digits", "origin"}),
-)
+)  # fmt: skip

@@ -20,12 +20,11 @@ _MIN_HOLE = 1e-4
 """Holes smaller than this, in m², come of rounding."""
 
 
-def is_houseexpo(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like a HouseExpo plan."""
+def _sniff(path: Path, head: bytes) -> bool:
     return begins_with(head, b"{") and b'"verts"' in head
 
 
-def read_houseexpo(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the floor plan at `path`.
 
     The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
@@ -97,9 +96,5 @@ def _description(document: dict[str, Any]) -> str:
 
 
 IMPORTER = Importer(
-    name="houseexpo",
-    title="HouseExpo floor plans (JSON with verts in metres)",
-    suffixes=(".json",),
-    sniff=is_houseexpo,
-    read=read_houseexpo,
-)
+    "houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",), _sniff, _read,
+)  # fmt: skip

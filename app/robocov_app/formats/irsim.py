@@ -35,12 +35,11 @@ _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
 
 
-def is_irsim(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like a world of IR-SIM."""
+def _sniff(path: Path, head: bytes) -> bool:
     return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
 
 
-def read_irsim(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map of an IR-SIM world.
 
     Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
@@ -226,10 +225,7 @@ class _Node:
 
 
 IMPORTER = Importer(
-    name="irsim",
-    title="IR-SIM: YAML of a world, robots and obstacles",
-    suffixes=(),  # a .yaml is this by its content only
-    sniff=is_irsim,
-    read=read_irsim,
+    # a .yaml is this by its content only
+    "irsim", "IR-SIM: YAML of a world, robots and obstacles", (), _sniff, _read,
     options=frozenset({"thickness", "anywhere", "only", "skip"}),
-)
+)  # fmt: skip

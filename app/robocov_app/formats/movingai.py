@@ -115,13 +115,9 @@ def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDA
 
 
 IMPORTER = Importer(
-    name="movingai",
-    title="MovingAI grid: .map",
-    suffixes=(".map",),
-    sniff=_sniff,
-    read=_read,
+    "movingai", "MovingAI grid: .map", (".map",), _sniff, _read,
     options=frozenset({"cell", "trees", "water"}),
-)
+)  # fmt: skip
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
@@ -139,9 +135,6 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
 
 
 EXPORTER = Exporter(
-    name="movingai",
-    title="MovingAI grid: .map",
-    suffixes=(".map",),
-    write=_write,
+    "movingai", "MovingAI grid: .map", (".map",), _write,
     options=frozenset({"cell"}),
-)
+)  # fmt: skip

@@ -58,12 +58,11 @@ class _Thing:
         return under or self.tags.get("tunnel", "no") != "no"
 
 
-def is_osm(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` is an extract in XML."""
+def _sniff(path: Path, head: bytes) -> bool:
     return _ROOT.match(head) is not None
 
 
-def read_osm(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that an extract of OpenStreetMap shows, in metres east and north of its middle.
 
     Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says
@@ -214,10 +213,6 @@ def _degrees(given: dict[str, str], key: str, most: float) -> float:
 
 
 IMPORTER = Importer(
-    name="osm",
-    title="OpenStreetMap (.osm): buildings, water, walls, fences, hedges",
-    suffixes=(".osm",),
-    sniff=is_osm,
-    read=read_osm,
+    "osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",), _sniff, _read,
     options=frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"}),
-)
+)  # fmt: skip

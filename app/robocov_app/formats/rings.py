@@ -28,12 +28,11 @@ _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
 _FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
 
 
-def is_rings(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like lists of rings."""
+def _sniff(path: Path, head: bytes) -> bool:
     return path.suffix.lower() == ".json" and bool(_LISTS.match(head) or _FLAT.search(head))
 
 
-def read_rings(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the polygons in a file of rings.
 
     It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free
@@ -114,10 +113,6 @@ def _pairs(value: Any, at: Steps, where: str, dimensions: int, shapes: Shapes) -
 
 
 IMPORTER = Importer(
-    name="rings",
-    title="lists of rings (JSON as earcut takes it): outline and holes",
-    suffixes=(".json",),
-    sniff=is_rings,
-    read=read_rings,
+    "rings", "lists of rings (JSON as earcut takes it): outline and holes", (".json",), _sniff, _read,
     options=frozenset({"scale", "outlines", "around"}),
-)
+)  # fmt: skip

@@ -201,13 +201,9 @@ def _parsed(text: files.Value, where: str) -> float:
 
 
 IMPORTER = Importer(
-    name="ros",
-    title="ROS map_server: YAML with a PGM or PNG",
-    suffixes=(".yaml", ".yml"),
-    sniff=_sniff,
-    read=_read,
+    "ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), _sniff, _read,
     options=frozenset({"unknown", "threshold", "anywhere"}),
-)
+)  # fmt: skip
 
 
 _WHITE, _GREY, _BLACK = 254, 205, 0
@@ -304,10 +300,6 @@ def _quoted(name: str, path: Path) -> str:
 
 
 EXPORTER = Exporter(
-    name="ros",
-    title="ROS map_server: YAML with a PGM or PNG",
-    suffixes=(".yaml", ".yml"),
-    write=_write,
-    options=frozenset({"cell", "mode", "image"}),
-    files=_files,
-)
+    "ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), _write,
+    options=frozenset({"cell", "mode", "image"}), files=_files,
+)  # fmt: skip

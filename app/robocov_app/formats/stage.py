@@ -97,12 +97,11 @@ class _Room:
     cell: float | None = None
 
 
-def is_stage(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like a world of Stage."""
+def _sniff(path: Path, head: bytes) -> bool:
     return path.suffix.lower() == ".world" and _MODELS.search(head) is not None
 
 
-def read_stage(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map of a Stage world.
 
     Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
@@ -358,10 +357,6 @@ def _blocks(entity: _Entity) -> list[Array]:
 
 
 IMPORTER = Importer(
-    name="stage",
-    title="Stage: .world with its includes and bitmaps",
-    suffixes=(".world",),
-    sniff=is_stage,
-    read=read_stage,
+    "stage", "Stage: .world with its includes and bitmaps", (".world",), _sniff, _read,
     options=frozenset({"anywhere", "around", "only", "skip"}),
-)
+)  # fmt: skip

@@ -83,12 +83,11 @@ class _Layer:
     wall: bool
 
 
-def is_tmx(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like a map of Tiled."""
+def _sniff(path: Path, head: bytes) -> bool:
     return _ROOT.search(head) is not None and b"tilewidth" in head
 
 
-def read_tmx(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that a TMX file of Tiled draws.
 
     Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like)
@@ -422,10 +421,6 @@ def _whole(element: Element, name: str, where: str, least: int, default: str = "
 
 
 IMPORTER = Importer(
-    name="tmx",
-    title="Tiled: TMX of orthogonal maps, tiles and objects",
-    suffixes=(".tmx",),
-    sniff=is_tmx,
-    read=read_tmx,
+    "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",), _sniff, _read,
     options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
-)
+)  # fmt: skip

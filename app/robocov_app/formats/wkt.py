@@ -242,12 +242,11 @@ _BEGIN = re.compile(
 )
 
 
-def is_wkt(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` begins with a geometry."""
+def _sniff(path: Path, head: bytes) -> bool:
     return _BEGIN.match(head) is not None
 
 
-def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
+def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that the geometries of a file of well-known text stand for.
 
     Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
@@ -269,13 +268,10 @@ def read_wkt(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 IMPORTER = Importer(
-    name="wkt",
-    title="well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
-    suffixes=(".wkt", ".ewkt"),
-    sniff=is_wkt,
-    read=read_wkt,
+    "wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
+    (".wkt", ".ewkt"), _sniff, _read,
     options=frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"}),
-)
+)  # fmt: skip
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
@@ -309,9 +305,6 @@ def _text(polygon: Polygon, digits: int) -> str:
 
 
 EXPORTER = Exporter(
-    name="wkt",
-    title="well-known text (JuPedSim): the free space as polygons with holes",
-    suffixes=(".wkt",),
-    write=_write,
+    "wkt", "well-known text (JuPedSim): the free space as polygons with holes", (".wkt",), _write,
     options=frozenset({"digits"}),
-)
+)  # fmt: skip
