@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
@@ -56,6 +57,8 @@ __all__ = [
     "shaped",
 ]
 
+_Format = TypeVar("_Format", Importer, Exporter)
+
 # the first whose `sniff` says yes has it: the surest come first
 _SURE = (irsim, ros, movingai, stage, argos, tmx, picture, osm, svg_reading, dxf, wkt, geojson)
 
@@ -70,9 +73,13 @@ EXPORTERS: dict[str, Exporter] = {each.EXPORTER.name: each.EXPORTER for each in 
 
 def importer(name: str) -> Importer:
     """Return the format called `name`; the ParameterError where there is none names the nearest."""
-    if name not in IMPORTERS:
-        raise ParameterError(unknown_name("format", name, IMPORTERS))
-    return IMPORTERS[name]
+    return _named(IMPORTERS, name)
+
+
+def _named(formats: dict[str, _Format], name: str) -> _Format:
+    if name not in formats:
+        raise ParameterError(unknown_name("format", name, formats))
+    return formats[name]
 
 
 def detect(path: str | Path) -> Importer:
@@ -105,9 +112,8 @@ def import_map(
 ) -> tuple[Environment, ImportReport, ForeignMap]:
     """Return the foreign map at `path` as an environment, what was done to it, and what was read.
 
-    `format` is its name; None looks at the file. Raises MapError when the file cannot be read or understood,
-    or has no room for a robot; ParameterError when the format is unknown, or an option is given that it does
-    not have.
+    `format` is its name; None looks at the file. Raises MapError when the file cannot be read, understood or
+    driven in; ParameterError when the format is unknown, or does not have an option that is given.
     """
     foreign = read_map(path, format=format, options=options)
     environment, report = shaped(foreign, shaping, one_line(path))
@@ -135,14 +141,9 @@ def _require_known(given: Collection[str], known: Collection[str], name: str) ->
 
 
 def exporter(path: str | Path, name: str | None = None) -> Exporter:
-    """Return the format called `name`, or else that of the suffix of `path`.
-
-    The ParameterError where there is none names the known ones.
-    """
+    """Return the format called `name`, or else that of the suffix of `path`."""
     if name is not None:
-        if name not in EXPORTERS:
-            raise ParameterError(unknown_name("format", name, EXPORTERS))
-        return EXPORTERS[name]
+        return _named(EXPORTERS, name)
     suffix = Path(path).suffix.lower()
     for candidate in EXPORTERS.values():
         if suffix in candidate.suffixes:
@@ -160,9 +161,8 @@ def export_map(
 ) -> ExportReport:
     """Write `environment` to `path` in a foreign format, and return what came of it.
 
-    `format` is its name; None goes by the suffix. Raises ParameterError when it is unknown, or an option is
-    given that it does not have; OutputError when a file cannot be written: what was there before is then
-    untouched.
+    `format` is its name; None goes by the suffix. Raises ParameterError as `import_map`; OutputError when a
+    file cannot be written: what was there before is then untouched.
     """
     path = Path(path)
     chosen = exporter(path, format)

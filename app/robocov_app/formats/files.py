@@ -7,7 +7,6 @@ anything but text: what a value is, who asks for it decides.
 from __future__ import annotations
 
 import codecs
-import math
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,33 +45,20 @@ HEAD = 1 << 20
 
 
 def head(path: Path) -> bytes:
-    """Return the first `HEAD` bytes of the file at `path`.
-
-    Raises MapError when there is no such file, it is no ordinary one (a folder, a pipe, a device), or it
-    cannot be read.
-    """
+    """Return the first `HEAD` bytes of the file at `path`; a MapError where there is no ordinary one."""
     return _read(path, HEAD)
 
 
 def content(path: Path, most: int = MAX_BYTES) -> bytes:
-    """Return the content of the file at `path`, of at most `most` bytes.
-
-    Raises MapError as `head`, and when the file is larger; its size is looked at first.
-    """
-    where = one_line(path)
-    data = b""
-    if _size(path) <= most:
-        data = _read(path, most + 1)
-    if (not data and _size(path) > most) or len(data) > most:
-        raise MapError(f"{where}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
+    """Return the content of a file; a MapError where it is larger than `most` bytes, or as `head`."""
+    data = _read(path, most + 1) if _size(path) <= most else None
+    if data is None or len(data) > most:
+        raise MapError(f"{one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
     return data
 
 
 def require_cells(width: int, height: int, where: str) -> None:
-    """Check the size of a raster as its header gives it.
-
-    Raises MapError when a side is not positive, or there are more than `MAX_CELLS`.
-    """
+    """Check the size of a raster as its header gives it: from 1 x 1 to `MAX_CELLS`."""
     if width < 1 or height < 1:
         raise MapError(f"{where}: {width} x {height} cells, but at least 1 x 1 was wanted")
     if width * height > MAX_CELLS:
@@ -81,44 +67,32 @@ def require_cells(width: int, height: int, where: str) -> None:
 
 
 def require_vertices(count: int, where: str) -> None:
-    """Check the number of vertices of a map, or the least that it can be.
-
-    Raises MapError when there are more than `MAX_VERTICES`.
-    """
+    """Check the number of vertices of a map, or the least that it can be: at most `MAX_VERTICES`."""
     if count > MAX_VERTICES:
         raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
 
 
 def require_shapes(count: int, where: str) -> None:
-    """Check the number of shapes of a drawing. Raises MapError when there are more than `MAX_SHAPES`."""
+    """Check the number of shapes of a drawing: at most `MAX_SHAPES`."""
     if count > MAX_SHAPES:
         raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
 
 
 def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
-    """Check a length in metres: a cell, a thickness, a unit.
-
-    Raises MapError when it is not a finite number from `smallest` to `largest`.
-    """
-    if not (math.isfinite(value) and smallest <= value <= largest):
-        raise MapError(
-            f"{where}: {shown(value)}, but a number from {smallest:g} to {largest:g} (m) was wanted"
-        )
+    """Check a length in metres: a cell, a thickness, a unit."""
+    if not smallest <= value <= largest:
+        wanted = f"a number from {smallest:g} to {largest:g} (m) was wanted"
+        raise MapError(f"{where}: {shown(value)}, but {wanted}")
 
 
 def require_coordinate(value: float, where: str) -> None:
-    """Check a coordinate in metres.
-
-    Raises MapError when it is not a finite number within `robocov.mapfile.models.FARTHEST`.
-    """
+    """Check a coordinate in metres: within `FARTHEST`."""
     if not abs(value) <= FARTHEST:
-        raise MapError(
-            f"{where}: {shown(value)}, but a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) was wanted"
-        )
+        wanted = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) was wanted"
+        raise MapError(f"{where}: {shown(value)}, but {wanted}")
 
 
 def _size(path: Path) -> int:
-    """Return the size of the file at `path`, in bytes."""
     where = one_line(path)
     try:
         found = path.stat()
@@ -150,16 +124,11 @@ _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codec
 
 
 def read_text(path: Path, separator: bytes) -> tuple[str, str]:
-    """Return the text of a file, and what messages call it.
-
-    `separator`: what stands between vertices: where there are too many, nothing is read. Raises MapError when
-    it cannot be read, is too large, or is neither UTF-8 nor marked as UTF-16.
-    """
+    """Return the text of a file, and what messages call it; `separator` is what stands between vertices."""
     where = one_line(path)
     data = content(path, MAX_TEXT_BYTES)
     require_vertices(data.count(separator), where)
-    marked = (both for both in _MARKS if data.startswith(both[0]))
-    mark, encoding = next(marked, (b"", "utf-8"))
+    mark, encoding = next((both for both in _MARKS if data.startswith(both[0])), (b"", "utf-8"))
     try:
         return data[len(mark) :].decode(encoding), where
     except UnicodeDecodeError as error:
@@ -179,10 +148,8 @@ def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> 
     """Return the file that the one at `path` names, and what was put right about it.
 
     It must be in the file's folder or below. Programs write where it was when it was saved, often from the
-    root, and it may have moved with the file: one of the same name beside it is as good. `name`: as it is
-    written there, relative to the folder of `path`. `anywhere`: whether it may be outside of that folder.
-    `at`, `what`: the place that names it, and what kind of file it is, for messages. Raises MapError when it
-    is no name of a file, or outside of the folder.
+    root, and it may have moved with the file: one of the same name beside it is as good. `anywhere`: whether
+    it may be outside of that folder. `at`, `what`: the place that names it, and what kind of file it is.
     """
     if not name:
         raise MapError(f"{at}: empty, but the name of a {what} was wanted")
@@ -199,15 +166,12 @@ def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> 
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
         raise MapError(f"{at}: {shown(name)}: {reason}") from None
     if not allowed:
-        raise MapError(
-            f"{at}: {shown(name)} is outside of the file's folder, but a {what} in it was wanted "
-            f"(--anywhere allows it)"
-        )
+        wanted = f"a {what} in it was wanted (--anywhere allows it)"
+        raise MapError(f"{at}: {shown(name)} is outside of the file's folder, but {wanted}")
     return named, None
 
 
 def _inside(named: Path, folder: Path) -> bool:
-    """Return whether a file is in `folder` or below, links followed."""
     return named.resolve().is_relative_to(folder.resolve())
 
 
@@ -229,11 +193,7 @@ def begins_with(head: bytes, bracket: bytes) -> bool:
 
 
 def read_json(path: Path) -> tuple[Any, bytes, str]:
-    """Return what the JSON file at `path` holds, its content, and what messages call it.
-
-    Raises MapError when it cannot be read, is too large, or is not JSON; see
-    `robocov.files.strictjson.parse`.
-    """
+    """Return what the JSON file at `path` holds, its content, and what messages call it."""
     where = one_line(path)
     data = content(path, MAX_TEXT_BYTES)
     # each point is a list of two or three: to count takes a moment, to parse minutes
@@ -253,9 +213,7 @@ def located_errors(content: bytes, where: str) -> Iterator[None]:
 def positions(value: Any, at: Steps, where: str, *, least: int, dimensions: tuple[int, int]) -> Array:
     """Return the points of a JSON list as (k, d); missing dimensions are nan.
 
-    `at`: where it is in the document. `where`: what messages call the file. `least`: so many points are
-    wanted. `dimensions`, (least, most): so many numbers are wanted of each; d is the most that there are.
-    Raises MapError when it is not such a list.
+    At least so many points, each of at least and at most so many `dimensions`; d is the most that there are.
     """
     if not isinstance(value, list) or len(value) < least:
         points = "point" if least == 1 else "points"
@@ -291,14 +249,8 @@ DEEPEST = 12
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Return the mapping in `text`.
+    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice.
 
-    `text`: UTF-8, with or without a byte order mark. `where`: what messages call it: a file's name. Raises
-    MapError when it is not YAML (with the line), no mapping, has a key twice, or has tags, anchors or
-    aliases.
-
-    Examples
-    --------
     >>> parse_yaml(b"image: a.pgm\\norigin: [0, 1.5, 0]", "map.yaml")
     {'image': 'a.pgm', 'origin': ['0', '1.5', '0']}
     """

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, checked, shown
-from robocov_app.formats.foreign import ForeignMap, square_metres
+from robocov_app.formats.foreign import ForeignMap, document_of, square_metres, told
 
 
 @dataclass(frozen=True)
@@ -63,13 +63,11 @@ class ReadOptions:
 
 @dataclass(frozen=True)
 class Importer:
-    """A foreign format.
+    """A foreign format: its name as in ``--format``, a title for people, suffixes in lower case.
 
-    `name`: as in ``--format``. `title`: one line for people. `suffixes`: lower case, with the dot:
-    ``(".yaml", ".yml")``. `sniff`: ``sniff(path, head)``: whether a file that begins with these bytes
-    (`files.HEAD` of them, or all) is of the format. Cheap, and never raises. `read`: ``read(path,
-    options)``: the `ForeignMap` in the file. Raises MapError, one line, on whatever it cannot use, within a
-    second and 200 MB. `options`: names of the `ReadOptions` that mean something here.
+    ``sniff(path, head)``: whether a file that begins with these bytes (`files.HEAD` of them, or all) is of
+    it; cheap, and never raises. ``read(path, options)``: the map in it; a MapError of one line on whatever it
+    cannot use, within a second and 200 MB. `options`: those of `ReadOptions` that mean something here.
     """
 
     name: str
@@ -127,12 +125,9 @@ def check_options(options: object, ranges: Mapping[str, tuple[float, float, str]
 
 @dataclass(frozen=True)
 class ExportReport:
-    """What came of a map in a foreign format.
+    """What came of a map in a foreign format: files (that asked for first), free areas in m², and words.
 
-    `files`: what was written; the first is the one that was asked for. `area`, m²: free area of the map.
-    `area_written`, m²: free area of what was written. `dropped`, `notes`: what the format cannot hold (names,
-    starts), and what is worth knowing besides; one line each. `warnings`: what is wrong in the file: where
-    robots cannot drive any more; one line each.
+    `dropped`: what the format cannot hold. `warnings`: where robots cannot drive any more.
     """
 
     format: str
@@ -148,37 +143,21 @@ class ExportReport:
         area, of_it = square_metres(self.area), square_metres(self.area_written)
         return [
             f"{self.format}: free area {area}, written {of_it}",
-            *(f"dropped: {line}" for line in self.dropped),
-            *(f"note: {line}" for line in self.notes),
+            *told(dropped=self.dropped, note=self.notes),
             f"saved in {', '.join(str(file) for file in self.files)}",
         ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as a JSON document, with units in the key names."""
-        return {
-            "format": self.format,
-            "files": [str(file) for file in self.files],
-            "area_m2": self.area,
-            "area_written_m2": self.area_written,
-            "dropped": list(self.dropped),
-            "notes": list(self.notes),
-            "warnings": list(self.warnings),
-        }
-
-
-def _only(path: Path, options: WriteOptions) -> tuple[Path, ...]:
-    return (path,)
+        return document_of(self) | {"files": [str(file) for file in self.files]}
 
 
 @dataclass(frozen=True)
 class Exporter:
-    """A foreign format to write.
+    """A foreign format to write, as an `Importer`.
 
-    `name`: as in ``--format``. `title`: one line for people. `suffixes`: lower case, with the dot. `write`:
-    ``write(environment, path, options)`` writes the map whole or not at all (`robocov.files.atomic.written`)
-    and returns an `ExportReport`. Raises ParameterError or OutputError. `options`: names of the
-    `WriteOptions` that mean something here. `files`: ``files(path, options)``: all files that would be
-    written, the given one first.
+    ``write(environment, path, options)`` writes the map whole or not at all (`robocov.files.atomic.written`).
+    ``files(path, options)``: all files that would be written, the given one first.
     """
 
     name: str
@@ -186,4 +165,4 @@ class Exporter:
     suffixes: tuple[str, ...]
     write: Callable[[Environment, Path, WriteOptions], ExportReport]
     options: frozenset[str] = frozenset()
-    files: Callable[[Path, WriteOptions], tuple[Path, ...]] = _only
+    files: Callable[[Path, WriteOptions], tuple[Path, ...]] = lambda path, _: (path,)
