@@ -34,13 +34,11 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the arena of an ARGoS experiment.
+    """Return the arena of an experiment.
 
     Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places
     are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
-    distributed at random is left out and counted: only ARGoS itself can tell from the seed where it puts
-    them, and the walls of the arena are a map without. Raises MapError when the file cannot be read or
-    understood; with the line.
+    distributed at random is left out and counted: only ARGoS can tell from the seed where it puts it.
     """
     root, where = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.child("arena")

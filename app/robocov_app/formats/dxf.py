@@ -33,8 +33,6 @@ def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
     """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
 
     A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
-    `points`: (k, 2). `bulges`, (k,): the last one is not used. Raises ValueError when there would be more
-    than `MOST_POINTS`.
     """
     arcs = extra("ezdxf.math", "dxf")
     drawn = [points[:1]]
@@ -56,8 +54,7 @@ def spline(entity: Any, tolerance: float) -> Array:
     """Return points of an ezdxf spline: a rational B-spline, between the knots where it is defined.
 
     Its own `flattening` goes on to where it is not, which spoils closed ones (ezdxf 1.4). L. Piegl, W.
-    Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2. Raises ValueError when knots and control
-    points do not fit together.
+    Tiller, The NURBS Book, 2nd edition, Springer 1997, section 4.2.
     """
     tool = entity.construction_tool()
     control, knots, degree = flat(tool.control_points), np.array(tool.knots(), dtype=float), tool.degree
@@ -93,16 +90,10 @@ _CLOSED = 1e-9
 
 
 class DxfDrawing:
-    """Goes through the entities and adds them to the shapes.
+    """Goes through the entities and adds them to the shapes; `scale` is metres a unit."""
 
-    `where`: what messages call the file. `scale`, m: of a unit.
-    """
-
-    def __init__(self, document: Any, where: str, shapes: Shapes, scale: float) -> None:
-        self.document = document
-        self.where = where
-        self.shapes = shapes
-        self.scale = scale
+    def __init__(self, document: Any, shapes: Shapes, scale: float) -> None:
+        self.document, self.where, self.shapes, self.scale = document, shapes.where, shapes, scale
         self.drawn = 0
         self.curved = False
         self._hidden = {
@@ -110,17 +101,12 @@ class DxfDrawing:
         }
 
     def draw(self) -> None:
-        """Add all that is drawn.
-
-        Raises MapError when a block is inserted within itself, or too much is drawn.
-        """
+        """Add all that is drawn."""
         space = self.document.modelspace()
         self._require_few(space)
         self._draw(space, "0", ())
-
-    def notes(self) -> list[str]:
-        """Return what is worth knowing of how things were taken."""
-        return [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.curved else []
+        if self.curved:
+            self.shapes.notes.append(f"curves flattened to within {1000 * TOLERANCE:g} mm")
 
     def _require_few(self, space: Iterable[Any]) -> None:
         """Count what will be drawn, blocks and all, without drawing it: a few kB may stand for billions."""
@@ -162,9 +148,8 @@ class DxfDrawing:
             except RobocovError:
                 raise
             except Exception as error:  # of ezdxf, which raises what it likes on nonsense
-                self.shapes.leave_out(
-                    "damaged shape", f"({one_line(entity.dxftype())[:20]}: {type(error).__name__})"
-                )
+                kind = one_line(entity.dxftype())[:20]
+                self.shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
         """Add an entity, or what a block holds; see `_draw`."""
@@ -190,7 +175,6 @@ class DxfDrawing:
             self._draw(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
 
     def _add(self, kind: str, entity: Any, labels: tuple[str, ...]) -> None:
-        """Add one entity that is no block."""
         at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
         if kind == "LINE":
             ends = self._metres([entity.dxf.start, entity.dxf.end])
@@ -358,9 +342,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     ``thickness``. Names are those of layers and blocks: see `enclosing.foreign_map`. Blocks are carried out
     wherever they are inserted. Layers that are off or frozen, texts, dimensions and what has a third
     dimension are left out; so are hatches without the option ``hatches``. Curves become lines that stay
-    within a millimetre. `options`: ``scale`` overrules the unit of the file's header; without either the file
-    is refused. Raises MapError when the file cannot be read or understood, has no unit, or ezdxf is not
-    installed.
+    within a millimetre. The option ``scale`` overrules the unit of the header; one of them is needed.
     """
     where = one_line(path)
     _check(path, where)
@@ -376,11 +358,10 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             f"--scale 0.001 for millimetres"
         )
     shapes = Shapes(where, options)
-    drawing = DxfDrawing(document, where, shapes, scale)
-    drawing.draw()
+    shapes.notes.append(unit)
+    DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    shapes.notes = [unit, *drawing.notes()]
     return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), "Imported from DXF.", solid=True)
 
 

@@ -42,14 +42,11 @@ def _sniff(path: Path, head: bytes) -> bool:
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that a FeatureCollection, a Feature or a geometry stands for.
 
-    What polygons and lines are is found out as in `enclosing.foreign_map`; shapes
-    have the names that the properties ``name``, ``kind`` and ``id`` of their feature give.
-
-    Coordinates are longitude and latitude (RFC 7946, section 4) and are projected to metres, if that makes
-    a map of at most 10 km; else they are metres. The member ``crs`` of the older standard is obeyed, as is
-    a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes; the option overrules both.
-
-    Raises MapError when the file cannot be read or understood; with line and column.
+    What polygons and lines are is found out as in `enclosing.foreign_map`; the properties ``name``, ``kind``
+    and ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and
+    are projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of
+    the older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export`
+    writes; the option overrules both.
     """
     document, content, where = read_json(path)
     shapes = Shapes(where, options)
@@ -68,8 +65,6 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 class _Found:
-    """The geometries of a document, as they are found."""
-
     def __init__(self, where: str, shapes: Shapes) -> None:
         self.where = where
         self.shapes = shapes
@@ -77,7 +72,6 @@ class _Found:
         self.crs: str | None = None
 
     def read(self, document: Any) -> None:
-        """Read a whole document."""
         kind = document.get("type") if isinstance(document, dict) else None
         if kind == "FeatureCollection":
             features = document.get("features")
@@ -169,9 +163,8 @@ class _Found:
         if not isinstance(name, str):
             raise refused(self.where, (*at, "crs"), given, "the name of a reference system was wanted")
         if self.crs not in (None, name):
-            raise refused(
-                self.where, (*at, "crs"), given, f"the same system as before, {self.crs}, was wanted"
-            )
+            wanted = f"the same system as before, {self.crs}, was wanted"
+            raise refused(self.where, (*at, "crs"), given, wanted)
         self.crs = name
 
 
@@ -261,15 +254,11 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
 
 
 def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, float]]]]) -> dict[str, Any]:
-    many = len(polygons) > 1
-    return {
-        "type": "Feature",
-        "properties": {"kind": kind} if name is None else {"kind": kind, "name": name},
-        "geometry": {
-            "type": "MultiPolygon" if many else "Polygon",
-            "coordinates": polygons if many else polygons[0],
-        },
-    }
+    geometry: dict[str, Any] = {"type": "MultiPolygon", "coordinates": polygons}
+    if len(polygons) == 1:
+        geometry = {"type": "Polygon", "coordinates": polygons[0]}
+    properties = {"kind": kind} if name is None else {"kind": kind, "name": name}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
 
 
 def _text(environment: Environment, options: WriteOptions, features: list[dict[str, Any]]) -> str:

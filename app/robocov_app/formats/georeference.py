@@ -25,6 +25,8 @@ DEGREES = "OGC:CRS84"
 _IN_DEGREES = (DEGREES, "EPSG:4326")
 _AS_THEY_ARE = "--units metres takes coordinates as they are"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
+_URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
+_ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
 _DIGITS = 6
 """Decimals of metres: free space is known to a micrometre."""
 
@@ -44,11 +46,9 @@ def in_metres(
     """Return figures with coordinates in metres, and what was done to them, in words.
 
     `options`: ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
-    `where`: what messages call the file. `crs`: the reference system that the file names, as ``EPSG:25832``
-    or an OGC URN. `globe`: whether coordinates without a system are degrees where that makes a map of at most
-    10 km. `origin`, (longitude, latitude) or None: where the file says that [0, 0] m is; by default the
-    middle of what is there. Raises MapError when a system is needed that is unknown, or that needs pyproj
-    where it is not installed; or there are too many shapes.
+    `crs`: the reference system that the file names, as ``EPSG:25832`` or an OGC URN. `globe`: whether
+    coordinates without one are degrees where that makes a map of at most 10 km. `origin`, longitude and
+    latitude: where the file says that [0, 0] m is; by default the middle of what is there.
     """
     if not figures:
         return [], []
@@ -105,17 +105,10 @@ def _authority(crs: str, where: str) -> str:
 
     Only codes are looked up: definitions in full may name files.
     """
-    match = re.fullmatch(
-        r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Za-z]{3,4}):(?:[\d.]*:)?([A-Za-z]*\d{1,9})",
-        crs.strip(),
-        re.IGNORECASE,
-    ) or re.fullmatch(
-        r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})", crs.strip()
-    )
+    match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
-        raise MapError(
-            f"{where}: reference system {shown(crs)}, but a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"
-        )
+        wanted = f"a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"
+        raise MapError(f"{where}: reference system {shown(crs)}, but {wanted}")
     return f"{match[1].upper()}:{match[2].upper()}"
 
 
@@ -161,10 +154,7 @@ class LocalPlane:
         self._project = pyproj.Proj(proj="aeqd", lon_0=longitude, lat_0=latitude, ellps="WGS84")
 
     def metres(self, degrees: Array) -> Array:
-        """Return (n, 2) m of longitudes and latitudes.
-
-        Rounded to the micrometre that free space is known to: walls that touch or share a corner still do.
-        """
+        """Return (n, 2) m of longitudes and latitudes, to the micrometre: walls that touch still do."""
         return np.round(np.column_stack(self._project(*degrees.T)), _DIGITS)
 
     def degrees(self, metres: Array) -> Array:

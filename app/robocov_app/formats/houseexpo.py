@@ -25,11 +25,10 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the floor plan at `path`.
+    """Return a floor plan.
 
     The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
-    corners cut by a step or two of it. Doors and furniture are not in the format. `options`: None of them
-    means anything here. Raises MapError when the file cannot be read, or is not such a plan.
+    corners cut by a step or two of it. Doors and furniture are not in the format.
     """
     document, content, where = read_json(path)
     with located_errors(content, where):
@@ -38,9 +37,12 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         parts = _parts(vertices, where, repaired)
     small = [hole for part in parts for hole in map(Polygon, part.interiors) if hole.area < _MIN_HOLE]
     dropped = [f"{counted(len(small), 'hole')} of {sum(hole.area for hole in small):.2g} m² together"]
+    given, rooms = document.get("id"), document.get("room_num")
+    name = given if isinstance(given, str) and given else path.stem
+    many = f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""
     return ForeignMap(
-        name=_name(document, path),
-        description=_description(document),
+        name=f"HouseExpo {one_line(name)[:60]}",
+        description=f"A floor plan{many}, imported from HouseExpo.",
         format=IMPORTER.name,
         free=MultiPolygon([_without_small_holes(part) for part in parts]),
         vertices_read=len(vertices),
@@ -81,18 +83,6 @@ def _parts(vertices: Array, where: str, repaired: list[str]) -> list[Polygon]:
 
 def _without_small_holes(part: Polygon) -> Polygon:
     return Polygon(part.exterior, [hole for hole in part.interiors if Polygon(hole).area >= _MIN_HOLE])
-
-
-def _name(document: dict[str, Any], path: Path) -> str:
-    given = document.get("id")
-    name = given if isinstance(given, str) and given else path.stem
-    return f"HouseExpo {one_line(name)[:60]}"
-
-
-def _description(document: dict[str, Any]) -> str:
-    rooms = document.get("room_num")
-    many = f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""
-    return f"A floor plan{many}, imported from HouseExpo."
 
 
 IMPORTER = Importer(

@@ -40,12 +40,11 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of an IR-SIM world.
+    """Return the map of a world; one that is generated is refused.
 
     Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
     ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out
-    and counted. The states of robots are a start. Raises MapError when the file cannot be read or understood,
-    or its world is generated.
+    and counted. The states of robots are a start.
     """
     where = one_line(path)
     shapes = Shapes(where, options)
@@ -209,8 +208,7 @@ class _Node:
         return value
 
     def length(self, default: float) -> float:
-        value = self.number(default)
-        files.require_length(value, self.at)
+        files.require_length(value := self.number(default), self.at)
         return value
 
     def numbers(self, default: list[float]) -> Array:

@@ -68,8 +68,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says
     that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
     option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below
-    the ground, roofs, and ways whose nodes the extract lacks are left out. Raises MapError when the file
-    cannot be read or understood; with the line.
+    the ground, roofs, and ways whose nodes the extract lacks are left out.
     """
     where = one_line(path)
     extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))
@@ -111,9 +110,8 @@ class _Extract:
         try:
             self.parser.Parse(content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
-            raise MapError(
-                f"{where}:{self.parser.ErrorLineNumber}: not XML: {one_line(error)[:80]}"
-            ) from None
+            line = self.parser.ErrorLineNumber
+            raise MapError(f"{where}:{line}: not XML: {one_line(error)[:80]}") from None
 
     def figures(self, shapes: Shapes, *, water: bool) -> Iterable[Figure]:
         """Yield what stands on the ground, in degrees; tell `shapes` what is left out."""
@@ -166,7 +164,6 @@ class _Extract:
             self._refuse(f"<{name}>: {what}, but what OpenStreetMap writes was wanted")
 
     def _take(self, name: str, given: dict[str, str]) -> None:
-        """Take the attributes of an element."""
         thing = self.thing
         if name == "bounds":
             longitudes = [_degrees(given, key, 360.0) for key in ("minlon", "maxlon")]

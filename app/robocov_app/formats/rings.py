@@ -38,8 +38,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free
     space and the others are obstacles; or one ring alone; or a list of such lists; or, flat, an object with
     ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and ``dimensions``.
-    There are no units: the option ``scale`` is metres a unit, 1 by default. Raises MapError when the file
-    cannot be read or understood; with line and column.
+    There are no units: the option ``scale`` is metres a unit, 1 by default.
     """
     document, content, where = read_json(path)
     shapes = Shapes(where, options)
@@ -56,7 +55,6 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 
 def _polygons(document: Any, where: str, shapes: Shapes) -> list[list[Array]]:
-    """Return the polygons of a document: lists of rings, (k, 2) each."""
     if isinstance(document, dict):
         return [_flat(document, where, shapes)]
     depth, inner = 0, document
@@ -87,7 +85,6 @@ def _ring(value: Any, at: Steps, where: str, shapes: Shapes) -> Array:
 
 
 def _flat(document: dict[str, Any], where: str, shapes: Shapes) -> list[Array]:
-    """Return the rings of the flat form."""
     dimensions = document.get("dimensions", 2)
     if type(dimensions) is not int or dimensions not in (2, 3):
         raise refused(where, ("dimensions",), dimensions, "2 or 3 was wanted")

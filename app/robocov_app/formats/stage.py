@@ -50,8 +50,6 @@ _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 class _Token(NamedTuple):
-    """A word, number, text or bracket, and its line."""
-
     kind: str
     text: str
     at: str
@@ -102,12 +100,11 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of a Stage world.
+    """Return the map of a world.
 
     Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
     (``position``) are places to start; sensors and the like are left out. The map is the largest model with a
-    bitmap or a ``boundary``, if most of the others are in it. Raises MapError when a file cannot be read or
-    understood, with the line; or when it is not in the world's folder.
+    bitmap or a ``boundary``, if most of the others are in it.
     """
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)
@@ -145,7 +142,6 @@ class _World:
         self.rooms: list[_Room] = []
 
     def read(self) -> _Entity:
-        """Return the file as an entity: what is global, and the models."""
         self._split(self.path, 0)
         root = _Entity("world", self.shapes.where)
         self._fill(root, 0, 0)
@@ -180,9 +176,8 @@ class _World:
             elif (kind, token.text) == ("word", "include"):
                 include = True
             elif len(self.tokens) >= MOST_TOKENS:
-                raise MapError(
-                    f"{token.at}: more than {MOST_TOKENS} words and numbers, but fewer were wanted"
-                )
+                what = f"more than {MOST_TOKENS} words and numbers"
+                raise MapError(f"{token.at}: {what}, but fewer were wanted")
             else:
                 self.tokens.append(token)
 
@@ -282,8 +277,8 @@ class _World:
     def _shape(self, entity: _Entity, frame: Array, labels: tuple[str, ...]) -> None:
         """Add what a model covers: its bitmap, its blocks, or a box."""
         size = entity.numbers("size", (0.4, 0.4)) * self.metre
-        files.require_length(float(size.min()), f"{entity.at}: size")
-        files.require_length(float(size.max()), f"{entity.at}: size")
+        for length in size.tolist():
+            files.require_length(length, f"{entity.at}: size")
 
         def placed(points: Array) -> Array:
             """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
@@ -316,28 +311,22 @@ class _World:
                 self.shapes.leave_out("block", "without an area")
 
     def _bitmap(self, file: Path) -> tuple[MultiPolygon, int, int]:
-        """Return what is light in the box around all dark pixels, and its columns and rows.
-
-        The box has sides of 1 about the origin.
-        """
+        """Return what is light in the box around all dark pixels, of side 1, and its columns and rows."""
         if file not in self.bitmaps:
             where = one_line(file)
             picture = read_picture(file, where)
             self.pixels += picture.level.size
             if self.pixels > files.MAX_CELLS:
-                most = files.MAX_CELLS // 1_000_000
-                raise MapError(
-                    f"{where}: with those before it more than {most} million pixels, but fewer were wanted"
-                )
+                what = f"with those before it more than {files.MAX_CELLS // 1_000_000} million pixels"
+                raise MapError(f"{where}: {what}, but fewer were wanted")
             dark = picture.level <= _DARK * picture.full
             if not dark.any():
                 raise MapError(f"{where}: all is light, but a picture with dark walls was wanted")
             row, column = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
             light = ~dark[row[0] : row[-1] + 1, column[0] : column[-1] + 1]
             rows, columns = light.shape
-            free = MultiPolygon()
-            if light.any():
-                free = free_area(light, (1 / columns, 1 / rows), (-0.5, -0.5), where)
+            sides = 1 / columns, 1 / rows
+            free = free_area(light, sides, (-0.5, -0.5), where) if light.any() else MultiPolygon()
             self.bitmaps[file] = free, columns, rows
         return self.bitmaps[file]
 

@@ -94,8 +94,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     or by collision objects; of a layer without any such tile all, if the option ``only`` names it, or its
     name, class or a property says so. Objects are solid if they or their layer say so or are asked for, and
     all of them where nothing else is. Hidden layers count: those of walls mostly are hidden. `options`:
-    ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel. Raises MapError when a file
-    cannot be read or understood, with the line; when the map is not orthogonal, or nothing in it is solid.
+    ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel.
     """
     root, where = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
     return _Map(path, root, Shapes(where, options)).read()
@@ -110,9 +109,8 @@ class _Map:
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
             root.refuse(self.where, f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
-        self.tile = np.array(
-            [_whole(root, name, self.where, 1) for name in ("tilewidth", "tileheight")], float
-        )
+        sides = [_whole(root, name, self.where, 1) for name in ("tilewidth", "tileheight")]
+        self.tile = np.array(sides, float)
         options = shapes.options
         if options.cell is not None and options.scale is not None:
             raise ParameterError("--cell, --scale: both say how large a tile is, but one of them was wanted")
@@ -124,7 +122,6 @@ class _Map:
         self.shape = (0, 0)
 
     def read(self) -> ForeignMap:
-        """Return the map."""
         shapes, tiles = self.shapes, self._tiles()
         layers = [*self._layers(self.root, (), np.zeros(2), wall=False)]
         grids = self._grids([layer for layer in layers if layer.element.tag == "layer"])
@@ -195,11 +192,8 @@ class _Map:
         """Return layers of tiles with global IDs, (rows, columns) of the map, whose corner it finds."""
         given = [(layer, [*self._pieces(layer.element)]) for layer in layers]
         pieces = [piece for _, some in given for piece in some]
-        left, top, right, bottom = (
-            0,
-            0,
-            *(_whole(self.root, name, self.where, 1) for name in ("width", "height")),
-        )
+        left = top = 0
+        right, bottom = (_whole(self.root, name, self.where, 1) for name in ("width", "height"))
         infinite = bool(pieces) and self.root.attributes.get("infinite", "0") != "0"
         if infinite:
             left, top = min(x for x, _, _ in pieces), min(y for _, y, _ in pieces)
@@ -219,11 +213,10 @@ class _Map:
             grids.append((layer, grid))
         used = np.logical_or.reduce([grid & _ID != 0 for _, grid in grids]) if infinite else np.empty((0, 0))
         if used.any():  # chunks have empty edges
-            (top_, end), (left_, side) = (
-                np.flatnonzero(used.any(axis=axis))[[0, -1]].tolist() for axis in (1, 0)
-            )
-            grids = [(layer, grid[top_ : end + 1, left_ : side + 1]) for layer, grid in grids]
-            left, bottom, self.shape = left + left_, top + end + 1, grids[0][1].shape
+            rows, columns = (np.flatnonzero(used.any(axis=axis)) for axis in (1, 0))
+            part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+            grids = [(layer, grid[part]) for layer, grid in grids]
+            left, bottom, self.shape = left + int(columns[0]), top + int(rows[-1]) + 1, grids[0][1].shape
         self.corner = np.array([left, bottom]) * self.tile
         return grids
 
@@ -236,9 +229,8 @@ class _Map:
             width, height = (_whole(sized, name, self.where, 1) for name in ("width", "height"))
             self.tiles_read += width * height
             if self.tiles_read > MOST_READ:
-                part.refuse(
-                    self.where, f"with those before more than {MOST_READ} tiles, but fewer were wanted"
-                )
+                what = f"with those before more than {MOST_READ} tiles"
+                part.refuse(self.where, f"{what}, but fewer were wanted")
             x, y = (_whole(part, name, self.where, -MOST_READ, "0") for name in "xy") if chunks else (0, 0)
             yield x, y, self._decoded(part, data or part, width * height).reshape(height, width)
 
@@ -262,9 +254,8 @@ class _Map:
                 except (DeprecationWarning, ValueError, OverflowError):
                     numbers = np.array([-1])
             if len(numbers) and not 0 <= numbers.min() <= numbers.max() < 2**32:
-                part.refuse(
-                    self.where, "what is not whole numbers from 0, but those, with commas, were wanted"
-                )
+                what = "what is not whole numbers from 0, but those, with commas, were wanted"
+                part.refuse(self.where, what)
             ids = None if more else numbers.astype(np.uint32)
         elif not encoding:
             tiles = [child for child in part.children if child.tag == "tile"]

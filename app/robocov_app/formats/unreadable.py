@@ -61,8 +61,6 @@ _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 def named_kind(path: Path, head: bytes) -> str | None:
     """Return what a file that begins with `head` is, and what to do with it; None where it is not known.
 
-    Examples
-    --------
     >>> from pathlib import Path
     >>> named_kind(Path("plan.pdf"), b"%PDF-1.7")
     'a PDF, which cannot be imported: pdftocairo -svg plan.pdf out.svg, or pdftoppm -png for a scan'
@@ -82,6 +80,5 @@ def described(head: bytes) -> str:
     """Return what is seen of a file of no known kind: how it begins."""
     text = head[:1000].decode(errors="replace")
     binary = "\0" in text or text.count("\ufffd") > 1
-    return (
-        f"{'binary data' if binary else 'text'} that begins with {shown(head[:20] if binary else text[:20])}"
-    )
+    kind, begin = ("binary data", shown(head[:20])) if binary else ("text", shown(text[:20]))
+    return f"{kind} that begins with {begin}"

@@ -46,11 +46,9 @@ _COMMENT = re.compile(r"^[ \t]*(?:#|--).*$", re.MULTILINE)
 
 
 class WktText:
-    """Well-known text that is read from its beginning to its end.
+    """Reads geometries that stand one after the other, with a comma, a semicolon or nothing between them.
 
-    `text`: geometries one after the other, with a comma, a semicolon or nothing between them; lines that
-    begin with # or -- are comments. `where`: what messages call the file. `shapes`: is told what is left out.
-    `srid`: the reference system that the geometries name, once they are read.
+    Lines that begin with # or -- are comments. `srid`: the reference system that the geometries name.
     """
 
     def __init__(self, text: str, where: str, shapes: Shapes) -> None:
@@ -63,10 +61,7 @@ class WktText:
         self._figures: list[Figure] = []
 
     def figures(self) -> list[Figure]:
-        """Return all geometries; the parts of collections one by one.
-
-        Raises MapError where the text is no well-known text, or names two reference systems.
-        """
+        """Return all geometries; the parts of collections one by one."""
         count = 0
         while self._skip_space() < len(self.text):
             srid = _SRID.match(self.text, self.at)
@@ -247,14 +242,12 @@ def _sniff(path: Path, head: bytes) -> bool:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that the geometries of a file of well-known text stand for.
+    """Return the map that the geometries of a file stand for.
 
     Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
     Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
     it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-    `enclosing.foreign_map`. Third coordinates and measures are left out. Coordinates are metres, unless a
-    prefix ``SRID=...;`` names a system other than 0. Raises MapError when the file cannot be read or
-    understood; with line and column.
+    `enclosing.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
     """
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)

@@ -33,10 +33,9 @@ _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of SVG, or of a format without namespaces; others are left out when it is read.
+    """An element of SVG, or of a format without namespaces, with its line; others are left out.
 
-    `tag`: without its namespace. `attributes`: their names without namespaces. `text`: of elements whose text
-    means something only. `line`: of the file, counted from 1.
+    Names are without namespaces; `text` is of elements whose text means something only.
     """
 
     tag: str
@@ -60,12 +59,7 @@ class Element:
     def numbers(
         self, where: str, name: str, *, count: int | None = None, default: str | None = None
     ) -> Array:
-        """Return the numbers of an attribute, which commas or blanks separate.
-
-        `where`: what messages call the file. `count`: so many are wanted. `default`: what stands for an
-        attribute that is missing. Raises MapError when there are no such numbers, or one is too large for a
-        map.
-        """
+        """Return the numbers of an attribute, which commas or blanks separate, `count` of them."""
         text = self.attributes.get(name, default)
         try:
             values = np.array([float(part) for part in (text or "").replace(",", " ").split()])
@@ -74,9 +68,8 @@ class Element:
         if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
             found = "missing" if text is None else shown(text)
             wanted = "numbers" if count is None else "a number" if count == 1 else f"{count} numbers"
-            self.refuse(
-                where, f"{name}: {found}, but {wanted} within 1e7 {'was' if count == 1 else 'were'} wanted"
-            )
+            wanted += " within 1e7 was" if count == 1 else " within 1e7 were"
+            self.refuse(where, f"{name}: {found}, but {wanted} wanted")
         return values
 
     def refuse(self, where: str, what: str) -> NoReturn:
@@ -87,10 +80,7 @@ class Element:
 
 
 def read_svg_tree(path: Path) -> tuple[Element, str]:
-    """Return the root of the SVG file at `path`, and what messages call the file.
-
-    Raises MapError as `read_xml_tree`.
-    """
+    """Return the root of the SVG file at `path`, and what messages call the file."""
     return read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
 
 
@@ -98,9 +88,7 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
     """Return the root of the XML file at `path`, and what messages call the file.
 
     `root`: tag that the root has. `kind`: what messages call the format. `texts`: tags of elements whose text
-    means something. Raises MapError when it cannot be read, is too large, is not XML or has another root;
-    when it has entities that stand for other files or other entities, or for too much; or too many elements,
-    or too deep ones.
+    means something. Refused are entities that stand for other files, other entities or too much.
     """
     where = one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)
@@ -112,8 +100,6 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
 
 
 class _Reader:
-    """Builds the tree from what expat tells."""
-
     def __init__(self, where: str, content: bytes, wanted: str, kind: str, texts: Collection[str]) -> None:
         self.where = where
         self.content = content
@@ -136,7 +122,6 @@ class _Reader:
         self.count = 0
 
     def root(self) -> Element:
-        """Return the root element."""
         try:
             self.parser.Parse(self.content, True)
         except (expat.ExpatError, ValueError, LookupError) as error:
@@ -190,17 +175,10 @@ class _Reader:
         if self.room < 0:
             self._refuse("its entities stand for too much")
 
-    def _entity(
-        self,
-        name: str,
-        parameter: bool,
-        value: str | None,
-        base: str | None,
-        system: str | None,
-        *rest: object,
-    ) -> None:
+    def _entity(self, name: str, parameter: bool, value: str | None, *rest: object) -> None:
         """Check an entity: it may stand for a few words, which expat puts in where it is used."""
         self._declared()
+        _, system, *_ = rest
         if value is None:
             self._refuse(f"entity {shown(name)} stands for another file ({shown(system)}), which is not read")
         if parameter or "&" in value or "%" in value:
