@@ -47,8 +47,8 @@ STEP_RATIO = 10.0  # the time of a step of a large team by that of RAPF, at most
 
 CLOSED = 0.5  # most of a gap is closed when more than half of it is
 
-# what RAPF is to bear: axis, value, words
-BORNE = (("loss", 0.6, "60 % of all messages are lost"), ("delay", 1.0, "messages arrive after 1 s"))
+# what RAPF is to bear: axis and value, words
+BORNE = ((("loss", 0.6), "60 % of all messages are lost"), (("delay", 1.0), "messages arrive after 1 s"))
 
 _RESAMPLES = 2000
 
@@ -303,12 +303,9 @@ def conditions_claim(found: Iterable[Degradation], maps: int) -> Claim:
     text = f"RAPF ends within {near} of its cost where messages get lost or are late."
     head = Claim("conditions", EXTENSIONS, text)
     rapf = [each for each in found if each.controller == "rapf" and math.isfinite(each.ratio.estimate)]
-    borne = [
-        (f"final cost where {words}, by that under ideal conditions", each)
-        for axis, value, words in BORNE
-        for each in rapf
-        if (each.axis, each.value) == (axis, value)
-    ]
+    known = {(each.axis, each.value): each for each in rapf}
+    measure = "final cost where {}, by that under ideal conditions"
+    borne = [(measure.format(words), known[at]) for at, words in BORNE if at in known]
     if not borne:
         return head
     worst = max(rapf, key=lambda each: each.ratio.estimate)

@@ -46,12 +46,7 @@ PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 
 _REPLAY_BUDGET = 400_000  # bytes of the runs in the page's replay
 
-_CASES = {
-    "convex": "Figure 2",
-    "a": "Figure 4",
-    "b": "Figure 6",
-    "other": "Figure 8",
-}  # which shows which runs
+_CASES = {"convex": "Figure 2", "a": "Figure 4", "b": "Figure 6", "other": "Figure 8"}  # which shows what
 
 _TICKS = (0.0, 0.01, 0.03, 0.1, 0.2, 0.5, 1.0, 2.0, 4.0)  # of the axis of gaps
 
@@ -88,10 +83,8 @@ def save_paper_figures(
         figures = {f"figure-{number}": partial(draw_figure, number, runs, first, theme) for number in FIGURES}
         return figures if results is None else {**figures, **paper_plots(results, theme)}
 
-    shown = {
-        number: f"{shows} {describe_figure(number, runs, first)}" for number, (_, shows) in FIGURES.items()
-    }
-    words = {f"figure-{number}": text for number, text in shown.items()}
+    told = {number: describe_figure(number, runs, first) for number in FIGURES}
+    words = {f"figure-{number}": f"{shows} {told[number]}" for number, (_, shows) in FIGURES.items()}
     return _save_figures(folder, drawn, words, quiet=quiet)
 
 
@@ -215,12 +208,8 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
 
     loader, undefined = jinja2.FileSystemLoader(ASSETS), jinja2.StrictUndefined
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=undefined, finalize=_unbroken)
-    environment.filters |= {
-        "span": span,
-        "g": "{:g}".format,
-        "amount": amount,
-        "unbroken": lambda text: Markup(_unbroken(str(text))),
-    }
+    environment.filters.update(span=span, g="{:g}".format, amount=amount)
+    environment.filters["unbroken"] = lambda text: Markup(_unbroken(str(text)))
     known = environment.globals.update
     known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)

@@ -75,10 +75,9 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
             if rows:
                 bands.append(Band(group.label, group.controller, time, np.array(rows)))
         if bands:
-            what = (
-                "mean distance / that of the start" if several else "mean distance to the nearest robot (m)"
-            )
-            yield _band_plot(title, bands, looks, own, what, "" if several else "m")
+            relative, metres = "mean distance / that of the start", "mean distance to the nearest robot (m)"
+            what, unit = (relative, "") if several else (metres, "m")
+            yield _band_plot(title, bands, looks, own, what, unit)
 
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:

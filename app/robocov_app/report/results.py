@@ -334,14 +334,12 @@ def _of_sweep(folder: Path) -> Result:
         facts["team"] = {name: value for name, value in teams[0].items() if name not in swept}
     facts["versions"] = _versions(entries)
     columns = {column.name: column.metadata or {} for column in results.dataset.schema}
-    documented = {
-        name: [columns[gain_column(name)].get(key, b"").decode() for key in (b"unit", b"meaning")]
-        for own in gains.values()
-        for name in own
-        if gain_column(name) in columns
+    about = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
+    texts = {
+        name: [known.get(key, b"").decode() for key in (b"unit", b"meaning")] for name, known in about.items()
     }
     maps = {printable(name): environment for name, environment in maps.items()}
-    known = _known_gains(entries, documented)
+    known = _known_gains(entries, texts)
     return Result("sweep", folder, _labelled(entries), maps, wanted, *known, facts, {})
 
 
@@ -356,10 +354,8 @@ def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
 
 
 def _gains(gains: Mapping[str, Value]) -> Gains:
-    return tuple(
-        (printable(str(name)), printable(value) if isinstance(value, str) else value)
-        for name, value in gains.items()
-    )
+    known = ((name, printable(value) if isinstance(value, str) else value) for name, value in gains.items())
+    return tuple((printable(name), value) for name, value in known)
 
 
 def _known_gains(
