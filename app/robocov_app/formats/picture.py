@@ -30,17 +30,12 @@ from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_repor
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
-_PIECE = 1 << 20
-"""Bytes that are unpacked at a time."""
-
-_STRIP = 512
-"""Rows that are converted at a time, which bounds the memory."""
-
+_PIECE = 1 << 20  # bytes that are unpacked at a time
+_STRIP = 512  # rows that are converted at a time, which bounds the memory
+# what separates the numbers of a PGM header: a comment runs to the end of its line
 _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
-"""What separates the numbers of a PGM header: a comment runs to the end of its line."""
-
 _DIGITS = re.compile(rb"\d+")
-
+# first bytes (magic numbers) of formats that Pillow reads, by its names for them
 _PILLOW = {
     "PNG": re.compile(rb"\x89PNG\r\n\x1a\n"),
     "JPEG": re.compile(rb"\xff\xd8\xff"),
@@ -48,10 +43,8 @@ _PILLOW = {
     "TIFF": re.compile(rb"II[*+]\0|MM\0[*+]"),
     "PPM": re.compile(rb"P[14][\s#]"),
 }
-"""First bytes (magic numbers) of formats that Pillow reads, by its names for them."""
-
+# pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey
 _MOST_OF_JPEG = 512
-"""Pixels a byte: a block of 8 x 8 takes a bit at least. What is not there would be made up in grey."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,11 +216,8 @@ CHUNK = "robocov"
 TITLE = "Title"
 """Key of the text chunk with the name of what is shown."""
 
-_NOISE = 1.5
-"""Single cells beside dark ones come of how a JPEG is saved."""
-
-_OPAQUE = 128
-"""Less opaque pixels count as transparent, of 255."""
+_NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
+_OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:

@@ -24,14 +24,9 @@ from robocov_app.formats.options import ExportReport
 CELL = 0.05
 """Side of a cell in metres where none is given: what maps of robots mostly have."""
 
-_LEAST = math.pi * DEFAULT_RADIUS**2
-"""Parts of the free space with no room for a robot, in m², do not count."""
-
-_MOST_TRIED = 16_000_000
-"""Cells of grids that are tried for whether they keep what others lose."""
-
-_DIGITS = 6
-"""Decimals of a grid's corner: a micrometre."""
+_LEAST = math.pi * DEFAULT_RADIUS**2  # parts of the free space with no room for a robot, in m², do not count
+_MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
+_DIGITS = 6  # decimals of a grid's corner: a micrometre
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,12 +14,10 @@ from robocov.environment import SAGITTA
 TOLERANCE = SAGITTA
 """Largest distance between a curve and the line that stands for it, in metres: as of round obstacles."""
 
+# steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
+# not be where the curve is farthest
 _FIRST, _SAFE = 8, 0.8
-"""Steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
-not be where the curve is farthest."""
-
-_LEAST = 8
-"""Points of a whole ellipse at least, however small it is."""
+_LEAST = 8  # points of a whole ellipse at least, however small it is
 
 MOST_POINTS = 250_000
 """Of one call. A circle of 10 000 km, the farthest that coordinates go, has 222 thousand."""

@@ -23,11 +23,10 @@ BOUNDARY = "boundary"
 AROUND = 1.0
 """Room left around the shapes where none of them is the boundary, in metres."""
 
+# a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
 _MOST = 0.5
-"""A boundary holds more than this part of the other shapes; walls that are one leave so much of it open."""
-
+# shapes that are farther from each other, in metres, are of no map: unions of such take seconds
 _FARTHEST_PARTS = 10.0 * LARGEST
-"""Shapes that are farther from each other, in metres, are of no map: unions of such take seconds."""
 
 
 class _Enclosure(NamedTuple):

@@ -12,22 +12,13 @@ from robocov.arrays import Array, IntArray, ranges
 from robocov.environment import Point
 from robocov_app.formats.geometry.polygons import sides_of
 
-_CHUNK = 2048
-"""Sides that are looked at together, which bounds the memory."""
-
-_SQUARES = 1024
-"""So many squares are looked at more closely, at each size."""
-
+_CHUNK = 2048  # sides that are looked at together, which bounds the memory
+_SQUARES = 1024  # so many squares are looked at more closely, at each size
+# so many sides may be crossed by the rays that tell whether squares of one size, and gaps, are inside
 _SQUARED_WORK, _WORK = 5_000_000, 300_000_000
-"""So many sides may be crossed by the rays that tell whether squares of one size, and gaps, are inside."""
-
 _QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
-
-_MOST_GAPS = 200_000
-"""So many gaps are looked at."""
-
-_CLEARLY = 1 + 1e-6
-"""A gap of just a robot's diameter is none."""
+_MOST_GAPS = 200_000  # so many gaps are looked at
+_CLEARLY = 1 + 1e-6  # a gap of just a robot's diameter is none
 
 
 def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:

@@ -29,15 +29,11 @@ cross itself millions of times, and to find all of these places takes minutes an
 CRUMB = 1e-4
 """Obstacles and parts that are smaller, in m², come of rounding."""
 
-_FEW = 12
-"""So few edges are compared each with each, which is quicker than a tree of them."""
-
-_RAYS = 500_000
-"""So many pairs of a ray and an edge are looked at together, which bounds the memory."""
-
+_FEW = 12  # so few edges are compared each with each, which is quicker than a tree of them
+_RAYS = 500_000  # so many pairs of a ray and an edge are looked at together, which bounds the memory
+# edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
+# most, and crossings that are enough for one
 _SAMPLES, _TOGETHER, _WORK, _CERTAIN = 500, 20, 400_000, 50
-"""Edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
-most, and crossings that are enough for one."""
 
 
 @dataclass

@@ -32,11 +32,8 @@ RIM = 2
 NECK = 1 / 32
 """Where obstacles touch at a corner, so much of each side of the two free cells is cut off, in cells."""
 
-_STRIP = 512
-"""Rows that are looked at together."""
-
-_TOUCHING = np.ones((3, 3), dtype=bool)
-"""Known cells that touch at a corner belong together."""
+_STRIP = 512  # rows that are looked at together
+_TOUCHING = np.ones((3, 3), dtype=bool)  # known cells that touch at a corner belong together
 
 
 def foreign_map(

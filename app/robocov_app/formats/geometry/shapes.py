@@ -26,12 +26,8 @@ Kind: TypeAlias = Literal["polygon", "line", "point"]
 THICKNESS = 0.1
 """Width of walls that are drawn as lines without one, in metres."""
 
-_SHOWN = 20
-"""Names that are listed where one is wrong."""
-
+_SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
-_MITRE_LIMIT = 4.0
-"""As of walls in `robocov.environment`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +71,7 @@ class Line:
     labels: tuple[str, ...] = ()
     cap: Literal["flat", "square", "round"] = "flat"
     join: Literal["mitre", "bevel", "round"] = "mitre"
-    mitre_limit: float = _MITRE_LIMIT
+    mitre_limit: float = 4.0  # as of walls in `robocov.environment`
     stretched: tuple[Array, float, Array] | None = None
 
     @cached_property

@@ -46,30 +46,23 @@ from robocov_app.formats.options import check_options
 DEFAULT_TOLERANCE = 0.02
 """By how much walls of vector formats may move, in metres."""
 
+# coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
 _GRID = 1e-4
-"""Coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer."""
-
+# obstacles smaller than this, in m², are perhaps noise: so many of them are worth a word
 _TINY, _MANY = 0.01, 10
-"""Obstacles smaller than this, in m², are perhaps noise: so many of them are worth a word."""
-
+# where less of the free area stays than the first, or a part of more than the second does not, it is said how
+# to choose: so many of the largest parts that are left out are named, with a place in each
 _LITTLE, _CONSIDERABLE, _OFFERED = 0.5, 0.1, 3
-"""Where less of the free area stays than the first, or a part of more than the second does not, it is said
-how to choose: so many of the largest parts that are left out are named, with a place in each."""
-
+# of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
-"""Of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage."""
 
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
 """Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
 
-_MOST_ROBOTS = 1000
-"""Of a file, so many are looked at."""
-
-_ZERO = 1e-100
-"""Coordinates nearer to zero, in metres, are zero; as of map files."""
-
+_MOST_ROBOTS = 1000  # of a file, so many are looked at
+_ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
+# width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost
 _SLIVER = 2.0
-"""Width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost."""
 
 
 @dataclass(frozen=True)

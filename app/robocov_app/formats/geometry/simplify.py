@@ -33,34 +33,24 @@ KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
 """By so much of it the area of an outline may change, of an obstacle or a part of the free space; and the
 free area as a whole."""
 
-_BLOCKS = 16
-"""A thing of fewer cells stays as it is: what it is like, its cells say best."""
-
+_BLOCKS = 16  # a thing of fewer cells stays as it is: what it is like, its cells say best
+# how often the tolerance is halved around a place before everything stays there; the rounds after which all
+# of a wall stays where something is wrong, and after which everything stays everywhere, as it does after so
+# many times the vertices
 _HALVINGS, _PATIENCE, _ROUNDS, _WORK = 3, 24, 60, 1_000_000
-"""How often the tolerance is halved around a place before everything stays there; the rounds after which
-all of a wall stays where something is wrong, and after which everything stays everywhere, as it does after so
-many times the vertices."""
-
+# from this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little
 _MIDDLES, _FEW = 0.75, 3
-"""From this tolerance on, in cells, stairs are drawn as lines; and one through fewer middles says little."""
-
-_UNBALANCED = 0.02
-"""From this part of it on, the area that a ring lost is given back to it."""
-
+_UNBALANCED = 0.02  # from this part of it on, the area that a ring lost is given back to it
+# of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
+# smaller ones less is, but always so much, in cells
 _SIZES, _FINEST = 16, 0.4
-"""Of a thing with the area of a square of so many tolerances and more, all of the tolerance is left out; of
-smaller ones less is, but always so much, in cells."""
-
+# lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
+# nowhere in particular
 _RIGHT, _SQUARE = 1e-5, 0.2
-"""Lines whose cosine of the angle between them is smaller are at right angles; whose sine is smaller, meet
-nowhere in particular."""
-
+# in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
+# angle below which two walls count as parallel
 _SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
-"""In tolerances: what counts as a short edge, and how far from the corner its run may be; and the
-sine of the angle below which two walls count as parallel."""
-
-_LONGEST = 1024
-"""Most vertices between two that must stay: the algorithm's depth may grow with their number."""
+_LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
 class Simplified(NamedTuple):

@@ -17,12 +17,11 @@ _DECIMAL = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"
 NUMBER = re.compile(rf"[\s,]*+({_DECIMAL})", re.ASCII)
 _LENGTH = re.compile(rf"\s*+({_DECIMAL})\s*+([A-Za-z]*+|%)\s*+", re.ASCII)
 _FUNCTION = re.compile(r"[\s,]*([A-Za-z]+)\s*\(([^()]*)\)")
-
 _LARGEST = 1e30
+# user units in a unit of length (CSS Values 4, section 6.2)
 _PIXELS = {
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
-"""User units in a unit of length (CSS Values 4, section 6.2)."""
 
 PIXEL = 0.0254 / 96
 """A user unit in metres, where nothing says otherwise."""

@@ -26,16 +26,14 @@ from robocov_app.formats.svg.style import INHERITED, Style, StyleSheet, inherite
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_svg_tree
 
 _ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
-_SMALLEST = 1.0
-"""A drawing smaller than this, in metres, at its own scale is a picture of something larger."""
-
+_SMALLEST = 1.0  # a drawing smaller than this, in metres, at its own scale is a picture of something larger
 _GROUPS = ("g", "a", "switch", "svg", "use")
 _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
 _PICTURES = ("text", "image", "foreignObject", "video", "iframe", "canvas")
 _CAPS: dict[str, Literal["square", "round"]] = {"square": "square", "round": "round"}
 _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "round"}
+# where lengths grow by more different factors in different directions, a stroke has no one width
 _EVEN = 1.0 + 1e-6
-"""Where lengths grow by more different factors in different directions, a stroke has no one width."""
 
 
 def is_svg(path: Path, head: bytes) -> bool:

@@ -22,7 +22,6 @@ INHERITED = {
 """What passes from groups to their elements, and what it is by default (SVG 2, section 13)."""
 
 _PROPERTIES = (*INHERITED, "display", "opacity", "transform", "clip-path", "mask")
-
 _SELECTOR = re.compile(r"(\*|[A-Za-z][\w-]*)?((?:[.#][\w-]+)*)")
 _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)

@@ -21,8 +21,7 @@ from robocov_app.render.theme import DARK, LIGHT, Theme
 DIGITS = 3
 """Decimals of millimetres by default: as fine as the free space is known at true scale."""
 
-_MARGIN = 0.03
-"""Of the longer side, around the map."""
+_MARGIN = 0.03  # of the longer side, around the map
 
 
 @dataclass(frozen=True)
