@@ -125,24 +125,23 @@ def save_pictures(
             if value is not None and (kind == "mean_distance" or np.isfinite(value).any())
         ]
 
-    def trajectories() -> Figure:
-        if comparison:
-            return plot_comparison(records, theme, film.colours, size, finals, times)
-        return plot_trajectories(records[0], None, theme, film.colours, size, finals[0], times[0])
-
-    def costs() -> Figure:
-        robots = counted(len(records[0].team), "robot")
-        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {robots}"
-        moments = last_moments(runs, cost)
-        return plot_coverage(curves("mean_distance"), moments, theme, size, title, curves("mean_time"))
-
     with progress("pictures", 4, quiet=options.json) as update:
         done = counting(update)
-        for stem, draw in (("trajectories", trajectories), ("cost", costs)):
-            figure = draw()
+
+        def save(figure: Figure, stem: str) -> None:
             for suffix in (".png", ".svg"):
                 save_figure(figure, folder / (stem + suffix))
                 done()
+
+        look = (theme, film.colours, size)
+        if comparison:
+            save(plot_comparison(records, *look, finals, times), "trajectories")
+        else:
+            save(plot_trajectories(records[0], None, *look, finals[0], times[0]), "trajectories")
+        robots = counted(len(records[0].team), "robot")
+        title = f"Coverage cost  ·  {records[0].environment.name}  ·  {robots}"
+        moments, timed = last_moments(runs, cost), curves("mean_time")
+        save(plot_coverage(curves("mean_distance"), moments, theme, size, title, timed), "cost")
 
 
 def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
@@ -161,7 +160,6 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
         now, rows = momentary.at(time), np.flatnonzero(working)
         field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
         some = None if working.all() else rows
-        moments.append(
-            Moment.last_of(record, field, float(run.history.mean_distance[-1]), some, run.final_time)
-        )
+        mean = float(run.history.mean_distance[-1])
+        moments.append(Moment.last_of(record, field, mean, some, run.final_time))
     return moments

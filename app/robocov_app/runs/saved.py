@@ -65,17 +65,16 @@ def roster_of(record: Record) -> Roster:
     environment, session = record.environment, record.session
     numbers = tuple(session.get("robots", range(1, len(record.team) + 1)))
     failed = {int(number): (x, y) for number, (x, y) in session.get("failed", {}).items()}
-    wrecks = {wreck_name(number): number for number in failed}
+    wrecks = {wreck_name(number) for number in failed}
+    shapes = environment.obstacles
     standing = tuple(
-        shape
-        for shape in environment.obstacles
-        if not (isinstance(shape, CircleObstacle) and shape.name in wrecks)
+        each for each in shapes if not (isinstance(each, CircleObstacle) and each.name in wrecks)
     )
     known = {*numbers, *failed}
     if (
         len(numbers) != len(record.team)
         or len(known) != len(numbers) + len(failed)
-        or len(environment.obstacles) - len(standing) != len(failed)
+        or len(shapes) - len(standing) != len(failed)
     ):
         return Roster(environment, tuple(range(1, len(record.team) + 1)), {})
     return Roster(replace(environment, obstacles=standing), numbers, failed)
@@ -95,9 +94,8 @@ def folder_names(names: Sequence[str]) -> list[str]:
     taken: list[str] = []
     for name in names:
         stem = re.sub(r"[^\w.-]+", "-", name.rpartition(":")[2]).strip(".-")[:64] or "controller"
-        number = 1 + sum(
-            other == stem or re.fullmatch(re.escape(stem) + r"-\d+", other) is not None for other in taken
-        )
+        alike = re.compile(re.escape(stem) + r"(-\d+)?")
+        number = 1 + sum(alike.fullmatch(other) is not None for other in taken)
         taken.append(stem if number == 1 else f"{stem}-{number}")
     return taken
 
