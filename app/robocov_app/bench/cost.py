@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.bench.measure import Case, Parameters, Row, in_turn
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
@@ -75,7 +75,7 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
         calls: dict[str, Callable[[], object]] = {"exact": partial(evaluated, cost, places)}
         if has_yardstick():
             calls["marching"] = partial(_marched, cost, places)
-        taken = InTurn(calls, before=places.move).rounds(7, 0.3 if quick else 1.0)
+        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
         goal = GOALS.get((lattice, vertices, robots))
         yield Row(
             *("cost", "evaluated", {**size, "robots": robots}, taken["exact"]),
@@ -152,7 +152,7 @@ def _on_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
             "exact": partial(evaluated, cost, places),
             "tree": lambda: cKDTree(places.now).query(cost.points),  # noqa: B023 - called at once
         }
-        taken = InTurn(calls, before=places.move).rounds(7, 0.3 if quick else 1.0)
+        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
         before = BEFORE[name, lattice, robots]
         faster = 10.0 if robots == 1000 else FASTER[lattice] * (2.0 if name == "campus" else 1.0)
         size: Parameters = {"map": name, "lattice": lattice, "robots": robots}

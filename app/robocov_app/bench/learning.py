@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.bench.measure import Case, Parameters, Row, in_turn
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
 ROBOTS, LATTICE, TOGETHER = 6, 32, 64
@@ -70,7 +70,7 @@ def _rows(quick: bool) -> Iterator[Row]:
         "many": lambda: many.step(next(actions)),
     }
     # processor time: a step of many is long enough to be interrupted by other programs
-    taken = InTurn(calls, clock=process_time).rounds(20 if quick else 200)
+    taken = in_turn(calls, 20 if quick else 200, clock=process_time)
     for name, count, goal in (("single", 1, 0.7), ("many", TOGETHER, 4.0)):
         size: Parameters = {"environments": count}
         each, yardstick = taken[name] / count, (YARDSTICK, taken["plain"], 1 / goal)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import gc
+import itertools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass
 from statistics import median
 from time import perf_counter
 from typing import Any, TypeAlias
@@ -55,45 +56,43 @@ class Row:
     def case(self) -> str:
         """The parameters in words."""
         words = {"lattice": "{0} x {0}", "map": "{0}"}
-        return ", ".join(
-            words.get(name, "{0} " + name).format(value) for name, value in self.parameters.items()
-        )
+        given = self.parameters.items()
+        return ", ".join(words.get(name, "{0} " + name).format(value) for name, value in given)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the row as JSON."""
-        plain = {each.name: getattr(self, each.name) for each in fields(self)}
-        return plain | {"ratio": self.ratio, "met": self.met}
+        return asdict(self) | {"ratio": self.ratio, "met": self.met}
 
 
-@dataclass
-class InTurn:
-    """Median times of calls in turn, as a shared machine slows all alike; `before` each round, untimed."""
+def in_turn(
+    calls: Mapping[str, Call],
+    count: int,
+    seconds: float = 0.0,
+    *,
+    clock: Callable[[], float] = perf_counter,
+    before: Call = lambda: None,
+) -> dict[str, float]:
+    """Return median times of calls in turn, as a shared machine slows all alike; `before` is not timed.
 
-    calls: Mapping[str, Call]
-    clock: Callable[[], float] = perf_counter
-    before: Call | None = None
-    taken: dict[str, list[float]] = field(default_factory=dict)
-
-    def rounds(self, count: int, seconds: float = 0.0) -> dict[str, float]:
-        """Return the medians of at least `count` rounds and of `seconds`, after one that does not count."""
-        self.taken = {name: [] for name in self.calls}
-        collecting = gc.isenabled()
-        gc.collect()
-        gc.disable()
-        try:
-            for call in self.calls.values():
+    There are at least `count` rounds, and `seconds` of them, after one that does not count.
+    """
+    taken: dict[str, list[float]] = {name: [] for name in calls}
+    collecting = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        for call in calls.values():
+            call()
+        until = clock() + seconds
+        for made in itertools.count():
+            if made >= count and clock() >= until:
+                break
+            before()
+            for name, call in calls.items():
+                begin = clock()
                 call()
-            until = self.clock() + seconds
-            made = 0
-            while made < count or self.clock() < until:
-                if self.before is not None:
-                    self.before()
-                for name, call in self.calls.items():
-                    begin = self.clock()
-                    call()
-                    self.taken[name].append(self.clock() - begin)
-                made += 1
-        finally:
-            if collecting:
-                gc.enable()
-        return {name: median(times) for name, times in self.taken.items()}
+                taken[name].append(clock() - begin)
+    finally:
+        if collecting:
+            gc.enable()
+    return {name: median(times) for name, times in taken.items()}

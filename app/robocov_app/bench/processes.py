@@ -11,7 +11,7 @@ from functools import partial
 from itertools import count
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.bench.measure import Case, Parameters, Row, in_turn
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
@@ -35,7 +35,7 @@ def _rows(seeds: int) -> Iterator[Row]:
             "numpy": lambda: [subprocess.run([sys.executable, "-c", "import numpy"]) for _ in range(5)],
         }
         # processor time of all processes: a sweep takes all cores there are
-        taken = InTurn(calls, clock=lambda: sum(os.times()[:4])).rounds(1)
+        taken = in_turn(calls, 1, clock=lambda: sum(os.times()[:4]))
     size: Parameters = {"runs": len(study), "workers": WORKERS}
     each = taken["sweep"] / len(study)
     note = f"{WORKERS / each:.1f} runs a second, all cores free"
@@ -72,6 +72,6 @@ def _start_rows(quick: bool) -> Iterator[Row]:
     silent = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
     words = {NUMPY: ("-c", NUMPY), **WORDS}
     calls = {name: partial(silent, [sys.executable, *given]) for name, given in words.items()}
-    taken = InTurn(calls).rounds(3 if quick else 15)
+    taken = in_turn(calls, 3 if quick else 15)
     for name in WORDS:
         yield Row("start", name, {}, taken[name], NUMPY, taken[NUMPY], GOALS.get(name))

@@ -15,7 +15,7 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.bench.measure import Case, Parameters, Row, in_turn
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import Scene
 from robocov_app.runs.film import iter_frames
@@ -44,7 +44,7 @@ def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
         canvas.blit(empty, (0, 0))
 
     calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": clear_and_flip}
-    taken = InTurn(calls).rounds(40 if quick else 150)
+    taken = in_turn(calls, 40 if quick else 150)
     size: Parameters = {"robots": n, "map": name}
     bare = "clear and flip", taken["bare"]
     yield Row("render", "one frame", size, taken["frame"], *bare, goal_seconds=FRAME_GOALS.get(n))
@@ -62,7 +62,7 @@ def _films(quick: bool) -> Iterator[Row]:
             "film": lambda: save_film(film, frames),
             "png": lambda: [png_bytes(frame) for frame in frames],
         }
-        taken = InTurn(calls).rounds(1 if quick else 3)
+        taken = in_turn(calls, 1 if quick else 3)
     size: Parameters = {"frames": len(frames)}
     for name, call in (("film encoded", "film"), ("PNGs encoded", "png")):
         rate = f"{len(frames) / taken[call]:.0f} frames a second"

@@ -13,7 +13,7 @@ from robocov.arrays import Array
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, InTurn, Parameters, Row
+from robocov_app.bench.measure import Case, Parameters, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
@@ -44,7 +44,7 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
         "delaunay": lambda: Delaunay(simulation.positions),
         "space": lambda: space.step(simulation.dt),
     }
-    taken = InTurn(calls).rounds((30 if n > 500 else 60) if quick else (100 if n > 500 else 300))
+    taken = in_turn(calls, (60 if quick else 300) if n <= 500 else 30 if quick else 100)
     step = taken["step"]
     note = f"{simulation.dt / step:.0f} x real time"
     # six robots 60 times as fast as real ones
@@ -70,7 +70,7 @@ def _together(quick: bool) -> Iterator[Row]:
         "step": simulation.step,
         "space": lambda: [call() for call in bare],
     }
-    taken = InTurn(calls).rounds(60 if quick else 300)
+    taken = in_turn(calls, 60 if quick else 300)
     size: Parameters = {"robots": n, "runs together": TOGETHER}
     each, space_each = taken["step"] / TOGETHER, taken["space"] / TOGETHER
     before = BEFORE[n][1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -167,7 +166,7 @@ class Scenarios:
             raise ParameterError("maps: none, but at least one was wanted")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
         self._lattice = lattice
-        self._costs: OrderedDict[Environment, CoverageCost] = OrderedDict()
+        self._costs: dict[Environment, CoverageCost] = {}
 
     @property
     def only(self) -> Environment | None:
@@ -182,13 +181,12 @@ class Scenarios:
 
     def cost(self, environment: Environment) -> CoverageCost:
         """Return the coverage cost of a map."""
-        cost = self._costs.get(environment)
+        cost = self._costs.pop(environment, None)
         if cost is None:
             cost = CoverageCost(environment, self._lattice)
-            self._costs[environment] = cost
-            if len(self._costs) > _KEPT:
-                self._costs.popitem(last=False)
-        self._costs.move_to_end(environment)
+        self._costs[environment] = cost  # the last one is the last that was asked for
+        if len(self._costs) > _KEPT:
+            del self._costs[next(iter(self._costs))]
         return cost
 
 

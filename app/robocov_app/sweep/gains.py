@@ -68,13 +68,11 @@ class Sampling:
         from scipy.stats import qmc
 
         rng = np.random.default_rng(self.seed)
-        if self.method == "latin-hypercube":
-            return np.asarray(qmc.LatinHypercube(dimensions, seed=rng).random(self.samples))
-        if self.method == "halton":
-            return np.asarray(qmc.Halton(dimensions, seed=rng).random(self.samples))
-        # the beginning of a longer, balanced sequence
-        whole = qmc.Sobol(dimensions, seed=rng).random_base2((self.samples - 1).bit_length())
-        return np.asarray(whole[: self.samples])
+        if self.method == "sobol":  # the beginning of a longer, balanced sequence
+            points = qmc.Sobol(dimensions, seed=rng).random_base2((self.samples - 1).bit_length())
+            return np.asarray(points[: self.samples])
+        kind = qmc.Halton if self.method == "halton" else qmc.LatinHypercube
+        return np.asarray(kind(dimensions, seed=rng).random(self.samples))
 
 
 Choice: TypeAlias = Mapping[str, Value]

@@ -14,7 +14,7 @@ from called import complaint
 from matplotlib.figure import Figure
 
 from robocov_app.bench import cost, learning, plot, processes, render, step, window
-from robocov_app.bench.measure import InTurn, Row
+from robocov_app.bench.measure import Row, in_turn
 from robocov_app.cli import main
 from robocov_app.commands import bench
 
@@ -50,7 +50,7 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
 
     calls = {"slow": partial(noted, "slow", slow), "quick": partial(noted, "quick", quick)}
     prepared = partial(noted, "before", clock.work(*[100.0] * 3))
-    assert InTurn(calls, clock, prepared).rounds(3) == {"slow": 2.0, "quick": 0.5}
+    assert in_turn(calls, 3, clock=clock, before=prepared) == {"slow": 2.0, "quick": 0.5}
     # the first round does not count, and nothing is collected meanwhile
     round_ = [("slow", False), ("quick", False)]
     assert order == [*round_, *[("before", False), *round_] * 3]
@@ -60,12 +60,10 @@ def test_calls_are_made_in_turn_and_their_medians_taken():
 @pytest.mark.slow
 def test_rounds_go_on_until_the_time_is_over():
     clock = Clock()
-    turn = InTurn({"one": clock.work(*[1.0] * 20)}, clock)
-    turn.rounds(2, seconds=6.5)
-    assert len(turn.taken["one"]) == 7
-    turn = InTurn({"one": clock.work(*[1.0] * 20)}, clock)
-    turn.rounds(5, seconds=2.0)
-    assert len(turn.taken["one"]) == 5
+    for least, seconds, rounds in ((2, 6.5, 7), (5, 2.0, 5)):
+        made, work = [], clock.work(*[1.0] * 20)
+        in_turn({"one": lambda: made.append(work())}, least, seconds, clock=clock)  # noqa: B023 - at once
+        assert len(made) == 1 + rounds
 
 
 @pytest.mark.parametrize(
