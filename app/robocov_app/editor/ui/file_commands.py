@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +11,12 @@ from typing import TYPE_CHECKING
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
 from robocov_app.editor.edits.properties import underlaid
-from robocov_app.editor.model.autosave import opened_elsewhere
+from robocov_app.editor.model.autosave import Autosave, opened_elsewhere
 from robocov_app.editor.model.background import picture_laid
 from robocov_app.editor.model.document import SUFFIX, Document
 from robocov_app.editor.model.file import ChangedError
 from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
 from robocov_app.editor.ui.settings import MOST_RECENT
@@ -22,15 +24,9 @@ from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from robocov_app.editor.model.autosave import Autosave
-    from robocov_app.editor.ui.editor import Editor
     from robocov_app.formats import Importer
 
-_PATIENCE = 2.0
-"""Seconds after which an import with settings that have changed since is given up."""
-
+_PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
@@ -60,8 +56,8 @@ class FileCommands:
             "save:as": self.ask_name,
             "export": self.ask_export,
             "reload": self.reload,
-            "background": self.ask_picture,
-            "quit": self.quit,
+            "background": lambda: self._ask_path("Picture under the map", self.underlay, PICTURES),
+            "quit": lambda: self.leave(lambda: setattr(self, "leaving", True)),
         }
 
     # leaving what is open
@@ -69,28 +65,18 @@ class FileCommands:
     def leave(self, then: Callable[[], object]) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
         document = self.editor.document
-        if not document.unsaved:
-            then()
-            document.close(discard=True)
-            return
-
-        def save() -> None:
-            self.save(then=lambda: self.leave(then))
 
         def discard() -> None:
             then()
             document.close(discard=True)
 
+        if not document.unsaved:
+            discard()
+            return
+        save = partial(self.save, then=lambda: self.leave(then))
         words = f"“{document.title}” has changes that are in no file."
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask("Save the changes?", words, *answers)
-
-    def quit(self) -> None:
-        """End, after asking what is to become of what is open."""
-        self.leave(self._leave_for_good)
-
-    def _leave_for_good(self) -> None:
-        self.leaving = True
 
     def _put(self, document: Document, words: str = "") -> None:
         self.editor.put(document)
@@ -114,20 +100,16 @@ class FileCommands:
         self._ask_path("Open a map", self.open, [SUFFIX, *foreign])
 
     def _ask_path(
-        self,
-        title: str,
-        call: Callable[[Path], object],
-        endings: Sequence[str],
-        text: str = "",
-        *,
-        saves: bool = False,
+        self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
-        editor = self.editor
+        """Ask for a file; for one to save to where a name is suggested."""
 
         def chosen(path: Path) -> None:
-            editor.carry_out(lambda: call(path))
+            self.editor.carry_out(lambda: call(path))
 
-        editor.dialogs.ask(file_choice(title, editor.folder, chosen, endings=endings, text=text, saves=saves))
+        folder, saves = self.editor.folder, bool(text)
+        asked = file_choice(title, folder, chosen, endings=endings, text=text, saves=saves)
+        self.editor.dialogs.ask(asked)
 
     def ask_recent(self) -> None:
         """Ask which of the maps to open that were open lately, or come with robocov."""
@@ -161,12 +143,11 @@ class FileCommands:
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
             self.leave(lambda: self._put(document, f"imported: {path.name}, not saved yet"))
 
-        self.editor.dialogs.ask(ImportDialog(path, importer, self._import_worker(), put))
-
-    def _import_worker(self) -> Worker[Imported]:
-        if self._patient:
-            return DirectWorker(Importing())
-        return LatestWorker("robocov_app.editor.ui.importing:Importing", "imports", patience=_PATIENCE)
+        worker: Worker[Imported] = DirectWorker(Importing())
+        if not self._patient:
+            service = "robocov_app.editor.ui.importing:Importing"
+            worker = LatestWorker(service, "imports", patience=_PATIENCE)
+        self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
         """Go on with work that was left behind."""
@@ -189,12 +170,10 @@ class FileCommands:
 
     def ask_name(self, then: Callable[[], object] | None = None) -> None:
         """Ask where to save."""
-        suggested = self.editor.document.suggested(self.editor.folder)
-        text = str(suggested)
-        if suggested.parent == self.editor.folder:
-            text = suggested.name
-
-        self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text, saves=True)
+        folder = self.editor.folder
+        suggested = self.editor.document.suggested(folder)
+        text = suggested.name if suggested.parent == folder else str(suggested)
+        self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
     def _save(
         self, path: Path, then: Callable[[], object] | None, *, over: bool = False, spoil: bool = False
@@ -233,10 +212,9 @@ class FileCommands:
 
         self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
-
         title = f"Export to a file ending in {', '.join(suffixes)}"
         name = Path(self.editor.document.suggested(self.editor.folder).name).stem
-        self._ask_path(title, self._export, suffixes, f"{name}.svg", saves=True)
+        self._ask_path(title, self._export, suffixes, f"{name}.svg")
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
         from robocov_app.formats import export_map
@@ -247,12 +225,8 @@ class FileCommands:
             self.editor.ask("Replace the file?", f"{path} is there already.", *answers)
             return None
         report = export_map(self.editor.sketch.environment(), path)
-        said = [
-            f"exported: {', '.join(str(file) for file in report.files)}",
-            *report.warnings,
-            *report.dropped,
-        ]
-        return "; ".join(said)
+        files = ", ".join(map(str, report.files))
+        return "; ".join([f"exported: {files}", *report.warnings, *report.dropped])
 
     # what happens on the disk
 
@@ -283,11 +257,6 @@ class FileCommands:
         return f"read again: {self.editor.document.title}"
 
     # the picture under the map
-
-    def ask_picture(self) -> None:
-        """Ask which picture to put under the map."""
-
-        self._ask_path("Picture under the map", self.underlay, PICTURES)
 
     def underlay(self, path: Path) -> None:
         """Put a picture under the map."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pygame
 
@@ -12,6 +12,7 @@ from robocov.cost import LATTICE
 from robocov.environment import Environment
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.ui.editor import Editor
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.input import key_of
 from robocov_app.viewer.costs import Costs
@@ -20,22 +21,13 @@ from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.viewer.costs import Costs
-
 BACK = ("f5",)
 
 
 class PlayPresenter(Presenter):
-    """The viewer's presenter, which knows whether the map is still the one that is tried.
+    """The viewer's presenter, which knows whether the map is still the one that is tried."""
 
-    `elsewhere`: another map was opened meanwhile.
-    """
-
-    elsewhere = False
+    elsewhere = False  # whether another map was opened meanwhile
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
         self._tried, self._title = session.environment, title
@@ -56,18 +48,14 @@ class PlayPresenter(Presenter):
 
 
 class PlayWindow(Window):
-    """The viewer's window, out of which F5 and Escape lead back.
-
-    `ended`: back to the editor. `held`: the key that began it, until it comes up: its repeated presses are
-    none of their own.
-    """
+    """The viewer's window, out of which F5 and Escape lead back."""
 
     viewer: PlayPresenter
     hint = "F5 back to the editor · F1 keys"
 
     def __init__(self, viewer: PlayPresenter, screen: pygame.Surface, scale: float, *, patient: bool) -> None:
-        self.ended = False
-        self.held: int | None = None
+        self.ended = False  # back to the editor
+        self.held: int | None = None  # the key that began it, until it comes up: it may repeat
         super().__init__(viewer, screen.get_size(), scale, patient=patient, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
@@ -84,28 +72,23 @@ class PlayWindow(Window):
     def do(self, name: str) -> None:
         """Do the action of this name; Escape leads back where it would do nothing."""
         idle = not (self.help or self.dialogs.open or self.tour is not None)
-        if (
-            name == "cancel"
-            and idle
-            and self.viewer.tool is self.viewer.hand
-            and self.viewer.selected is None
-        ):
-            self.ended = not self.viewer.hand.cancel(self.viewer.session)
-            return
-        super().do(name)
+        viewer = self.viewer
+        if name == "cancel" and idle and viewer.tool is viewer.hand and viewer.selected is None:
+            self.ended = not viewer.hand.cancel(viewer.session)
+        else:
+            super().do(name)
 
 
 def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
     """Return the demo on the map of the editor, with its team at its start."""
     environment = editor.sketch.environment()
     name = editor.start_name if editor.start_name in environment.starts else None
-    scenario = Scenario(
-        environment, robots=editor.robots, start=name, seed=editor.seed, limits=TeamSpec(radius=editor.radius)
-    )
+    limits = TeamSpec(radius=editor.radius)
+    scenario = Scenario(environment, robots=editor.robots, start=name, seed=editor.seed, limits=limits)
     session = Session(scenario)
     if patient:
         session.clock.budget = float("inf")
-    costs: Costs = Costs(LATTICE, direct=True) if patient else Costs(LATTICE)
+    costs = Costs(LATTICE, direct=patient)
     try:
         shown = {layer.name for layer in standard_layers() if layer.default}
         demo = PlayPresenter(session, costs, shown, editor.folder, editor.document.title)
@@ -137,8 +120,5 @@ def brought_back(sketch: Sketch, before: Environment, after: Environment) -> Cha
             same, key = Item(key, shape), key + 1
         items.append(same)
     new = frozenset(item.key for item in items if item.key not in sketch.places)
-    return Change(
-        replace(sketch, obstacles=tuple(items)),
-        Selection(items=new),
-        "what was changed while trying it, taken over",
-    )
+    words = "what was changed while trying it, taken over"
+    return Change(replace(sketch, obstacles=tuple(items)), Selection(items=new), words)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.robots import DEFAULT_RADIUS
-
-if TYPE_CHECKING:
-    from robocov_app.editor.tools.snapping import Kind
+from robocov_app.editor.tools.snapping import Kind
 
 FILE = "editor.json"
 

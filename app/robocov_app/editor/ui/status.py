@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from robocov_app.editor.tools.tool import place_words
-
-if TYPE_CHECKING:
-    from robocov_app.editor.ui.editor import Editor
-    from robocov_app.editor.ui.team import Team
+from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.team import Team
 
 HINT = "F5 try it · F1 keys"
 
@@ -34,14 +30,8 @@ def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
         said.append(team.words or f"{len(team.places)} robots at {team.start or 'anywhere'}")
     if editor.tool is editor.selector and not editor.selection:
         said.append(editor.tool.hint)
-    snaps = (
-        "no snapping"
-        if not editor.snaps
-        else f"grid {editor.grid:g} m"
-        if "grid" in editor.snaps
-        else "grid off"
-    )
-    said.append(snaps)
+    grid = f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"
+    said.append(grid if editor.snaps else "no snapping")
     if editor.readings.busy:
         said.append("measuring …")
     said.append(f"{frames:.0f} fps")
