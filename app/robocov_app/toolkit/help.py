@@ -52,14 +52,11 @@ def draw_keys(
         if command is None:
             if y > box.top + 45 * scale:
                 y += 0.5 * row
-            screen.blit(
-                label(group.upper(), max(8, round(size * 0.92)), theme.final, True), (round(x), round(y))
-            )
+            heading = label(group.upper(), max(8, round(size * 0.92)), theme.final, True)
+            screen.blit(heading, (round(x), round(y)))
         else:
-            keys = "  ".join(key_words(key) for key in command.keys[:1])
-            screen.blit(label(keys, size, theme.ink, True), (round(x), round(y)))
+            screen.blit(label(key_words(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
             told = shortened(command.title.partition(":")[0], size, wide - 92 * scale)
-            screen.blit(
-                label(told, size, mix(theme.panel, theme.ink, 0.8)), (round(x + 84 * scale), round(y))
-            )
+            meaning = label(told, size, mix(theme.panel, theme.ink, 0.8))
+            screen.blit(meaning, (round(x + 84 * scale), round(y)))
         y += row

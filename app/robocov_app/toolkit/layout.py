@@ -16,39 +16,31 @@ SMALLEST = (900, 600)
 
 
 class Layout(NamedTuple):
-    """Boxes of a window of some size.
-
-    `scale`: as it was asked for, or what of it the window has room for. `panel`: of no width while it is
-    hidden. `legend`: above several panes, which share it; of no height above a single one.
-    """
+    """Boxes of a window of some size."""
 
     size: tuple[int, int]
-    scale: float
+    scale: float  # as it was asked for, or what of it the window has room for
     arena: Box
-    panel: Box
+    panel: Box  # of no width while it is hidden
     chart: Box
     track: Box
     status: Box
     panes: tuple[Box, ...]
-    legend: Box
+    legend: Box  # above several panes, which share it; of no height above a single one
 
 
 def laid_out(
     size: tuple[int, int],
     scale: float,
-    panes: int,
-    aspect: float,
+    panes: int = 1,
+    aspect: float = 1.0,
     *,
-    panel: bool = True,
-    legend_rows: int = 1,
-    plot: bool = True,
+    panel: bool = True,  # whether it is shown
+    legend_rows: int = 1,  # of the legend that several panes share
+    plot: bool = True,  # whether it is shown
 ) -> Layout:
     """Lay a window out, for panes of a map whose width by height is `aspect`, at a scale of text and lines.
 
-    `panel`, `plot`: whether they are shown. `legend_rows`: of the legend that several panes share.
-
-    Examples
-    --------
     >>> layout = laid_out((1280, 720), 1.0, 1, 4 / 3)
     >>> layout.arena, layout.panel
     ((0, 0, 960, 518), (960, 0, 320, 720))
@@ -67,25 +59,21 @@ def laid_out(
     rows = -(-panes // columns)
     pane_width = (left - GAP * (columns - 1)) // columns
     pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
-    boxes = tuple(
-        (
-            (k % columns) * (pane_width + GAP),
-            legend + (k // columns) * (pane_height + GAP),
-            pane_width,
-            max(pane_height, 1),
-        )
-        for k in range(panes)
-    )
+    places = [divmod(k, columns) for k in range(panes)]
+    boxes: list[Box] = [
+        (k * (pane_width + GAP), legend + row * (pane_height + GAP), pane_width, max(pane_height, 1))
+        for row, k in places
+    ]
     return Layout(
-        size,
-        scale,
-        arena,
-        (left, 0, wide, height),
-        (0, arena[3], left, chart),
-        (0, arena[3] + chart, left, track),
-        (0, arena[3] + chart + track, left, status),
-        boxes,
-        (0, 0, left, legend),
+        size=size,
+        scale=scale,
+        arena=arena,
+        panel=(left, 0, wide, height),
+        chart=(0, arena[3], left, chart),
+        track=(0, arena[3] + chart, left, track),
+        status=(0, arena[3] + chart + track, left, status),
+        panes=tuple(boxes),
+        legend=(0, 0, left, legend),
     )
 
 

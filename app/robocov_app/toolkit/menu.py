@@ -15,10 +15,7 @@ from robocov_app.toolkit.ui import SMALL, TEXT, Ui
 
 
 class Menu:
-    """Commands to choose from at a place of the window, None for a line between groups.
-
-    Call `take` for every event while it is open, `draw` after all else.
-    """
+    """Commands to choose from at a place of the window, None for a line between groups."""
 
     def __init__(
         self, commands: Sequence[Command | None], at: tuple[int, int], do: Callable[[str], object]
@@ -35,9 +32,8 @@ class Menu:
             if command is None:
                 ui.cell()
                 continue
-            keys = key_words(command.keys[0]) if command.keys else ""
-            why = command.when()
-            if ui.option(command.title, keys, key=command.name, chosen=k == self.chosen, why=why):
+            why, chosen = command.when(), k == self.chosen
+            if ui.option(command.title, _keys(command), key=command.name, chosen=chosen, why=why):
                 self._choose(command)
 
     def _choose(self, command: Command) -> None:
@@ -53,13 +49,8 @@ class Menu:
             return self._ui.take(event) or not self.open
         elif self._ui is not None:
             self._ui.take(event)
-        return event.type in (
-            pygame.KEYDOWN,
-            pygame.KEYUP,
-            pygame.TEXTINPUT,
-            pygame.MOUSEBUTTONUP,
-            pygame.MOUSEMOTION,
-        )
+        keys = (pygame.KEYDOWN, pygame.KEYUP, pygame.TEXTINPUT)
+        return event.type in (*keys, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION)
 
     def _key(self, name: str) -> None:
         usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
@@ -79,11 +70,11 @@ class Menu:
         if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
             self._ui = Ui(self._page, theme, scale)
             self._ui.background = None
-        named = [each for each in self.commands if each is not None]
-        keys = [key_words(each.keys[0]) if each.keys else "" for each in named]
-        texts = [text_width(each.title, round(TEXT * scale)) for each in named]
-        asides = [text_width(each, round(SMALL * scale)) for each in keys]
-        wide = max((a + b for a, b in zip(texts, asides, strict=True)), default=0) + round(50 * scale)
+        wide = round(50 * scale) + max(
+            text_width(each.title, round(TEXT * scale)) + text_width(_keys(each), round(SMALL * scale))
+            for each in self.commands
+            if each is not None
+        )
         high = round(sum(7 if each is None else 24 for each in self.commands) * scale + 10 * scale)
         box = pygame.Rect(*self.at, wide, high)
         self._ui.box = box.clamp(screen.get_rect())
@@ -91,3 +82,7 @@ class Menu:
         self._ui.stale = True
         self._ui.draw(screen)
         self._ui.draw_over(screen)
+
+
+def _keys(command: Command) -> str:
+    return key_words(command.keys[0]) if command.keys else ""

@@ -12,17 +12,15 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.surface_cache import kept
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix
+from robocov_app.toolkit.layout import Box
 
-FLAT = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
-"""For strokes and words that are placed in pixels alone."""
+_FINE = 4
 
 
 def flat_canvas(surface: pygame.Surface, theme: Theme, scale: float) -> Canvas:
     """Return a canvas for strokes and words that are placed in pixels alone."""
-    return Canvas(surface, FLAT, theme, scale, np.zeros(1, dtype=np.intp))
-
-
-_FINE = 4
+    camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
+    return Canvas(surface, camera, theme, scale, np.zeros(1, dtype=np.intp))
 
 
 @kept(4_000_000)
@@ -94,12 +92,7 @@ def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Them
 
 
 def draw_status(
-    screen: pygame.Surface,
-    box: tuple[int, int, int, int],
-    theme: Theme,
-    scale: float,
-    facts: Sequence[str],
-    hint: str,
+    screen: pygame.Surface, box: Box, theme: Theme, scale: float, facts: Sequence[str], hint: str
 ) -> None:
     """Draw the status line; what there is no room for is left out, from the end."""
     left, top, width, height = box
@@ -115,12 +108,7 @@ def draw_status(
 
 
 def draw_message(
-    screen: pygame.Surface,
-    words: str,
-    arena: tuple[int, int, int, int],
-    theme: Theme,
-    scale: float,
-    trouble: bool,
+    screen: pygame.Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool
 ) -> None:
     """Show a message at the foot of a box; nothing where there is none."""
     if not words:

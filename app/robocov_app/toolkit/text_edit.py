@@ -12,16 +12,12 @@ _State = tuple[str, int, int]
 
 @dataclass
 class TextEdit:
-    """A line of text that is being edited.
-
-    `caret`, `anchor`: what is between them is selected. `composed`: shown at the caret while an input method
-    is still at it; not part of the text yet.
-    """
+    """A line of text that is being edited."""
 
     text: str = ""
     caret: int = 0
-    anchor: int = 0
-    composed: str = ""
+    anchor: int = 0  # what is between it and the caret is selected
+    composed: str = ""  # shown at the caret while an input method is still at it; not part of the text yet
     _undo: list[_State] = field(default_factory=list)
     _redo: list[_State] = field(default_factory=list)
     _typing: bool = False

@@ -6,7 +6,6 @@ runs one in another process, `DirectWorker` in this one; `started` and `asked` a
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import faulthandler
 import importlib
@@ -20,6 +19,7 @@ import sys
 import threading
 import time
 import traceback
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 
@@ -201,7 +201,7 @@ class _Talk:
     def _write(self) -> None:
         assert self.process.stdin is not None
         # when the process has ended, reading says so
-        with contextlib.suppress(OSError), self.process.stdin as stream:
+        with suppress(OSError), self.process.stdin as stream:
             while True:
                 with self._changed:
                     self._changed.wait_for(lambda: self._closed or self._wanted is not None)
@@ -296,9 +296,7 @@ def serve(service: str) -> None:
         faulthandler.enable(c_stack=False)  # the engine's own frames would hide those of a user's code
     else:
         faulthandler.enable()
-    with contextlib.suppress(
-        OSError, AttributeError, TypeError
-    ):  # where the kernel can end it with its parent
+    with suppress(OSError, AttributeError, TypeError):  # where the kernel can end it with its parent
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
     line = _PipeLine(*own_streams())
     threading.Thread(target=line.listen, daemon=True).start()
@@ -316,15 +314,14 @@ def started(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Pope
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         environment.setdefault(name, "1")
     serving = f"from robocov_app.toolkit.worker import serve; serve({service!r})"
-    # -P: what lies in the working folder is not meant
-    command = [sys.executable, "-P", "-c", serving]
+    command = [sys.executable, "-P", "-c", serving]  # -P: what lies in the working folder is not meant
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=stderr, env=environment)
     if sys.platform == "linux":
         import fcntl
 
         # a pipe that holds a whole answer wakes its reader less often; so much is not allowed to everybody
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             fcntl.fcntl(process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
     return process
 
@@ -332,7 +329,7 @@ def started(service: str, *, stderr: IO[bytes] | None = None) -> subprocess.Pope
 def asked(process: subprocess.Popen[bytes], question: object) -> Reply | None:
     """Ask a process that serves, and wait for its answer; None if it ends."""
     assert process.stdin is not None and process.stdout is not None
-    with contextlib.suppress(OSError):
+    with suppress(OSError):
         send(process.stdin, (0, question))
     while (reply := receive(process.stdout)) == READY:
         pass
@@ -343,16 +340,13 @@ def ended(process: subprocess.Popen[bytes]) -> int:
     """Let a process end, which it does without its streams; return its status."""
     for stream in (process.stdin, process.stdout):
         assert stream is not None
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             stream.close()
     return process.wait()
 
 
 def own_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes from and to the parent.
-
-    Code that is called may read from stdin, where there is nothing, and print, which goes to stderr.
-    """
+    """Return the pipes from and to the parent; code that is called reads nothing, and prints to stderr."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     source, target = (os.fdopen(os.dup(fd), mode) for fd, mode in ((0, "rb"), (1, "wb")))
     with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file

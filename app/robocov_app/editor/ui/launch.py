@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocov.errors import InputError
 from robocov_app.editor.model.autosave import Autosave, opened_elsewhere, recoverable
@@ -14,12 +13,10 @@ from robocov_app.editor.model.measurement_worker import measurement_worker
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.settings import ATTRIBUTES, FILE, SHOWN, SNAPS, EditorSettings
+from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.autosave import autosave_folder, discard
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
 from robocov_app.toolkit.window import display, fitting, screen_scale
-
-if TYPE_CHECKING:
-    from robocov_app.editor.ui.window import EditorWindow
 
 NO_DISPLAY = (
     "no display: the editor needs one (over ssh, try ssh -X); --screenshot FILE renders it without, "
@@ -39,8 +36,6 @@ def editor_window(
     headless: bool = False,
 ) -> Iterator[EditorWindow]:
     """Open the editor; settings are read before and kept afterwards."""
-    from robocov_app.editor.ui.window import EditorWindow
-
     drafts = None if headless else autosave_folder()
     if path is not None and not headless and opened_elsewhere(drafts, path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
