@@ -1,8 +1,7 @@
 """The command `robocov`: finds the subcommand, and turns errors into one line and an exit status.
 
-Each command lives in a module of `robocov_app.commands`: a dataclass `Arguments`, which is its
-options and its help, and a function `command`. Only the module of the command that is called gets
-imported: asking for help must not pay for plotting.
+Each command is a module of `robocov_app.commands`, with its options `Arguments` and a function `command`;
+only that of the command that is called is imported: asking for help must not pay for plotting.
 """
 
 from __future__ import annotations

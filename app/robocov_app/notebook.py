@@ -1,8 +1,4 @@
-"""The application as the library's drawing backend: matplotlib for plots, and what notebooks show.
-
-The entry point ``matplotlib`` of the group ``robocov.drawing`` names this module; its functions are those
-of `robocov.drawing.DrawingBackend`.
-"""
+"""The application as the library's `robocov.drawing.DrawingBackend`: matplotlib, and what notebooks show."""
 
 from __future__ import annotations
 
@@ -106,8 +102,7 @@ def plot_result(
 ) -> Axes:
     """Plot the distance of every place to its nearest robot; see `robocov_app.figures.coverage`.
 
-    A lattice too coarse for a picture, whose cells are wider than walls, is replaced by a finer one. Raises
-    ParameterError when the result does not know its map.
+    A lattice too coarse for a picture is replaced by a finer one. Raises ParameterError without a map.
     """
     from robocov_app.figures.coverage import Moment, plot_coverage, plot_distances
 
@@ -183,10 +178,7 @@ def record_png(record: Record) -> bytes:
 
 
 def _checked(axes: Any) -> Any:
-    """Return axes on which a plot can be drawn, or None.
-
-    Raises ParameterError when they are none, or several, or have other than two straight axes.
-    """
+    """Return axes on which a plot can be drawn, or None; raises ParameterError for any others."""
     from matplotlib.axes import Axes
 
     flat = isinstance(axes, Axes) and axes.transData.is_separable and not hasattr(axes, "get_zlim")

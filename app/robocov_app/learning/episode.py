@@ -256,8 +256,7 @@ class Episode:
     def _gained(self, rewarded: bool, result: CoverageResult | None) -> Array:
         """Return what each robot gets for what became of the cost, (n,) m, and take the new cost.
 
-        Who fails changes the cost at once. That is nobody's doing: those who have counted all the time
-        get what became of their own cost, as if they had been alone.
+        Who fails is nobody's doing: those who have counted all the time get what became of their own cost.
         """
         task, now, since = self.task, self.time, self.cycle - self._rewarded
         gained, stayed, before = np.zeros(len(self.team)), self._counted, self.result

@@ -28,17 +28,14 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
     """A team that one learner steers, who is told what all robots know: gymnasium's ``Env``.
 
     Observations are the robots' rows of the task's `ObservationLayout` below each other, (n, size) float32
-    from -1 to 1; actions one row for each robot, (n, 2), forces in N or velocities in m/s, held for
-    `CoverageTask.repeat` control periods. (`gymnasium.wrappers.RescaleAction` makes them -1 to 1,
-    `gymnasium.wrappers.FlattenObservation` flattens the rows.) The reward is the mean of what
-    `CoverageParallelEnv` gives each robot. The row of a robot that has failed, or not yet joined, is zero.
+    from -1 to 1, zero for a robot that has failed, or not yet joined; actions one row for each robot, (n, 2),
+    forces in N or velocities in m/s, held for `CoverageTask.repeat` control periods. The reward is the mean
+    of what `CoverageParallelEnv` gives each robot.
 
     An episode is truncated after `CoverageTask.duration`, and ends when no robot is left. The same seed and
-    actions give the same episode, bit for bit.
-
-    The `changes` are of the task, as in ``gymnasium.make(..., maps="museum", robots=4)``; for `render_mode`,
-    `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`. Several environments may share the
-    `scenarios` of their task; `place` and `outcome` are `CoverageVectorEnv`'s.
+    actions give the same episode, bit for bit. The `changes` are of the task, as in
+    ``gymnasium.make(..., maps="museum", robots=4)``; several environments may share the `scenarios` of their
+    task. For `render_mode`, `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """

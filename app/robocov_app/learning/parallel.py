@@ -24,17 +24,13 @@ Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[st
 class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     """A team that learns to cover, each robot by what it knows: PettingZoo's ``ParallelEnv``.
 
-    The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's
-    `ObservationLayout`: float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
-    `CoverageTask.repeat` control periods. Every robot's spaces are its own; equal robots have equal ones.
+    The agents are ``robot_1`` to ``robot_n``. An observation is one row of the task's `ObservationLayout`:
+    float32, from -1 to 1. An action is a force in N or a velocity in m/s, (2,), held for
+    `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
+    `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
 
-    An episode is truncated after `CoverageTask.duration`. The same seed and actions give the same episode,
-    bit for bit; ``reset()`` without a seed goes on with the random numbers.
-
-    The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``; `max_cycles`
-    actions until an episode is truncated are in place of its duration. For `render_mode`, `size` and `theme`
-    see `robocov_app.learning.pictures.EpisodeEnv`. `episode` is the present one, None before the first
-    ``reset``; `state_space` is that of `state`.
+    The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``. For `render_mode`,
+    `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """

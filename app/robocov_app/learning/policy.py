@@ -123,10 +123,8 @@ class PolicyController:
 class ControllerPolicy:
     """Says what a controller would do in the present state of a learning environment.
 
-    It knows what the controller knows, not the observations that learners get. Where actions are held for
-    longer than a control period the controller decides less often than in `robocov run`; with
-    ``repeat=1`` an episode is the same as a run, bit for bit. Scans that it wants are taken for it, without
-    the noise of any conditions.
+    It knows what the controller knows, not the observations that learners get; with ``repeat=1`` an episode
+    is the same as a run, bit for bit. Scans that it wants are taken without the noise of any conditions.
 
     ::
 

@@ -91,10 +91,9 @@ def reference_distance(area: float, robots: int) -> float:
 def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: float) -> Array:
     """Return what each robot gets for what became of the mean distance, (n,) m.
 
-    ``shared``: its decrease, the same for all; summed over a run it is the whole decrease. ``own``: the part
-    of the decrease that the robot's own move made, by the gradients of the cost before and after (the
-    trapezoidal rule); what these leave over is divided equally, so that all parts sum up to the decrease.
-    ``level``: less the mean distance itself, times the `part` of the run that has gone by in between.
+    ``shared``: the decrease, the same for all; summed over a run it is the whole decrease. ``own``: the part
+    that the robot's own move made, by the gradients before and after (the trapezoidal rule), and an equal
+    part of the rest. ``level``: less the mean distance itself, times the `part` of the run in between.
     """
     n = len(after.positions)
     if reward == "level":

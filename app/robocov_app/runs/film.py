@@ -42,10 +42,7 @@ FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
 
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Return which row of a record of ascending times, (T,) s, each frame shows.
-
-    `fps`: frames per second of the film. `speed`: simulated seconds per second of it. `hold`, s: so long it
-    stays on the last row.
+    """Return which row of a record of ascending times, (T,) s, each frame shows, the last one for `hold`, s.
 
     >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
     [0, 2, 4]
@@ -125,9 +122,8 @@ def pane_layout(
 ) -> PaneLayout:
     """Lay out panes so that the maps are as large as can be: wide maps below each other.
 
-    `size`, (width, height) or None: of the whole film; None for what suits the map, within `USUAL_SIZE`.
-    `legend_of`: scenes that the legend explains, by default the beginnings of the records, and where robots
-    fail their ends.
+    `size`: of the whole film, px; None suits the map, within `USUAL_SIZE`. `legend_of`: the scenes that the
+    legend explains, by default the beginnings of the records, and where robots fail their ends.
     """
     bounds = [record.environment.region.bounds for record in records]
     aspect = max((high_x - low_x) / (high_y - low_y) for low_x, low_y, high_x, high_y in bounds)

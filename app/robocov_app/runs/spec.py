@@ -24,10 +24,8 @@ COST_RATE = 10.0  # samples of the coverage cost per simulated second
 class RunSpec:
     """One run: all that its result depends on; the only place that makes simulations and recorders of it.
 
-    `controller`: by name, or ``mine.py:MyController``; `source`: its file, where that may be gone. `gains`:
-    those that differ from their defaults. `start`, `seed`: of the positions, where none are given; the map's
-    first start by default. `positions`, `velocities`, (n, 2) m and m/s: given; else drawn, and at rest.
-    `duration`, `dt`, s: of the run and of a control period.
+    `source`: the file of `controller`, where that may be gone. `positions`, `velocities`, (n, 2) m and m/s:
+    else drawn by `start` and `seed`, and at rest. `duration` and the control period `dt` are in s.
     """
 
     environment: Environment

@@ -44,9 +44,8 @@ Returned: TypeAlias = "tuple[Task, Outcome | Lost]"
 class Executor(ABC):
     """Does tasks; a context, whose end stops what is going on.
 
-    A task whose worker has ended is done again. Where it is not certain that the task is to blame (another
-    one may have taken all the memory), it is done alone. When workers have ended twice through it, it has
-    failed; when they end again and again, whatever they do, all ends. `lost` counts them.
+    A task whose worker has ended is done again, alone where another may be to blame. When workers have ended
+    twice through it, it has failed; when they end again and again, all ends. `lost` counts them.
     """
 
     def __init__(self) -> None:

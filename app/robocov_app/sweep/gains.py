@@ -93,10 +93,8 @@ class Gains:
     def of(cls, kind: type[Any], wanted: Wanted, sampling: Sampling | None, path: Place = ()) -> Gains:
         """Return what is tried of a controller of a class; other gains have their defaults.
 
-        `wanted`: each set of gains by itself, as dicts of name to value; or one dict of name to a value, a
-        list of values (every combination of them is tried), or a `Range`. Raises ParameterError, which begins
-        with the place, on an unknown gain (with the nearest name), a value out of range, a value given twice,
-        or a range without a way to sample it.
+        `wanted`: sets of gains, as dicts; or one dict of name to a value, a list of which every combination
+        is tried, or a `Range`. Raises ParameterError, which begins with the place.
         """
         if isinstance(wanted, Gains):
             return cls(cls.of(kind, wanted.choices, None, path).choices, wanted.ranges)

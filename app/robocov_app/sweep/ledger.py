@@ -1,8 +1,4 @@
-"""The folder of a sweep: which runs are done, which have failed, and what the table holds of them.
-
-Every run has a folder of its own, which is written aside, brought to the disk and renamed: it is there
-whole or not at all. Its ``row.json`` has check sums of itself and of the other files: damage is noticed.
-"""
+"""The folder of a sweep: each run in a folder of its own, there whole or not at all, with check sums."""
 
 from __future__ import annotations
 
@@ -57,12 +53,7 @@ class Damaged(Exception):  # noqa: N818 - it is handled
 
 @dataclass
 class Survey:
-    """Inventory of a study's runs.
-
-    `todo` has 1 for each task that is to be done, in their order; `outdated` counts runs by how their
-    versions differ from those here; `unchecked` ones were kept by a version without check sums; `failed` ones
-    are not done again.
-    """
+    """Inventory of a study's runs: `todo` has 1 for each, in order, that is to be done."""
 
     todo: bytearray = field(default_factory=bytearray)
     damaged: list[str] = field(default_factory=list)

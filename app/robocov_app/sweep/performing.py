@@ -133,10 +133,9 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Let no other thread of this process near the physics: pymunk is not made for that.
+    """Let no other thread of this process near the physics, for which pymunk is not made.
 
-    What runs leave behind is collected here as well: another thread that came upon it, as those of a Dask
-    worker do, would free bodies in the midst of the next run's steps.
+    What runs leave behind is collected here too: another thread would free bodies amid the next run's steps.
     """
     with _ONE_AT_A_TIME:
         enabled = gc.isenabled()

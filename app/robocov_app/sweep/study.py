@@ -384,8 +384,7 @@ _DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 class Task:
     """One run; nothing but this is needed to do it, on whatever machine.
 
-    `document` is the whole map as JSON, and `team` holds the conditions too, with None for a range without
-    limit. `digest` is of all of this but where files are: tasks of one digest have one result.
+    `document`: the map as JSON. `team`: with conditions. Tasks of one `digest` have one result.
     """
 
     map: str

@@ -129,11 +129,9 @@ def row_of(task: Task, entry: Entry) -> dict[str, Any]:
 class Table:
     """Writes the rows of a sweep in the order in which they come; a context.
 
-    Both files are written aside. When the context ends well they replace those of an earlier sweep, and
-    ``study.json`` with them; but those of a sweep that is not `complete` replace none with more rows. Where
-    there is no ``results.parquet`` yet, ``results.csv`` appears as soon as it is no shorter than the one that
-    is there, and grows row by row. `replaced` says whether the files are those of these rows. When something
-    cannot be written no half of a row is left, and no other row is taken.
+    Both files are written aside, and replace earlier ones, with ``study.json``, when the context ends well;
+    if not `complete`, none with more rows. A first ``results.csv`` appears as soon as it is no shorter than
+    what is there, and grows. `replaced`: whether the files are of these rows. No half of a row is ever left.
     """
 
     def __init__(self, folder: Path, columns: Sequence[Column], study: bytes | None = None) -> None:

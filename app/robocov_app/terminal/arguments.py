@@ -123,9 +123,6 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
 
     >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
     {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
-
-    Raises ParameterError when a text is not NAME=VALUE, a value is neither a number nor a word, or a gain is
-    given twice.
     """
     gains: dict[str, Any] = {}
     for text in texts:
