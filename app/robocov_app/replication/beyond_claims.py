@@ -36,9 +36,7 @@ QUESTIONS = {
 }
 
 # the goals
-LEAST_GAP = (
-    0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % when this was set
-)
+LEAST_GAP = 0.014  # the median of J/J_ref - 1, at most; RAPF at its best gains had about 5 % at that time
 MAP_GAP = 0.03  # the median on every single map, at most
 NEVER_WORSE = 1.01  # its median on a map by that of RAPF or LA on the same map, at most
 AT_REST = 0.97  # the share of its runs that come to rest

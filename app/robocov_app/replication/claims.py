@@ -177,12 +177,8 @@ def verdict_counts(claims: Sequence[Claim]) -> str:
 SAME_COST = 0.02  # two costs are the same when the median of their ratio is within 2 % of 1
 NEARLY_SAME = 0.05  # in single runs two costs are nearly the same when they differ by at most 5 %
 NEARLY_ALWAYS = 0.9  # the share of runs that "the result is" speaks of, where the paper makes no exceptions
-CLEARLY_BELOW = (
-    0.95  # a law is better than another one when the median of the ratio of their costs is below this
-)
-BARELY = (
-    0.05  # a result barely depends on the gains: its standard deviation over them is below 5 % of its mean
-)
+CLEARLY_BELOW = 0.95  # a law is better than another when the median ratio of their costs is below this
+BARELY = 0.05  # a result barely depends on the gains: its standard deviation is below 5 % of its mean
 REGRET = 0.02  # the best gains depend on the environment when those of other maps cost more than 2 % on it
 # a result barely depends on the starts: its standard deviation over them is below 10 % of its mean; starts
 # matter more than gains do in any law that descends to a local optimum, so the bound is wider

@@ -26,9 +26,7 @@ from robocov_app.replication.references import Reference
 from robocov_app.replication.studies import Contest
 from robocov_app.sweep.study import Study
 
-EARLY = (
-    20.0  # s in which a team spreads over a convex region of ten metres; Lloyd's algorithm has settled then
-)
+EARLY = 20.0  # s in which a team spreads over a convex region of ten metres: Lloyd's algorithm has settled
 FIRST_MINUTE = 60.0  # s that count as "during the motion"
 
 # measures that stand in the table of a sweep, and their columns; robots of one speed have no time
@@ -65,7 +63,7 @@ class Outcomes:
     placements: Mapping[str, Array] = field(default_factory=dict)  # (m, n, 2) m at the end, by contender
     shares: Mapping[str, float] = field(
         default_factory=dict
-    )  # side of a robot's share of each map, a square, m
+    )  # by map, side of a robot's share as a square, m
 
     def of(self, contender: str, measure: str) -> Array:
         """Return what a contender reached, (m,); all nan where it did not take part."""

@@ -105,9 +105,7 @@ class PaperResults:
 class DensityResults:
     """What became of knowing the density."""
 
-    outcomes: (
-        Outcomes  # of ``known`` and ``ignored``, for both of which ``final`` is the mean distance by φ, m
-    )
+    outcomes: Outcomes  # of ``known`` and ``ignored``; ``final`` is the mean distance by φ, m
     pictures: tuple[FigureRun, FigureRun]  # one run that knew it, one that did not, from the same places
     costs: tuple[float, float]  # their final ones
 

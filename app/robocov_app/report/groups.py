@@ -17,9 +17,7 @@ from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.report.results import Entry, Result
 from robocov_app.sweep.study import parameter_text
 
-MOST_GROUPS = (
-    8  # controllers with their gains up to which each is shown apart; of more, each controller as a whole
-)
+MOST_GROUPS = 8  # controllers with their gains up to which each is shown apart; of more, by controller
 LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 TUNED = " (tuned)"  # stands behind a controller's label where its gains were chosen on other runs than these
 

@@ -53,9 +53,7 @@ class Entry:
     start: str | None
     seed: int | None
     gains: Gains
-    figures: Mapping[str, float | None] = field(
-        compare=False
-    )  # `FIGURES`, None where not known; empty on error
+    figures: Mapping[str, float | None] = field(compare=False)  # `FIGURES`; nothing where it failed
     error: str | None
     folder: Path
 
