@@ -61,7 +61,6 @@ class TextEdit:
         self.caret = self.anchor = start + len(text)
 
     def _word(self, by: int) -> int:
-        """Return the next end of a word to the left or to the right."""
         if by < 0:
             before = re.search(r"\S+\s*$", self.text[: self.caret])
             return before.start() if before else 0

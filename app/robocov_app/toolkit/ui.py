@@ -403,10 +403,6 @@ class Ui:
         self.end_row()
         self.y += (count - last) * height
 
-    def scroll_to(self, key: str, top: float = 0.0) -> None:
-        """Scroll a region to a height."""
-        self._scrolled[key], self.stale = top, True
-
     def _bar(self, key: str, rect: pygame.Rect, needed: float, top: float) -> float:
         """Show a scroll bar, and take wheel and drags for it; return how far it is scrolled."""
         room = rect.height / self.scale
@@ -504,7 +500,6 @@ class Ui:
         return ink
 
     def _ring(self, key: str, rect: pygame.Rect) -> None:
-        """Draw a ring around what has the focus."""
         if self.surface is not None and self.focus == key:
             width = max(2, self.px(1.5))
             pygame.draw.rect(self.surface, self.theme.final, rect, width, border_radius=self.px(4))
@@ -760,7 +755,6 @@ class Ui:
             self.edit.select_word(self.edit.caret)
 
     def _caret_at(self, edit: TextEdit, rect: pygame.Rect) -> int:
-        """Return the gap between letters that is nearest to the mouse."""
         size = self.px(TEXT)
         x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
         widths = [text_width(edit.text[:k], size) for k in range(len(edit.text) + 1)]

@@ -171,7 +171,7 @@ def test_more_than_there_is_room_for_scrolls_and_folds(page: Page) -> None:
     page.draw()
     bar = page.ui.find("bar", "more")
     assert bar is not None and bar.value == 40.0
-    page.ui.scroll_to("more")
+    page.ui.take(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=1, precise_y=1.0))
     page.draw()
     page.press("section", "section:MORE")
     assert page.ui.find("label", "line 0") is None and page.ui.find("bar", "more") is None

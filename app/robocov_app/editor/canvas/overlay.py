@@ -437,7 +437,6 @@ def draw_problems(
 
 
 def _draw_place(canvas: Canvas, problem: Problem) -> None:
-    """Draw the place of a problem: lines along it."""
     colour = problem_colour(canvas.theme, grave=problem.grave)
     for part in shapely.get_parts(problem.where):
         for ring in [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]:

@@ -140,7 +140,6 @@ class Sheet:
         return boxes
 
     def _box(self, view: View, item: Item) -> pygame.Rect:
-        """Return the pixels that an obstacle takes."""
         low_x, low_y, high_x, high_y = self.outlines.of(item).bounds.tolist()
         if not np.isfinite(low_x):
             return pygame.Rect(0, 0, 0, 0)
@@ -289,7 +288,6 @@ def _joined(canvas: Canvas, rings: list[Array]) -> tuple[Array, list[int]]:
 
 
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
-    """Draw the smooth outlines of many rings."""
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
         points, begin = corners.tolist(), 0

@@ -235,7 +235,7 @@ def widen(editor: Editor, factor: float) -> None:
     if widths and not editor.tool.busy:
         change = properties.widened(editor.sketch, selection, width)
         editor.change(change, drag=("width", editor.selection))
-    editor.set_wall_width(width)
+    editor.set_length("wall_width", width)
     editor.say(f"walls are {width:g} m wide")
 
 
@@ -311,9 +311,9 @@ def _set_seed(editor: Editor, text: str) -> None:
     editor.seed = max(_number("seed", text, int), 0)
 
 
-def _set_length(put: Callable[[Editor, float], object], now: str) -> RunWith:
+def _set_length(name: str) -> RunWith:
     """Return what takes a length for the editor, which may be told by how it is now."""
-    return lambda editor, text: put(editor, length_of(text, now=getattr(editor, now)))
+    return lambda editor, text: editor.set_length(name, length_of(text, now=getattr(editor, name)))
 
 
 def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
@@ -568,12 +568,12 @@ def editor_commands(editor: Editor, of_window: Mapping[str, Callable[[], object]
 
 
 TYPED: dict[str, tuple[str, RunWith]] = {
-    "grid": ("0.25: distance of the grid's lines", _set_length(Editor.set_grid, "grid")),
+    "grid": ("0.25: distance of the grid's lines", _set_length("grid")),
     "angle": ("15: lines snap to multiples of it", _set_angle),
-    "radius": ("0.2: of a robot", _set_length(Editor.set_radius, "radius")),
+    "radius": ("0.2: of a robot", _set_length("radius")),
     "robots": ("8: of the team", lambda editor, text: editor.set_robots(_number("robots", text, int))),
     "seed": ("3: of the team's places", _set_seed),
-    "wall": ("0.1: width of walls that are drawn", _set_length(Editor.set_wall_width, "wall_width")),
+    "wall": ("0.1: width of walls that are drawn", _set_length("wall_width")),
     "move": ("1 0.5: what is selected", _move),
     "place": ("2 3: lower left corner", _place),
     "rotate": ("30: by degrees", _edit_to(transform.rotated, angle_of)),

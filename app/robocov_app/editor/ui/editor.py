@@ -275,30 +275,27 @@ class Editor:
             self.say("snaps to everything" if self.snaps else "snaps to nothing")
         else:
             chosen ^= {name}
-            titles = SHOWN if kind == "show" else {key: title for key, (title, _) in SNAPS.items()}
-            self.say(f"{titles[name]}: {'on' if name in chosen else 'off'}")
+            title = SHOWN[name] if kind == "show" else SNAPS[name][0]
+            self.say(f"{title}: {'on' if name in chosen else 'off'}")
         self.version += 1
 
-    def set_grid(self, spacing: float) -> None:
-        """Give the grid another spacing, m."""
-        _require_length("grid", spacing, 100.0)
-        self.grid = spacing
+    def set_length(self, name: str, length: float) -> None:
+        """Give grid, robots' radius or drawn walls another length, m."""
+        most = 10.0 if name == "radius" else 100.0
+        if not SMALLEST <= length <= most:
+            wanted = f"{SMALLEST:g} to {most:g} m was wanted"
+            raise MapError(f"{name.replace('_', ' ')}: {length:g} m, but {wanted}")
+        setattr(self, name, length)
         self.version += 1
-        self.say(f"the grid is {spacing:g} m")
+        self.ask_readings()
+        if name == "grid":
+            self.say(f"the grid is {length:g} m")
 
     def change_grid(self, by: int) -> None:
         """Take the next finer or coarser grid."""
-        if by > 0:
-            self.set_grid(next((each for each in GRIDS if each > self.grid * 1.001), GRIDS[-1]))
-        else:
-            self.set_grid(next((each for each in reversed(GRIDS) if each < self.grid * 0.999), GRIDS[0]))
-
-    def set_radius(self, radius: float) -> None:
-        """Take robots of another radius, m."""
-        _require_length("radius", radius, 10.0)
-        self.radius = radius
-        self.version += 1
-        self.ask_readings()
+        finer = [each for each in GRIDS if each < self.grid * 0.999] or GRIDS[:1]
+        coarser = [each for each in GRIDS if each > self.grid * 1.001] or GRIDS[-1:]
+        self.set_length("grid", coarser[0] if by > 0 else finer[-1])
 
     def set_robots(self, count: int) -> None:
         """Show a team of another size."""
@@ -310,14 +307,3 @@ class Editor:
     def add_robots(self, by: int) -> None:
         """Show a team of more or fewer robots."""
         self.set_robots(min(max(self.robots + by, 1), 1000))
-
-    def set_wall_width(self, width: float) -> None:
-        """Draw walls of another width, m."""
-        _require_length("wall width", width, 100.0)
-        self.wall_width = width
-        self.version += 1
-
-
-def _require_length(what: str, length: float, most: float) -> None:
-    if not SMALLEST <= length <= most:
-        raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")

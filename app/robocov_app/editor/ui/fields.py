@@ -84,7 +84,6 @@ def _bounds(editor: Editor) -> tuple[float, float, float, float]:
 
 
 def _put(editor: Editor, text: str, axis: int) -> None:
-    """Put what is selected at a typed coordinate."""
     now = _corner(editor)[axis]
     by = coordinate(text, now) - now
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)

@@ -170,7 +170,6 @@ class Panel:
             editor.attempt(lambda: field.take(editor, given))
 
     def _pair(self, ui: Ui, *fields: tuple[str, str, str]) -> None:
-        """Show one or two fields side by side."""
         names = max(len(word) for _, word, _ in fields)
         word = 14.0 if names < 3 else 48.0
         ui.row(*(width for _ in range(2) for width in (word, 0.0, 16.0)))
