@@ -190,9 +190,8 @@ def _converted(image: Image) -> Brightness:
     if image.mode.startswith("I") and not transparent:
         full = (1 << tags[Base.BitsPerSample][0]) - 1 if tags else 65535
         deep = np.asarray(image).astype(np.uint16)
-        return Brightness(
-            full - deep if tags.get(Base.PhotometricInterpretation) == 0 else deep, full, None, texts
-        )
+        dark = tags.get(Base.PhotometricInterpretation) == 0
+        return Brightness(full - deep if dark else deep, full, None, texts)
     has_alpha = transparent or image.mode in ("LA", "PA", "RGBA", "La", "RGBa")
     grey = image.mode in ("1", "L", "LA") and not transparent
     mode = ("LA" if has_alpha else "L") if grey else ("RGBA" if has_alpha else "RGB")

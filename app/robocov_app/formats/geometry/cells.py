@@ -76,11 +76,9 @@ class Grid:
         column, row = np.floor((points - self.origin) / self.cell).astype(np.intp).T
         return row, column
 
-    def _crossings(
-        self, geometry: BaseGeometry, finer: int = 1, *, across: bool = False
-    ) -> tuple[IntArray, Array]:
+    def _crossings(self, area: BaseGeometry, finer: int = 1, across: bool = False) -> tuple[IntArray, Array]:
         """Return where sides cross lines of centres, rows or columns: which one, and where on it."""
-        sides = (sides_of(geometry) - self.origin) / (self.cell / finer) - 0.5
+        sides = (sides_of(area) - self.origin) / (self.cell / finer) - 0.5
         if across:
             sides = sides[..., ::-1]
         (x0, y0), (x1, y1) = sides[:, 0].T, sides[:, 1].T
@@ -104,10 +102,8 @@ def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELL
     columns = math.ceil((high_x - low_x) / cell - 1e-3) + 2
     rows = math.ceil((high_y - low_y) / cell - 1e-3) + 2
     if rows * columns > most:
-        raise ParameterError(
-            f"cell: {cell:g} m makes {columns} x {rows} cells, but at most {most // 1_000_000} million "
-            f"were wanted"
-        )
+        few = f"at most {most // 1_000_000} million were wanted"
+        raise ParameterError(f"cell: {cell:g} m makes {columns} x {rows} cells, but {few}")
     return Grid(rows, columns, cell, (round(low_x - cell, _DIGITS), round(low_y - cell, _DIGITS)))
 
 
@@ -163,9 +159,8 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
     words = []
     if (pieces == 0).any():
         gone = int((pieces == 0).sum())
-        words.append(
-            f"{counted(gone, 'separate part')} of the free space {'is' if gone == 1 else 'are'} lost"
-        )
+        are = "is" if gone == 1 else "are"
+        words.append(f"{counted(gone, 'separate part')} of the free space {are} lost")
     if (pieces > 1).any():
         words.append(f"gaps close: the free space falls into {len(large)} parts, not {len(parts)}")
     return "; ".join(words)

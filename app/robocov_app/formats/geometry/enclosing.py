@@ -101,17 +101,13 @@ def foreign_map(
     blocks = np.array([outline.area for outline in inner], dtype=object)
     shapely.prepare(area)
     around = shapely.covered_by(area, blocks)
-    obstacles = [
-        *blocks[~around],
-        *(line.solid for line in walls),
-        *(each.polygon for each in shapes.pillars),
-    ]
-    outside = int((~shapely.intersects(area, obstacles)).sum() + around.sum())
+    solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in shapes.pillars)]
+    outside = int((~shapely.intersects(area, solids)).sum() + around.sum())
     if outside:
         shapes.leave_out("shape", "outside of the boundary", outside)
     free = area
-    if obstacles:
-        free = polygons_of(shapely.difference(area, united(obstacles), grid_size=GRID))
+    if solids:
+        free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID))
     outer = None
     # what is free of a grid has its own outline
     plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
@@ -184,9 +180,8 @@ def _named(shapes: Shapes) -> _Enclosure | None:
     if area.is_empty:
         if wanted is None:
             return None
-        raise MapError(
-            f"{shapes.where}: boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
-        )
+        what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
+        raise MapError(f"{shapes.where}: {what}")
     return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
 
 

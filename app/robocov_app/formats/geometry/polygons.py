@@ -54,18 +54,17 @@ class Crossings:
         tree = shapely.STRtree(edges)
         order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
         crossings = work = seen = 0
+        estimate = 0.0
         for begin in range(0, len(order), _TOGETHER):
             some = order[begin : begin + _TOGETHER]
             one, other = tree.query(edges[some])
             work += len(one)
             seen += len(some)
             crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
-            # enough for an estimate of too many, or worked enough
-            if work > _WORK or (
-                crossings > _CERTAIN and self.count + crossings * n / seen / 2 > MAX_CROSSINGS
-            ):
+            estimate = crossings * n / seen / 2  # each is seen from both of its edges
+            if work > _WORK or (crossings > _CERTAIN and self.count + estimate > MAX_CROSSINGS):
                 break
-        self._add(crossings * n / seen / 2)  # each is seen from both of its edges
+        self._add(estimate)
 
     def _add(self, count: float) -> None:
         self.count += count

@@ -17,6 +17,7 @@ from scipy import ndimage
 from shapely import MultiPolygon, Polygon
 
 from robocov.arrays import Array, BoolArray, IntArray, ranges
+from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.formats.files import require_coordinate, require_vertices
 from robocov_app.formats.foreign import ForeignMap, square_metres
@@ -43,7 +44,7 @@ def foreign_map(
     description: str,
     format: str,  # noqa: A002 - as of the map
     cell: float,
-    origin: tuple[float, float] = (0.0, 0.0),
+    origin: Point = (0.0, 0.0),
     yaw: float = 0.0,
     unknown: Literal["obstacle", "free", "cut"] = "obstacle",
     called: str = "unknown",
@@ -108,9 +109,7 @@ def foreign_map(
     )
 
 
-def free_area(
-    free: BoolArray, cell: tuple[float, float], origin: tuple[float, float], where: str
-) -> MultiPolygon:
+def free_area(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
     """Return the free cells, (rows, columns), the top row first, as polygons in metres.
 
     `cell`, m: width and height of one. `origin`, m: lower left corner of all. Raises MapError as
@@ -118,9 +117,8 @@ def free_area(
     """
     if not free.any():
         raise MapError(f"{where}: no cell is free, but some were wanted")
-    area: MultiPolygon = shapely.transform(
-        _traced(free[::-1], where), lambda points: _placed(points, cell, origin)
-    )
+    outline = _traced(free[::-1], where)
+    area: MultiPolygon = shapely.transform(outline, lambda points: _placed(points, cell, origin))
     return area
 
 
@@ -129,9 +127,7 @@ def vertices_of(area: MultiPolygon) -> int:
     return int(shapely.get_num_coordinates(area)) - sum(1 + len(part.interiors) for part in area.geoms)
 
 
-def _placed(
-    points: Array, cell: float | tuple[float, float], origin: tuple[float, float], yaw: float = 0.0
-) -> Array:
+def _placed(points: Array, cell: float | Point, origin: Point, yaw: float = 0.0) -> Array:
     """Return (n, 2) places in the grid, in cells, in metres on the map."""
     x, y = (points * cell).T
     if yaw:

@@ -30,15 +30,7 @@ from robocov.mapfile.models import FARTHEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.foreign import ForeignMap, ImportReport, square_metres
 from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
-from robocov_app.formats.geometry.polygons import (
-    CRUMB,
-    bounded,
-    filled,
-    made_valid,
-    polygons,
-    polygons_of,
-    rounded,
-)
+from robocov_app.formats.geometry.polygons import CRUMB, bounded, filled, made_valid, polygons_of, rounded
 from robocov_app.formats.geometry.primitives import with_primitives
 from robocov_app.formats.geometry.simplify import sharpened, simplified
 from robocov_app.formats.options import check_options
@@ -208,8 +200,8 @@ class _Shaper:
         if outer is None or outer.is_valid:
             return None if outer is None else Polygon(outer.exterior)
         self.repaired.append(f"the boundary met itself: {_reason(outer)}")
-        valid = polygons(made_valid(outer))
-        return Polygon(valid[0].exterior) if valid else None
+        valid = polygons_of(made_valid(outer))
+        return None if valid.is_empty else filled(valid)
 
     def _valid(self, outer: Polygon | None) -> MultiPolygon:
         """Return the free space within `outer` as disjoint valid polygons, the largest first."""
@@ -258,9 +250,8 @@ class _Shaper:
             most = int(np.argmax([shapely.contains(part, places).sum() for part in parts])) if robots else 0
             stays = np.arange(len(parts)) == most
             if most:
-                self.notes.append(
-                    "the part of the free space with most robots stays, which is not the largest"
-                )
+                what = "the part of the free space with most robots"
+                self.notes.append(f"{what} stays, which is not the largest")
         kept: list[Polygon] = parts[stays].tolist()
         left: list[Polygon] = parts[~stays].tolist()
         if not kept:
@@ -274,9 +265,8 @@ class _Shaper:
             self.dropped.append(f"{what} of the free space, {_squared(left)}{largest}")
             self._offer(left, area[stays].sum() / area.sum(), left[0].area / area.sum())
         if len(kept) > 1:
-            self.notes.append(
-                f"the free space is of {len(kept)} separate parts: robots cannot pass between them"
-            )
+            what = f"the free space is of {len(kept)} separate parts"
+            self.notes.append(f"{what}: robots cannot pass between them")
         return kept
 
     def _offer(self, left: list[Polygon], share: float, next_share: float) -> None:
@@ -325,10 +315,8 @@ class _Shaper:
         if cell is None:
             return DEFAULT_TOLERANCE
         if cell > width:
-            self.notes.append(
-                f"cells are larger than robots: walls move by at most {width:g} m, not by one "
-                f"(--simplify {cell:g})"
-            )
+            what = f"walls move by at most {width:g} m, not by one (--simplify {cell:g})"
+            self.notes.append(f"cells are larger than robots: {what}")
         return min(cell, width)
 
     def _require_few(self, count: int, what: str, most: int) -> None:
