@@ -552,7 +552,6 @@ def _by_start(pairs: Comparison) -> str:
 
 
 def _other_gains(outcomes: Outcomes) -> str:
-    """Return how RAPF compares with LA at its best gains, and at robocov's default."""
     parts = []
     for law in ("rapf-best", "rapf-default"):
         pairs = outcomes.compared(law, "lloyd")

@@ -119,7 +119,7 @@ class Outcomes:
         fine = self.measured(measure, first, second)
         if not fine.scenarios:
             return None
-        return Comparison(fine, first, second, fine.of(first, measure), fine.of(second, measure))
+        return Comparison(fine, first, fine.of(first, measure), fine.of(second, measure))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +128,8 @@ class Comparison:
 
     fine: Outcomes
     first: str
-    second: str
     a: Array  # the first's values, (m,)
-    b: Array
+    b: Array  # the second's
 
     @cached_property
     def ratios(self) -> Array:

@@ -100,7 +100,6 @@ def _save_figures(
     *,
     quiet: bool,
 ) -> dict[str, Image]:
-    """Write figures as PNG, SVG and PDF, and as PNG for dark pages."""
     target = folder / "figures"
     with for_results(target):
         target.mkdir(exist_ok=True)
@@ -335,5 +334,4 @@ def _svg(kind: str, wide: float, tall: float, words: str, parts: Sequence[str]) 
 
 
 def _root(value: float) -> float:
-    """Return the square root, with the sign of the value."""
     return math.copysign(math.sqrt(abs(value)), value)

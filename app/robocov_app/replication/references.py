@@ -134,7 +134,6 @@ def _keep(path: Path, question: Question, answer: Reference) -> None:
 def _searched(
     questions: Mapping[str, Question], workers: int, stop: Interruption
 ) -> Iterator[tuple[str, Reference]]:
-    """Yield answers as they come; ends early when somebody wants to stop."""
     processes: list[subprocess.Popen[bytes]] = []
     own = threading.local()
 

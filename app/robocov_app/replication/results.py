@@ -440,7 +440,6 @@ def _finals(
 
 
 def _density(at: Path, plan: Plan, *found: Outcomes) -> DensityResults:
-    """Judge by φ the runs that knew the density, and those that did not."""
     costs = {each.name: CoverageCost(each.environment, plan.lattice) for each in studies.density_maps(plan)}
     values = {}
     for key, outcomes in zip(("known", "ignored"), found, strict=True):
@@ -460,12 +459,10 @@ def _density(at: Path, plan: Plan, *found: Outcomes) -> DensityResults:
 def _run_grid(
     study: Study, name: str, folder: Path, plan: Plan, options: RunnerOptions
 ) -> tuple[dict[str, GainOutcomes], dict[str, Reference]]:
-    """Do the runs of grids of gains, and return what each controller reached with every set."""
     known = references_of(study.maps, folder, plan, options)
     return reached.read_gain_outcomes(run_study(study, folder, name, options), study, known), known
 
 
 def _counts(folder: Path, names: Iterable[str]) -> tuple[int, int]:
-    """Return how many runs the folders of sweeps have, and how many of them failed."""
     found = [read_results(folder / "studies" / name) for name in names]
     return sum(map(len, found)), sum(len(each.failures()) for each in found)

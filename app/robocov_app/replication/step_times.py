@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array
 from robocov.controllers import gain_values, make_controller
 from robocov.files.atomic import written
 from robocov.mapfile import load_map
@@ -41,15 +40,10 @@ class StepTimes:
     dt: float  # s, simulated time of a step
     seconds: Mapping[str, tuple[float, ...]]
 
-    def ratios(self, controller: str) -> Array:
-        """Return the time by RAPF's in the same turn, for each block; none where it is not measured."""
-        own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
-        return np.array(own) / np.array(yardstick) if own and yardstick else np.empty(0)
-
     def ratio_interval(self, controller: str) -> Interval:
-        """Return the median of that ratio with its bootstrap interval over the blocks."""
-        ratios = self.ratios(controller)
-        return bootstrap(ratios) if len(ratios) else UNKNOWN
+        """Return the median time by RAPF's in the same turn, with its bootstrap interval over the blocks."""
+        own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
+        return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
     def interval(self, controller: str) -> Interval:
         """Return the median time of a step, s, with its bootstrap interval over the blocks."""

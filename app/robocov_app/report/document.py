@@ -68,7 +68,6 @@ def report(results: Sequence[Result], *, title: str | None = None, theme: str = 
 
 
 def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
-    """Return all that the page says of a result."""
     looks = grouped.styles(result)
     choice = grouped.chosen(result, grouped.MOST_RUNS, MOST_PANES)
     compared, chosen_gains = grouped.compared_groups(result)

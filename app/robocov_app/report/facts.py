@@ -185,7 +185,6 @@ def _seeds_text(result: Result) -> str:
 
 
 def _team_text(result: Result) -> str:
-    """Return limits and ranges of the team, and which of them vary."""
     team = result.facts.get("team")
     parts = [_parameter(str(key), value) for key, value in team.items()] if isinstance(team, dict) else []
     for name, _ in result.entries[0].team if result.entries else ():

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -36,11 +35,6 @@ class Group:
     controller: str
     gains: Gains | None
     entries: tuple[Entry, ...]
-
-    @cached_property
-    def finals(self) -> Array:
-        """Mean distances at the end, (m,) m, nan where there is none."""
-        return np.array([entry.final for entry in self.entries])
 
     def at(self, setting: Setting) -> Group:
         """Return the part of the group in one setting."""
@@ -327,7 +321,6 @@ def _by_case(group: Group) -> dict[tuple[object, ...], Entry]:
 
 
 def _exp(effect: Interval) -> Interval:
-    """Return ratios for their logarithms."""
     with np.errstate(over="ignore"):
         return Interval(*np.exp([effect.estimate, effect.low, effect.high]).tolist())
 

@@ -214,7 +214,6 @@ def _map_shapes(environment: Environment, frame: Frame, time: float) -> str:
 
 
 def _motion(obstacle: MovingObstacle, environment: Environment, frame: Frame) -> str:
-    """Return a moving obstacle: its shape, its path as a dashed line, and an arrow where it heads."""
     seen = shapely.intersection(obstacle.polygon, environment.region.polygon)
     along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
     across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)

@@ -84,10 +84,8 @@ def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
     scales = grouped.medians(result)
     for title, own, groups, several in _parts(result, key):
-        values = [
-            grouped.relative(group.entries, scales) if several else group.finals[np.isfinite(group.finals)]
-            for group in groups
-        ]
+        metres = dict.fromkeys(scales, 1.0)
+        values = [grouped.relative(group.entries, scales if several else metres) for group in groups]
         what, unit = (RELATIVE, "") if several else (METRES, " m")
         yield from _sample_plot(title, groups, values, looks, own, what, unit)
 

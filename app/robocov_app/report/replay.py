@@ -166,8 +166,6 @@ def script_json(content: Any) -> str:
 
 
 def _affordable(runs: Sequence[ReplayRun], budget: int) -> tuple[float, bool]:
-    """Return the rate, and whether goals may come along."""
-
     def bytes_at(rate: float, goals: bool) -> float:
         total = 0.0
         for record in (run.record for run in runs):

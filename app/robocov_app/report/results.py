@@ -239,7 +239,6 @@ def _damaged(folder: Path, error: InputError) -> Damaged:
 
 
 def _of_runs(folder: Path) -> Result:
-    """Read a run or a comparison."""
     kind: Kind = "run"
     parts, unfinished, path = [folder], False, folder / "comparison.json"
     if path.is_file():
@@ -291,7 +290,6 @@ def _of_runs(folder: Path) -> Result:
 
 
 def _of_sweep(folder: Path) -> Result:
-    """Read a sweep, finished or not."""
     results = read_results(folder)
     study, path = results.study, folder / "study.json"
     try:
@@ -342,7 +340,6 @@ def _of_sweep(folder: Path) -> Result:
 
 
 def _labelled(entries: list[Entry]) -> tuple[Entry, ...]:
-    """Return the entries with labels that tell the controllers apart."""
     labels: dict[str, str] = {}
     for entry in entries:
         if entry.controller not in labels:
@@ -374,7 +371,6 @@ def _known_gains(
 
 
 def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | None]:
-    """Return the figures of a single run out of its summary."""
     known = summary if isinstance(summary, dict) else {}
     figures: dict[str, float | None] = {}
     for name in FIGURES:
@@ -392,7 +388,6 @@ def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | Non
 
 
 def _versions(entries: list[Entry]) -> Any:
-    """Return the versions that the first run was made with."""
     for entry in entries:
         if entry.error is None:
             try:

@@ -81,7 +81,6 @@ class _Copy:
         return self._names.setdefault(old, f"{self._key}-{len(self._names)}")
 
     def _renamed(self, reference: str) -> str:
-        """Return ``url(#name)`` with the name that is used here."""
         return f"url(#{self._name(reference.removeprefix('url(#').removesuffix(')'))})"
 
     def _element(self, source: Element) -> Element:
@@ -129,7 +128,6 @@ def _short(number: str, decimals: int) -> str:
 
 
 def _coloured(style: str) -> str:
-    """Return a style with the page's colours and font."""
     parts = [part for part in style.split("; ") if not part.startswith("font-family:")]
     text = ";".join(part.replace(": ", ":") for part in parts)
     return re.sub(r"#[0-9a-f]{6}", lambda match: _variables()[match[0]], text)

@@ -222,7 +222,6 @@ def _clearance(entries: Sequence[Entry]) -> str:
 
 
 def _ranges_text(group: Group, result: Result) -> str:
-    """Return between which values the gains of a controller vary."""
     values: dict[str, list[Value]] = {}
     for entry in group.entries:
         for name, value in entry.gains:
