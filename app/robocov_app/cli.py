@@ -4,8 +4,6 @@ Each command is a module of `robocov_app.commands`, with its options `Arguments`
 only that of the command that is called is imported: asking for help must not pay for plotting.
 """
 
-from __future__ import annotations
-
 import importlib
 import io
 import os

@@ -4,8 +4,6 @@ Fast marching travels over the same lattice with the same free sites, from the c
 It is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 from importlib.util import find_spec

@@ -1,7 +1,5 @@
 """Steps of learning environments against a plain one of gymnasium: point masses in an empty square."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from itertools import cycle

@@ -1,7 +1,5 @@
 """Times that can be trusted on a shared machine: calls in turn, medians, ratios."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """Sweeps, per run, and the start of commands, against an interpreter that imports numpy."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

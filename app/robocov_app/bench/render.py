@@ -1,7 +1,5 @@
 """Drawing a frame against filling and copying an empty one; films and PNGs against drawing their frames."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from functools import partial

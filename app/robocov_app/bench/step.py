@@ -1,7 +1,5 @@
 """A whole step (observe, cells, forces, physics) against Qhull's Delaunay triangulation and bare physics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The interactive window, used for some seconds with its live cost, without a display."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path

@@ -1,14 +1,12 @@
 """`robocov check`."""
 
-from __future__ import annotations
-
 import json
 import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import tyro
 from rich.console import Console
@@ -52,7 +50,7 @@ class Outcome:
     error: InputError | None = None
 
     @classmethod
-    def of(cls, name: str) -> Outcome:
+    def of(cls, name: str) -> Self:
         """Check the map with a name."""
         try:
             return cls(name, check_map(load_map(name)))

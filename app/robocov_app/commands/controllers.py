@@ -1,7 +1,5 @@
 """`robocov controllers`."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """`robocov export`."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import dataclass, field

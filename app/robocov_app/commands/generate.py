@@ -1,7 +1,5 @@
 """`robocov generate`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace

@@ -1,7 +1,5 @@
 """`robocov maps`."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

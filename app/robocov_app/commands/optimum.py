@@ -1,7 +1,5 @@
 """`robocov optimum`."""
 
-from __future__ import annotations
-
 import json
 import time
 from dataclasses import dataclass

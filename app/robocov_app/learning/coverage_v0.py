@@ -1,7 +1,5 @@
 """The environment as PettingZoo lays its own out: `parallel_env`, and `env` where robots act in turn."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pettingzoo.utils import parallel_to_aec

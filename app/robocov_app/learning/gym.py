@@ -4,8 +4,6 @@ Importing this module registers it; ``gymnasium.make("robocov_app.learning.gym:r
 both. (gymnasium knows no entry points of packages any more.)
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, ClassVar, cast
 

@@ -1,7 +1,5 @@
 """What a learner is told of what a robot knows: one row of numbers from -1 to 1 for each robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """One learner for each robot: a parallel environment of PettingZoo."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar, TypeAlias
 

@@ -1,7 +1,5 @@
 """Policies as controllers, and controllers as policies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, TypeAlias
@@ -21,7 +19,7 @@ from robocov_app.learning.episode import Episode
 from robocov_app.learning.layout import ObservationLayout
 from robocov_app.learning.task import ACTIONS, Action, actions_of, checked_kind, driving_forces
 
-Policy: TypeAlias = "Callable[[NDArray[np.float32]], Any]"
+Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
 """From an observation, (size,), to an action, (2,)."""
 
 _SOON = 5e-7  # seconds that sums of control periods may miss

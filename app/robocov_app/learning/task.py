@@ -1,7 +1,5 @@
 """The task that is to be learned: maps, team, time, actions and reward."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -114,7 +112,7 @@ def _slope(result: CoverageResult) -> Array:
     return result.gradient * (result.mean_distance / result.value)
 
 
-MapSource: TypeAlias = "str | Path | Environment | Callable[[int], Environment]"
+MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
 """A map, its name or path, or what makes one of a seed."""
 
 SEEDS = 2**31  # a maker of maps is given a seed below this

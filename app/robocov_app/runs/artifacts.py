@@ -1,7 +1,5 @@
 """What is made of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The coverage cost of a map, with progress; and its picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from robocov.arrays import Array

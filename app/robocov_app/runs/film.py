@@ -1,7 +1,5 @@
 """Films of runs: one by itself, or several side by side under a legend that they share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path

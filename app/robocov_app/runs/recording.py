@@ -1,7 +1,5 @@
 """Files of frames and films."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import subprocess

@@ -1,7 +1,5 @@
 """Saved runs and comparisons, read back; names of their folders."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

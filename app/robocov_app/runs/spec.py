@@ -1,7 +1,5 @@
 """What a run is, for whoever does it: the window, the command line, a sweep, learning, the paper."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

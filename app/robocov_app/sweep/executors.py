@@ -1,7 +1,5 @@
 """Executors of a sweep's tasks: processes of this machine, or the workers of a Dask cluster."""
 
-from __future__ import annotations
-
 import asyncio
 import importlib.util
 import logging
@@ -38,7 +36,7 @@ class Lost(NamedTuple):
     blamed: bool
 
 
-Returned: TypeAlias = "tuple[Task, Outcome | Lost]"
+Returned: TypeAlias = tuple[Task, Outcome | Lost]
 
 
 class Executor(ABC):

@@ -1,7 +1,5 @@
 """The folder of a sweep: each run in a folder of its own, there whole or not at all, with check sums."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Doing one task: from what a run needs to the files that come of it."""
 
-from __future__ import annotations
-
 import gc
 import io
 import json

@@ -1,7 +1,5 @@
 """A study, what a sweep runs, and its tasks: one run each."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -1,7 +1,5 @@
 """Words of the command line to values, with one line for what is wrong with them."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,12 +1,11 @@
 """Ctrl-C that keeps what is done."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading
 from contextlib import suppress
 from types import FrameType
+from typing import Self
 
 INTERRUPTED = 130  # exit status
 
@@ -18,7 +17,7 @@ class Interruption:
         self.requested = False
         self._former: dict[signal.Signals, signal._HANDLER] = {}
 
-    def __enter__(self) -> Interruption:
+    def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._former[number] = signal.signal(number, self._note)

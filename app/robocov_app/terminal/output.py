@@ -1,7 +1,5 @@
 """Small text files of results, and names for them."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

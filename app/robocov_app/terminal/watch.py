@@ -1,7 +1,5 @@
 """Files that are watched: their changes, however editors write them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
