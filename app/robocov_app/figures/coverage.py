@@ -15,7 +15,6 @@ from matplotlib.patches import Patch, Polygon
 
 from robocov.arrays import IntArray
 from robocov.environment import Environment
-from robocov.errors import ParameterError
 from robocov.record import Record
 from robocov.robots import Team
 from robocov_app.figures.arena import (
@@ -28,7 +27,7 @@ from robocov_app.figures.arena import (
 )
 from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TEXT, Box, Page, tone
+from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
 from robocov_app.figures.runs import plot_cost
 from robocov_app.render.density import cost_label, density_label, mean_label
 from robocov_app.render.distance_field import Field, levels, palette, round_limit, strength, ticks
@@ -97,8 +96,7 @@ def plot_coverage(
     x 400, has the curves alone. `times`: mean times, s, where robots are not equally fast; they stand below
     the curves. Raises ParameterError when there are no moments.
     """
-    if not moments:
-        raise ParameterError("moments: none were given, but at least one was wanted")
+    check_some("moments", moments)
     if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
         return plot_cost(curves, theme=theme, size=size, title=title)
     theme = theme_named(theme)

@@ -20,6 +20,7 @@ from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
     SMALL,
     Page,
+    check_some,
     cut_to,
     even_ticks,
     figure_of,
@@ -73,8 +74,7 @@ def plot_gains(
             raise ParameterError(f"dependence {shown(each.label)}: no finite value, but one was wanted")
         short = cut_to(each.label, len, MOST_LETTERS)
         kept.append(Dependence(short, each.controller, each.gains[fine], each.values[fine]))
-    if not kept:
-        raise ParameterError("dependences: none were given, but at least one was wanted")
+    check_some("dependences", kept)
     known = curve_styles(each.controller for each in kept)
     looks = [known[each.controller] for each in kept] if styles is None else list(styles)
     axes = _page_axes(theme, size or (700, 480), title, scale)

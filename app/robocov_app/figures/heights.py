@@ -128,8 +128,6 @@ def _window(points: Array, aspect: float) -> Box:
 
 
 def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) -> None:
-    from matplotlib.ticker import MaxNLocator
-
     ring = cell.polygons[0]
     fill = tone(mix(theme.background, theme.robots[1], theme.tint))
     axes.add_patch(Polygon(ring, facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))

@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError
 from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, Page
+from robocov_app.figures.page import HEADING, Page, check_some
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
@@ -27,8 +26,7 @@ def plot_maps(
     title: str = "",
 ) -> Figure:
     """Plot the first `MOST` maps side by side at one scale, each under its name; the page has `size` px."""
-    if not environments:
-        raise ParameterError("maps: none were given, but at least one was wanted")
+    check_some("maps", environments)
     theme = theme_named(theme)
     drawn = list(environments)[:MOST]
     if len(drawn) < len(environments):

@@ -9,11 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError
 from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import Page
+from robocov_app.figures.page import Page, check_some
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 
@@ -47,8 +46,7 @@ def plot_metrics(
     title: str = "Metrics",
 ) -> Figure:
     """Plot the metrics of runs against time, each curve named with its value at the end."""
-    if not runs:
-        raise ParameterError("runs: none were given, but at least one was wanted")
+    check_some("runs", runs)
     theme = theme_named(theme)
     page = Page(size, theme)
     s = page.scale

@@ -13,6 +13,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from robocov.errors import ParameterError
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.theme import Colour, Theme
@@ -32,6 +33,12 @@ def tone(colour: Colour) -> tuple[float, float, float]:
 def figure_of(axes: Axes) -> Figure:
     """Return the figure that axes are on."""
     return cast("Figure", axes.get_figure(root=True))
+
+
+def check_some(what: str, items: Sequence[object]) -> None:
+    """Raise ParameterError where there is nothing to plot."""
+    if not items:
+        raise ParameterError(f"{what}: none were given, but at least one was wanted")
 
 
 def quiet_axes(axes: Axes, theme: Theme, x: str = "", y: str = "", grid: Literal["x", "y", ""] = "") -> None:

@@ -18,7 +18,17 @@ from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
 from robocov_app.figures.curves import DISTANCE, Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import TEXT, Page, cut_to, even_ticks, figure_of, quiet_axes, tone, value_limits
+from robocov_app.figures.page import (
+    TEXT,
+    Page,
+    check_some,
+    cut_to,
+    even_ticks,
+    figure_of,
+    quiet_axes,
+    tone,
+    value_limits,
+)
 from robocov_app.figures.statistics import Interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.render.theme import LIGHT, Theme, theme_named
@@ -73,8 +83,7 @@ def plot_cost_bands(
     unit: str = "m",
 ) -> Figure:
     """Plot values against time: of several runs their median and quartiles, of one run its line."""
-    if not bands:
-        raise ParameterError("bands: none were given, but at least one was wanted")
+    check_some("bands", bands)
     for band in bands:
         if band.values.ndim != 2 or band.values.shape[1] != len(band.time):
             raise ParameterError(
@@ -209,8 +218,7 @@ def _fitting(curve: Curve, page: Page, unit: str, room: float) -> Curve:
 
 
 def _check_samples(samples: Sequence[Sample]) -> None:
-    if not samples:
-        raise ParameterError("samples: none were given, but at least one was wanted")
+    check_some("samples", samples)
     for sample in samples:
         if not np.isfinite(sample.values).any():
             raise ParameterError(

@@ -15,7 +15,7 @@ from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, figure_of
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some, figure_of
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
@@ -152,8 +152,7 @@ def plot_cost(
     None makes a page of `size` px with a `title`. Raises ParameterError when there are no curves, or one has
     no finite value.
     """
-    if not curves:
-        raise ParameterError("curves: none were given, but at least one was wanted")
+    check_some("curves", curves)
     for label, _, time, values in curves:
         if len(time) != len(values) or not np.isfinite(values).any():
             raise ParameterError(

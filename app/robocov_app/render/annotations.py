@@ -67,14 +67,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     name = shortened(scene.label, canvas.text_size(size), room, bold=True)
     left += canvas.text(name, (left, y), size=size, bold=True) + gap
     if "scale_bar" in canvas.shown and is_small(canvas.surface.get_height(), canvas.scale, canvas.shown):
-        _draw_bar(canvas, left, y)
-        bar = bar_length(canvas)
-        left += (
-            bar * canvas.camera.zoom
-            + canvas.text_width(length_label(bar), bold=True)
-            + 8 * canvas.scale
-            + gap
-        )
+        left += _draw_bar(canvas, left, y) + gap
     cost = next((each for each in costs if canvas.text_width(each) <= right - left), "")
     canvas.text(cost, (right, y), anchor="right")
 

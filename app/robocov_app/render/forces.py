@@ -94,11 +94,10 @@ def draw_velocities(canvas: Canvas, scene: Scene) -> None:
     _arrows(canvas, scene, vectors, canvas.theme.velocity, 1.6 * canvas.scale, "open")
 
 
-def _velocity_glyph(canvas: Canvas, x: float, y: float) -> None:
-    _level_arrow(canvas, x, y, canvas.theme.velocity, 1.6 * canvas.scale, "open")
-
-
-velocities_legend = says("velocity", _velocity_glyph)
+velocities_legend = says(
+    "velocity",
+    lambda canvas, x, y: _level_arrow(canvas, x, y, canvas.theme.velocity, 1.6 * canvas.scale, "open"),
+)
 
 
 def range_layer(kind: str, title: str) -> Layer:
@@ -143,11 +142,9 @@ def _link(canvas: Canvas, start: list[float], end: list[float]) -> None:
     canvas.line(start, end, colour, canvas.width(canvas.theme.line))
 
 
-def _link_glyph(canvas: Canvas, x: float, y: float) -> None:
-    _link(canvas, [x - 9 * canvas.scale, y], [x + 9 * canvas.scale, y])
-
-
-links_legend = says("neighbours", _link_glyph)
+links_legend = says(
+    "neighbours", lambda canvas, x, y: _link(canvas, [x - 9 * canvas.scale, y], [x + 9 * canvas.scale, y])
+)
 
 
 def draw_points(canvas: Canvas, scene: Scene) -> None:

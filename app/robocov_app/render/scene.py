@@ -42,55 +42,44 @@ class Sensed:
     """A growing set of points, each with its robot and the time when it was sensed first."""
 
     def __init__(self) -> None:
-        self._times, self._robots = np.empty(256), np.empty(256, dtype=np.intp)
-        self._points = np.empty((256, 2))
-        self._known: set[tuple[int, int, int]] = set()
-        self._count = 0
+        self._times, self._robots = np.empty(0), np.empty(0, dtype=np.intp)
+        self._points = np.empty((0, 2))
+        self._known: set[tuple[int, float, float]] = set()
 
     def __len__(self) -> int:
-        return self._count
+        return len(self._times)
 
     def add(self, time: float, numbers: Sequence[int], points: Array) -> None:
         """Add what robots of these numbers sense now, (n, 2) m, nan for nothing."""
-        if self._count + len(numbers) > MOST:
+        if len(self) + len(numbers) > MOST:
             return
-        cells = np.floor(points / CELL)
-        for number, cell, point in zip(numbers, cells.tolist(), points.tolist(), strict=True):
-            if cell[0] != cell[0]:  # nan
-                continue
-            key = number, int(cell[0]), int(cell[1])
-            if key not in self._known:
+        fresh = []
+        for row, key in enumerate(zip(numbers, *np.floor(points / CELL).T.tolist(), strict=True)):
+            if key[1] == key[1] and key not in self._known:  # nan is not equal to itself
                 self._known.add(key)
-                self._append(time, number, point)
+                fresh.append(row)
+        if fresh:
+            self._times = np.append(self._times, np.full(len(fresh), time))
+            self._robots = np.append(self._robots, np.asarray(numbers, dtype=np.intp)[fresh])
+            self._points = np.concatenate([self._points, points[fresh]])
 
     def until(self, time: float) -> tuple[Array, IntArray]:
         """Return the points that were known at a time, (k, 2) m in order, and the numbers of the robots."""
-        count = int(np.searchsorted(self._times[: self._count], time + 1e-6, side="right"))
+        count = int(np.searchsorted(self._times, time + 1e-6, side="right"))
         return self._points[:count], self._robots[:count]
 
     def copy(self) -> Sensed:
         """Return a set of its own with the same points."""
-        twin = copy(self)
-        twin._points, twin._times = self._points.copy(), self._times.copy()
-        twin._robots, twin._known = self._robots.copy(), set(self._known)
+        twin = copy(self)  # arrays are replaced, never changed
+        twin._known = set(self._known)
         return twin
 
     def cut(self, time: float) -> None:
         """Forget what was sensed after a time."""
-        count = len(self.until(time)[0])
-        for k in range(count, self._count):
-            x, y = np.floor(self._points[k] / CELL).tolist()
-            self._known.discard((int(self._robots[k]), int(x), int(y)))
-        self._count = count
-
-    def _append(self, time: float, number: int, point: list[float]) -> None:
-        if self._count == len(self._points):
-            self._points = np.concatenate([self._points, np.empty_like(self._points)])
-            self._times = np.concatenate([self._times, np.empty_like(self._times)])
-            self._robots = np.concatenate([self._robots, np.empty_like(self._robots)])
-        self._points[self._count] = point
-        self._times[self._count], self._robots[self._count] = time, number
-        self._count += 1
+        self._points, self._robots = self.until(time)
+        self._times = self._times[: len(self._points)]
+        x, y = np.floor(self._points / CELL).T.tolist()
+        self._known = set(zip(self._robots.tolist(), x, y, strict=True))
 
 
 class MovingObstacle(NamedTuple):

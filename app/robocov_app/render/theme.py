@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,76 +147,58 @@ class Theme:
         return colour
 
 
-LIGHT = Theme(
-    name="light",
-    background=rgb("FFFFFF"),
-    panel=rgb("F4F6FA"),
-    ink=rgb("1B2330"),
-    faint=rgb("5A6678"),
-    grid=rgb("C3CCD8"),
-    boundary=rgb("414D60"),
-    obstacle=rgb("8C95A5"),
-    obstacle_edge=rgb("5B6576"),
-    cell_edge=rgb("66738A"),
-    robot_ring=rgb("FFFFFF"),
-    start=rgb("1E9E36"),
-    final=rgb("1F5FE0"),
-    trajectory=rgb("D62222"),
-    velocity=rgb("1F5FE0"),
-    controllers={"rapf": rgb("1F5FE0"), "rpf": rgb("D62222"), "lloyd": rgb("118038")},
-    others=tuple(rgb(code) for code in ("8A3FA8", "7A5C00", "28303C", "007A8A", "D4127E")),
-    forces={
-        "attraction": rgb("0B7A6F"),
-        "repulsion_robots": rgb("D9480F"),
-        "repulsion_obstacle": rgb("A81E62"),
-        "viscosity": rgb("6B7280"),
-        "resultant": rgb("1B2330"),
-    },
-    robots=tuple(rgb(code) for code in _MUTED),
-    heat=tuple(rgb(code) for code in ("FBFCFE", "DCE6F2", "B4CBE4", "86A9D3", "5D84BF", "3F60A2", "2A3F78")),
-    unreached=rgb("E3DED4"),
-    density=rgb("B4550A"),
-    density_strength=0.5,
-    tint=0.25,
-    paper_tint=0.13,
+# codes of the light look and of the dark one
+_COLOURS = {
+    "background": ("FFFFFF", "13181F"),
+    "panel": ("F4F6FA", "1B212B"),
+    "ink": ("1B2330", "E8ECF2"),
+    "faint": ("5A6678", "9AA6B8"),
+    "grid": ("C3CCD8", "4A5566"),
+    "boundary": ("414D60", "A3AEC0"),
+    "obstacle": ("8C95A5", "485366"),
+    "obstacle_edge": ("5B6576", "8793A6"),
+    "cell_edge": ("66738A", "7A879B"),
+    "robot_ring": ("FFFFFF", "FFFFFF"),
+    "start": ("1E9E36", "46D160"),
+    "final": ("1F5FE0", "5B9BFF"),
+    "trajectory": ("D62222", "FF6B63"),
+    "velocity": ("1F5FE0", "5B9BFF"),
+    "unreached": ("E3DED4", "332E28"),
+    "density": ("B4550A", "FFB45A"),
+}
+_CONTROLLERS = {
+    "rapf": ("1F5FE0", "5B9BFF"),
+    "rpf": ("D62222", "FF6B63"),
+    "lloyd": ("118038", "46C46A"),
+}
+_FORCES = {
+    "attraction": ("0B7A6F", "2DD4BF"),
+    "repulsion_robots": ("D9480F", "FF9354"),
+    "repulsion_obstacle": ("A81E62", "FF7AB6"),
+    "viscosity": ("6B7280", "A9B4C4"),
+    "resultant": ("1B2330", "FFFFFF"),
+}
+_OTHERS = "8A3FA8 7A5C00 28303C 007A8A D4127E", "CF8BE8 F0A94A E8ECF2 2DD4BF FF5CA4"
+_HEAT = (
+    "FBFCFE DCE6F2 B4CBE4 86A9D3 5D84BF 3F60A2 2A3F78",
+    "141B26 1B2F4B 23486F 31668F 4B88A6 78ADB8 B8D3C8",
 )
 
-DARK = Theme(
-    name="dark",
-    background=rgb("13181F"),
-    panel=rgb("1B212B"),
-    ink=rgb("E8ECF2"),
-    faint=rgb("9AA6B8"),
-    grid=rgb("4A5566"),
-    boundary=rgb("A3AEC0"),
-    obstacle=rgb("485366"),
-    obstacle_edge=rgb("8793A6"),
-    cell_edge=rgb("7A879B"),
-    robot_ring=rgb("FFFFFF"),
-    start=rgb("46D160"),
-    final=rgb("5B9BFF"),
-    trajectory=rgb("FF6B63"),
-    velocity=rgb("5B9BFF"),
-    controllers={"rapf": rgb("5B9BFF"), "rpf": rgb("FF6B63"), "lloyd": rgb("46C46A")},
-    others=tuple(rgb(code) for code in ("CF8BE8", "F0A94A", "E8ECF2", "2DD4BF", "FF5CA4")),
-    forces={
-        "attraction": rgb("2DD4BF"),
-        "repulsion_robots": rgb("FF9354"),
-        "repulsion_obstacle": rgb("FF7AB6"),
-        "viscosity": rgb("A9B4C4"),
-        "resultant": rgb("FFFFFF"),
-    },
-    # the darkest three would sink into the background
-    robots=tuple(
-        mix(rgb(code), (255, 255, 255), 0.38 if luminance(rgb(code)) < 0.16 else 0.0) for code in _MUTED
-    ),
-    heat=tuple(rgb(code) for code in ("141B26", "1B2F4B", "23486F", "31668F", "4B88A6", "78ADB8", "B8D3C8")),
-    unreached=rgb("332E28"),
-    density=rgb("FFB45A"),
-    density_strength=0.45,
-    tint=0.26,
-    paper_tint=0.19,
-)
+
+def _theme(look: int, name: str, robots: Iterable[Colour], **numbers: Any) -> Theme:
+    def named(codes: dict[str, tuple[str, str]]) -> dict[str, Any]:
+        return {key: rgb(code[look]) for key, code in codes.items()}
+
+    others, heat = (tuple(map(rgb, codes[look].split())) for codes in (_OTHERS, _HEAT))
+    looks: Any = {"controllers": named(_CONTROLLERS), "forces": named(_FORCES), "others": others}
+    return Theme(name, robots=tuple(robots), heat=heat, **named(_COLOURS), **looks, **numbers)
+
+
+_HUES = [rgb(code) for code in _MUTED]
+LIGHT = _theme(0, "light", _HUES, density_strength=0.5, tint=0.25, paper_tint=0.13)
+# the darkest three hues would sink into the background
+_PALER = [mix(hue, (255, 255, 255), 0.38 if luminance(hue) < 0.16 else 0.0) for hue in _HUES]
+DARK = _theme(1, "dark", _PALER, density_strength=0.45, tint=0.26, paper_tint=0.19)
 
 THEMES: dict[str, Theme] = {"light": LIGHT, "dark": DARK}
 

@@ -53,8 +53,8 @@ class Trajectories:
         # mostly below the robot's disc, where seams do not show, nor steps in a crowd
         lines = pygame.draw.aalines if len(ends) < CROWD else pygame.draw.lines
         for path, end, colour in zip(self._open, ends, colours, strict=True):
-            # nan: not there yet
-            if path[-1][0] != path[-1][0] or (len(path) == 1 and _near(path[0], end)):
+            still = len(path) == 1 and max(abs(path[0][0] - end[0]), abs(path[0][1] - end[1])) < 1.0
+            if still or path[-1][0] != path[-1][0]:  # nan: not there yet
                 continue
             if whole == 1:
                 lines(canvas.surface, colour, False, [*path, end])
@@ -136,7 +136,7 @@ class Trajectories:
 
     def _found(self, trail: Array) -> bool:
         """Look for the row that was drawn last; where old rows were thinned it has come forward."""
-        if self._drawn <= len(trail) and _same(trail[self._drawn - 1], self._last_row):
+        if self._drawn <= len(trail) and _same_rows(trail[[self._drawn - 1]], self._last_row).all():
             return True
         rows = np.flatnonzero(_same_rows(trail[: self._drawn], self._last_row))
         if len(rows):
@@ -257,14 +257,6 @@ def _stroke(
     if width > 2.5 * _FADE_FINE:  # lines have straight ends: fill the corners' notches
         for point in path:
             pygame.draw.circle(surface, colour, point, width / 2)
-
-
-def _near(point: list[float], other: list[float]) -> bool:
-    return abs(point[0] - other[0]) < 1.0 and abs(point[1] - other[1]) < 1.0
-
-
-def _same(row: Array, other: Array) -> bool:
-    return row.shape == other.shape and np.array_equal(row, other, equal_nan=True)
 
 
 def _same_rows(rows: Array, other: Array) -> Array:
