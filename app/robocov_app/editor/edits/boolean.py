@@ -1,7 +1,6 @@
-"""Selected obstacles united, subtracted, intersected: by shapely, holes kept.
+"""Selected obstacles united, subtracted, intersected; walls and circles become polygons.
 
-Walls and circles become polygons. The result may be several obstacles; they take the place, the name and
-the note of the lowest.
+The result, perhaps several obstacles, takes the place, the name and the note of the lowest.
 """
 
 from __future__ import annotations
@@ -80,10 +79,7 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
 
 
 def clipped(sketch: Sketch, selection: Selection) -> Change:
-    """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected.
-
-    What lies outside as a whole goes; what lies inside stays as it is.
-    """
+    """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected."""
     if sketch.boundary is None or len(sketch.boundary) < 3 or not Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be sound first")
     inside = Polygon(sketch.boundary)
@@ -99,10 +95,7 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
 
 
 def repaired(sketch: Sketch, selection: Selection) -> Change:
-    """Make polygons of outlines that cross themselves, by shapely's make_valid; the boundary too.
-
-    Of the selected things, or of all if none is selected. The boundary keeps its largest part.
-    """
+    """Make crossing outlines valid, of what is selected or of all; the boundary keeps its largest part."""
     everything = not (selection.items or selection.boundary)
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in sketch.obstacles:

@@ -1,7 +1,6 @@
 """Copy and paste, as JSON text: within a window, between windows, and into a text editor.
 
-Besides its own format, what is pasted may be a whole map, an obstacle as a map has it, a list of obstacles,
-or a list of points, which becomes a polygon.
+A whole map, an obstacle, a list of them, or a list of points (a polygon) can be pasted, too.
 """
 
 from __future__ import annotations
@@ -38,11 +37,9 @@ def copied(sketch: Sketch, selection: Selection) -> str:
 
 
 def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | None = None) -> Change:
-    """Paste what `copied` returned; it is selected then.
+    """Paste what `copied` returned, its middle at a place, m (None: where it was), still on the grid.
 
-    A boundary becomes the map's if it has none; else it is left out, or a polygon if it was copied alone.
-    Starts get free names. The middle of its bounding box comes to be at a place, m, None leaves it where it
-    was; what is on a grid stays on it.
+    A boundary becomes the map's if that has none; else it is left out, or a polygon if it was copied alone.
     """
     part = _part(text)
     shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]

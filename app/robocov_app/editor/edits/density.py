@@ -1,8 +1,4 @@
-"""Edits of the density: hot spots and weighted areas drawn, moved, sized, weighed and taken away; the floor.
-
-A density has features of one kind, numbered: Gaussian hot spots, which add to a floor, or polygons of one
-weight each on a background.
-"""
+"""Edits of the density: features of one kind, hot spots on a floor or weighted areas on a background."""
 
 from __future__ import annotations
 

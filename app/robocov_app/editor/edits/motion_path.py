@@ -35,10 +35,7 @@ def goes(path: ObstaclePath) -> bool:
 def way_point_added(
     sketch: Sketch, key: int, point: Point, at: int | None = None, speed: float = FIRST_SPEED
 ) -> Change:
-    """Add a way point, as the last or before way point `at`.
-
-    The first one makes a path from the obstacle's middle to there, at a speed in m/s.
-    """
+    """Add a way point, last or before `at`; the first makes a path from the obstacle's middle, at m/s."""
     path = path_of(sketch, key)
     if path is None:
         path = ObstaclePath(
@@ -106,10 +103,7 @@ def way_point_at(path: ObstaclePath, point: Point, reach: float) -> int | None:
 
 
 def leg_at(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return before which way point one at a point goes, if that is on the line within `reach` metres.
-
-    The leg that closes a loop ends behind the last way point.
-    """
+    """Return before which way point one at a point goes, if that is on the line within `reach` metres."""
     if len(path.points) < 2:
         return None
     points = np.array(path.points)

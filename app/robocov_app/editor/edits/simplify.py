@@ -22,8 +22,7 @@ _STEPS = 12  # tolerances that are tried, each half of the one before, until not
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """Leave out vertices of the selected obstacles and boundary; of all obstacles if none is selected.
 
-    No vertex that is left out is farther than `tolerance` m from the new outline (Douglas and Peucker,
-    1973), and no outline crosses itself, or a hole of its own, that did not before.
+    By Douglas and Peucker (1973), to `tolerance` m; nothing crosses itself afterwards that did not before.
     """
     if not (math.isfinite(tolerance) and 0.0 <= tolerance <= LARGEST):
         raise MapError("a tolerance of 0 m or more was wanted")
@@ -41,10 +40,7 @@ def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change
 
 
 def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
-    """Make edges horizontal or vertical that are nearly so, up to so many degrees: a plan traced by hand.
-
-    Edges that are in line through common vertices come to lie on one line, in their middle.
-    """
+    """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
     if not 0.0 < degrees <= 30.0:
         raise MapError("an angle of up to 30 degrees was wanted")
     after, count = sketch, 0

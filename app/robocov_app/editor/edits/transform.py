@@ -99,10 +99,9 @@ class Affine:
         return self.ring([point])[0]
 
     def shape(self, shape: Obstacle) -> Obstacle:
-        """Return where an obstacle goes.
+        """Return where an obstacle goes, with its path; its speed stays.
 
-        Radii and the widths of walls grow with it where all lengths do; where they do not, a circle becomes
-        a polygon, and a wall keeps its width. The path of one that moves goes with it, its speed stays.
+        Where lengths do not all scale alike, a circle becomes a polygon, and a wall keeps its width.
         """
         factor = self.factor
         path = None if shape.path is None else replace(shape.path, points=self.ring(shape.path.points))
@@ -145,10 +144,7 @@ def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 
 def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
-    """Turn what is selected counter-clockwise, about the middle of its bounding box unless a point is given.
-
-    Circles and discs keep their shape; a start in the whole free space stays as it is.
-    """
+    """Turn what is selected counter-clockwise, by default about the middle of its bounding box."""
     if not math.isfinite(degrees):
         raise MapError("an angle in degrees was wanted")
     affine = Affine.turn(degrees, _middle(sketch, selection) if about is None else about)
@@ -160,8 +156,7 @@ def scaled(
 ) -> Change:
     """Scale what is selected by fx (and fy, by default the same), about its middle unless a point is given.
 
-    With both the same, radii and the widths of walls grow too. Else walls keep their width, a circle becomes
-    a polygon, and a start that is a disc is refused. A factor below 0 mirrors.
+    Radii and widths of walls grow only when both are the same, see `Affine.shape`; below 0 mirrors.
     """
     fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
@@ -171,10 +166,7 @@ def scaled(
 
 
 def resized(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
-    """Scale what is selected so that its bounding box is so many metres wide and high.
-
-    None keeps the proportions by the other. The lower left corner stays where it is.
-    """
+    """Scale so that the bounding box has a width and height, m (None: in proportion), lower left fixed."""
     bounds = _bounds(sketch, selection)
     now = bounds[2] - bounds[0], bounds[3] - bounds[1]
     for wanted, there, name in ((width, now[0], "width"), (height, now[1], "height")):
@@ -246,11 +238,7 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
 
 
 def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
-    """Align the selected obstacles and starts with the side of their common bounding box.
-
-    The boundary itself stays: when it is selected too, the others align with it. Of single vertices alone:
-    gives them the same x or y.
-    """
+    """Align selected obstacles and starts, or vertices, at a side of their box, or of a selected boundary."""
     if side not in SIDES:
         raise MapError(f"one of {', '.join(SIDES)} was wanted")
     words = {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
@@ -296,10 +284,7 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
 
 
 def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
-    """Turn the whole map about `a` so that the line to `b` becomes level or upright, as of a tilted scan.
-
-    Picture and density turn with it; a density that is a raster is refused.
-    """
+    """Turn map, picture and density about `a`: the line to `b` becomes level or upright."""
     if math.dist(a, b) < SMALLEST:
         raise MapError("two points that are apart were wanted")
     degrees = angle_to_level(a, b)

@@ -59,10 +59,7 @@ def put(sketch: Sketch, places: Mapping[Vertex, Point]) -> Change:
 
 
 def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
-    """Return the sketch with vertices at other places.
-
-    Where a circle's centre is among them it moves as a whole; else the first of its rim gives the radius.
-    """
+    """Return the sketch with vertices elsewhere; a circle's centre moves it, its rim gives the radius."""
     by_owner: dict[Owner, dict[Vertex, Point]] = defaultdict(dict)
     for vertex, place in places.items():
         place_of(sketch, vertex)
@@ -111,10 +108,7 @@ def inserted(sketch: Sketch, edge: Edge) -> Change:
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
-    """Delete the selected vertices; a ring that has too few left goes, and with it a hole or the obstacle.
-
-    The boundary keeps at least three.
-    """
+    """Delete the selected vertices, and with too few left the hole or obstacle; the boundary keeps three."""
     if not selection.vertices:
         raise MapError("select vertices first")
     after = sketch
@@ -302,10 +296,7 @@ def split(sketch: Sketch, vertex: Vertex) -> Change:
 
 
 def joined(sketch: Sketch, selection: Selection) -> Change:
-    """Join the selected walls into one where their ends meet, or are nearest to each other.
-
-    It is as wide as the lowest, and takes its place, and its name and note or else the next one's.
-    """
+    """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
     items = [item for item in sketch.obstacles if item.key in selection.items]
     shapes = [item.shape for item in items if isinstance(item.shape, WallObstacle)]
     if len(shapes) < 2 or len(shapes) < len(items):

@@ -1,7 +1,6 @@
 """What the editor keeps in a map's free keys: notes, groups, locks, and the picture underneath.
 
-An entry tells of its obstacle by its place in the list and by its name, so that it finds it again when
-somebody has edited the file by hand. What others keep under the same key stays untouched.
+An entry names its obstacle by place and name, which survives edits by hand; what others keep there stays.
 """
 
 from __future__ import annotations
@@ -27,10 +26,7 @@ def annotated(
     names: Sequence[str | None],
     background: Background | None,
 ) -> dict[str, Any]:
-    """Return the free keys of a map, `extra`, together with the editor's.
-
-    Marks, as `MARKS`, come by the place of each obstacle, and the names of all obstacles in their order.
-    """
+    """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():
         entries = []

@@ -18,10 +18,7 @@ MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
 
 @dataclass(frozen=True)
 class Background:
-    """A picture that lies under the map.
-
-    Pixels count from the picture's upper left corner, x to the right and y down, as pictures have them.
-    """
+    """A picture under the map; its pixels count from the upper left corner, y down, as pictures have them."""
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
 

@@ -1,8 +1,6 @@
 """Typed coordinates, lengths and angles: ``3.2 1.5``, ``+0.5 0``, ``120cm``, ``@2<45``.
 
-A comma between two digits is a decimal comma, so numbers stand apart by blanks or semicolons; a comma with
-a blank on a side of it parts numbers too, and so does one among numbers with decimal points, as in
-``3.2,1.5``. What means nothing is a MapError of one sentence: what was typed, and what can be.
+A comma between digits is a decimal comma, except beside a blank and among decimal points (``3.2,1.5``).
 """
 
 from __future__ import annotations

@@ -24,9 +24,7 @@ _LOOKED_AGAIN = 1.0  # seconds between two looks at the file
 class Document:
     """A sketch with its history, its file, and the autosave that survives whatever happens.
 
-    It is kept aside in a folder below `drafts`, None for nowhere, or in the folder of an autosave that is
-    `resumed`. What never had a file has no `path`, but perhaps the `stem` of a name for one; of what is not
-    `saved`, something would be lost.
+    Kept aside below `drafts` (None: nowhere) or in the `resumed` folder; `stem` names what has no `path` yet.
     """
 
     def __init__(
@@ -102,11 +100,7 @@ class Document:
         return False
 
     def save(self, path: Path, *, over: bool = False) -> str:
-        """Write the file; return what to tell. ChangedError when something would be lost, unless `over`.
-
-        A map that nobody has named is called like its file, at each of its steps: what was undone can be
-        redone after saving.
-        """
+        """Write the file, which names an unnamed map; ChangedError, unless `over`, if it has changed."""
         path = _with_suffix(path)
         if is_bundled(path):
             raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")

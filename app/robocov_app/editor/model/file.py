@@ -39,11 +39,9 @@ def opened(path: Path) -> tuple[Sketch, OnDisk]:
 
 
 def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
-    """Write a sketch to a file, whole or not at all; drafts too.
+    """Write a sketch to a file, whole or not at all; through a link, the file that it points to.
 
-    Through a link, the file that it points to is replaced, not the link; who may read it stays as it was.
-    ChangedError when the file is not as it was `before`, or there is one of which nothing is known, unless
-    `over`.
+    ChangedError, unless `over`, when the file is not as it was `before`, or was not known of.
     """
     path = path.absolute()
     text = sketch_text(sketch).encode()
@@ -56,10 +54,7 @@ def saved(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: boo
 
 
 def state_of(before: OnDisk) -> State:
-    """Return whether a file is still as it was; to be asked every second or so.
-
-    A file that was merely touched, or written again with the same content, is the same.
-    """
+    """Return whether a file is still as it was, quickly; one that was merely touched is the same."""
     stamp = _stamp(before.path)
     if stamp is None:
         return "gone"

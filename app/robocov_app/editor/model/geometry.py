@@ -100,11 +100,9 @@ def angle_to_level(a: Point, b: Point) -> float:
 
 
 def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Return the polygons of a valid geometry, the largest first, with their holes.
+    """Return the polygons of a valid geometry, the largest first, snapped to tenths of a millimetre.
 
-    Vertices come to lie on a grid of a tenth of a millimetre by shapely's snap rounding, so that no outline
-    crosses itself afterwards; vertices in line with their neighbours go, and so do parts and holes
-    smaller than a millimetre either way.
+    Vertices in line with their neighbours go, and so do parts and holes smaller than a millimetre either way.
     """
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]

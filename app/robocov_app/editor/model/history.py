@@ -29,10 +29,9 @@ class History:
         self._broken = False
 
     def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
-        """Take a change; return whether it changed anything. What had been undone cannot be redone then.
+        """Take a change; return whether it changed anything.
 
-        Changes one after another with the same `drag` become one, such as those of one drag, of keys
-        pressed quickly, or of a field that is typed in. One that leads back to where they began is none.
+        Changes one after another with the same `drag` become one, as of one drag or one typed field.
         """
         before, selected = self.sketch, self.selection
         last = self._done[-1] if self._done else None

@@ -19,8 +19,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
     """Return all that a click could mean within `reach` metres, what it means first.
 
-    A start's places, centre or rim come first, then the topmost obstacle that covers the point, a start's
-    disc, the nearest obstacle, and the line of the boundary.
+    Places, centres and rims of starts, covering obstacles from the top, discs, near obstacles, the boundary.
     """
     found: list[Owner] = []
     discs: list[Owner] = []
@@ -67,10 +66,7 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
 
 
 def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
-    """Return all that lies in the box with two opposite corners, m; with `touched` also what only touches it.
-
-    The boundary counts when it lies in the box as a whole.
-    """
+    """Return all that lies in a box, `touched`: or only touches it; the boundary counts only as a whole."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     box = shapely.box(*low, *high)
     if touched:

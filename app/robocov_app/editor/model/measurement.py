@@ -1,7 +1,4 @@
-"""What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass.
-
-Takes longer than a frame: a window asks a `measurement_worker`, which has a process of its own.
-"""
+"""What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass."""
 
 from __future__ import annotations
 
@@ -44,10 +41,7 @@ class Measurement:
 
 
 def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
-    """Measure a sketch for robots of a radius, m.
-
-    One that has no boundary, or a broken one, has as much free space as can be made out.
-    """
+    """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
     found, free = examined(sketch, radius)
     narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
     gap = narrow[0] if narrow else narrowest_gap(free)
@@ -72,12 +66,9 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
 def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[BaseGeometry, ...], MultiPolygon]:
     """Return what a robot sweeps from anywhere in each part that it can drive in, and what it never touches.
 
-    Its centre can be where the free space is eroded by its radius; grown back by the radius, each connected
-    part of that is what it sweeps (their union is the free space's opening by a disc). What is left of the
-    free space are long passages and niches that are too narrow, and crumbs in corners, which are left out:
-    they touch the rest in one arc, and no point of them is farther from it than the radius. Curves are
-    polygons of 64 sides, so that this is right to about a hundredth of the radius. Returns: `swept`: the
-    largest first. `untouched`.
+    Swept parts, the largest first, are the connected pieces of the free space's opening by the robot's disc.
+    Never touched are passages and niches too narrow for it, but no crumbs in corners, which touch the rest in
+    one arc and lie within the radius of it. Right to about a hundredth of the radius.
     """
     centres = [part for part in _polygons(free.buffer(_EXACTLY - radius)) if part.area > 0.0]
     swept = [part.buffer(radius) & free for part in centres]

@@ -1,13 +1,13 @@
 """Sketches read from documents: what a map may not be is kept, what is no map at all is refused.
 
-Sizes may be 0 or less, rings may have few points or none, names may be empty: such a draft can be edited, and
-says itself what is wrong with it.
+Sizes may be 0 or less, rings short or empty, names empty: such a draft can be edited, and tells its faults.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
@@ -20,8 +20,8 @@ from robocov.environment import (
     Point,
     PointsStart,
     PolygonObstacle,
+    Repeat,
     Ring,
-    StartSpec,
     UniformStart,
     WallObstacle,
 )
@@ -32,17 +32,16 @@ from robocov.mapfile.models import FORMAT, VERSION
 from robocov_app.editor.model.annotations import taken_apart
 from robocov_app.editor.model.sketch import Item, Sketch
 
-_MAP = ("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts")
-_KEYS = {
-    "map": (*_MAP, "density", "extra"),
-    "polygon": ("kind", "name", "vertices", "holes", "path"),
-    "circle": ("kind", "name", "center", "radius", "path"),
-    "wall": ("kind", "name", "points", "width", "path"),
-    "path": ("points", "speed", "repeat"),
-    "disc": ("kind", "center", "radius"),
-    "points": ("kind", "positions"),
-    "uniform": ("kind",),
-}
+_MAP = (
+    *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
+    *("density", "extra"),
+)
+_OBSTACLES = {"polygon": PolygonObstacle, "circle": CircleObstacle, "wall": WallObstacle}
+_STARTS = {"disc": DiscStart, "uniform": UniformStart, "points": PointsStart}
+_READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
+_READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
+_READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
+"""Which method reads each key."""
 
 _UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 """What a raster of a map without a boundary covers, m, unless it says so itself."""
@@ -62,30 +61,32 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
 def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
     """Return the sketch in a parsed map document; what breaks the rules of maps is kept as it is.
 
-    A density is read as strictly as in a map; `folder` holds its picture. MapError, with the place, where it
-    is not made as maps are: another version, an unknown key or kind, something that is not a number.
+    MapError, with the place, where it is not made as maps are. `folder` holds the picture of a density.
     """
     where = one_line(where)
     require_json(document, where)
     check_header(document, where, FORMAT, VERSION)
     reader = _Reader(where)
-    members = reader.members(document, (), _KEYS["map"])
+    members = reader.members(document, (), _MAP)
     obstacles = reader.items(members.get("obstacles", []), ("obstacles",), "obstacles")
-    shapes = [reader.obstacle(value, ("obstacles", k)) for k, value in enumerate(obstacles)]
+    shapes: list[Obstacle] = [
+        reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)
+    ]
     starts = reader.object(members.get("starts", {}), ("starts",))
     extra = reader.object(members.get("extra", {}), ("extra",))
     marks, background, others = taken_apart(extra, [shape.name for shape in shapes])
-    boundary = reader.optional(reader.ring, members, (), "boundary")
+    boundary, schema = members.get("boundary"), members.get("$schema")
+    boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
     density = members.get("density")
     return Sketch(
         name=reader.text(members.get("name", ""), ("name",)),
         description=reader.text(members.get("description", ""), ("description",)),
         boundary=boundary,
         obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
-        starts=tuple((name, reader.start(value, ("starts", name))) for name, value in starts.items()),
+        starts=tuple((name, reader.either(_STARTS, spec, ("starts", name))) for name, spec in starts.items()),
         background=background,
         extra=others,
-        schema=reader.optional(reader.text, members, (), "$schema"),
+        schema=None if schema is None else reader.text(schema, ("$schema",)),
         density=None if density is None else density_of(density, boundary or _UNBOUNDED, where, folder),
     )
 
@@ -140,58 +141,38 @@ class _Reader:
         points = self.items(value, path, "points [x, y]")
         return tuple([self.point(point, (*path, k)) for k, point in enumerate(points)])
 
-    def obstacle(self, value: Any, path: JsonPath) -> Obstacle:
-        kind, members = self._kind(value, path, ("polygon", "circle", "wall"))
-        name = self.optional(self.text, members, path, "name")
-        way = self.optional(self.way, members, path, "path")
-        if kind == "polygon":
-            holes = self.items(members.get("holes", []), (*path, "holes"), "rings")
-            rings = tuple(self.ring(hole, (*path, "holes", k)) for k, hole in enumerate(holes))
-            return PolygonObstacle(self.wanted(self.ring, members, path, "vertices"), rings, name, way)
-        if kind == "circle":
-            center = self.wanted(self.point, members, path, "center")
-            return CircleObstacle(center, self.wanted(self.number, members, path, "radius"), name, way)
-        points = self.wanted(self.ring, members, path, "points")
-        return WallObstacle(points, self.wanted(self.number, members, path, "width"), name, way)
+    def rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
+        return tuple([self.ring(ring, (*path, k)) for k, ring in enumerate(self.items(value, path, "rings"))])
+
+    def repeat(self, value: Any, path: JsonPath) -> Repeat:
+        if value not in REPEATS:
+            self.refuse(path, f"{shown_json(value)}, but one of {', '.join(REPEATS)} was wanted")
+        found: Repeat = value
+        return found
 
     def way(self, value: Any, path: JsonPath) -> ObstaclePath:
-        members = self.members(value, path, _KEYS["path"])
-        repeat = members.get("repeat", "loop")
-        if repeat not in REPEATS:
-            what = f"{shown_json(repeat)}, but one of {', '.join(REPEATS)} was wanted"
-            self.refuse((*path, "repeat"), what)
-        points = self.wanted(self.ring, members, path, "points")
-        return ObstaclePath(points, self.wanted(self.number, members, path, "speed"), repeat)
+        return self.built(ObstaclePath, value, path)
 
-    def start(self, value: Any, path: JsonPath) -> StartSpec:
-        kind, members = self._kind(value, path, ("disc", "uniform", "points"))
-        if kind == "disc":
-            center = self.wanted(self.point, members, path, "center")
-            return DiscStart(center, self.wanted(self.number, members, path, "radius"))
-        if kind == "points":
-            return PointsStart(self.wanted(self.ring, members, path, "positions"))
-        return UniformStart()
-
-    def _kind(self, value: Any, path: JsonPath, kinds: tuple[str, ...]) -> tuple[str, Mapping[str, Any]]:
-        """Return the kind of an object, and its members."""
-        wanted = f"one of {', '.join(kinds)}"
+    def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
+        """Return what an object says, of the class of its kind."""
+        wanted = f"one of {', '.join(classes)}"
         if not isinstance(value, dict):
             self.refuse(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
-        kind = self.wanted(lambda kind, path: kind, value, path, "kind")
-        if kind not in kinds:
+        if "kind" not in value:
+            self.refuse((*path, "kind"), "missing, but it was wanted")
+        kind = value["kind"]
+        if kind not in tuple(classes):
             self.refuse((*path, "kind"), f"{shown_json(kind)}, but {wanted} was wanted")
-        return kind, self.members(value, path, _KEYS[kind])
+        return self.built(classes[kind], value, path, "kind")
 
-    def wanted(
-        self, read: Callable[[Any, JsonPath], _Read], members: Mapping[str, Any], path: JsonPath, key: str
-    ) -> _Read:
-        """Return a member that must be there, as `read` returns it."""
-        if key not in members:
-            self.refuse((*path, key), "missing, but it was wanted")
-        return read(members[key], (*path, key))
-
-    def optional(
-        self, read: Callable[[Any, JsonPath], _Read], members: Mapping[str, Any], path: JsonPath, key: str
-    ) -> _Read | None:
-        """Return a member that may be missing or null."""
-        return None if members.get(key) is None else read(members[key], (*path, key))
+    def built(self, of: type[_Read], value: Any, path: JsonPath, *more: str) -> _Read:
+        """Return an object of a dataclass whose fields are the keys; what may be None may also be null."""
+        known: tuple[Field[Any], ...] = fields(of)  # type: ignore[arg-type]
+        members = self.members(value, path, (*more, *(field.name for field in known)))
+        found = {}
+        for key, default in ((field.name, field.default) for field in known):
+            if key in members and not (members[key] is None and default is None):
+                found[key] = getattr(self, _READ_AS[key])(members[key], (*path, key))
+            elif default is MISSING:
+                self.refuse((*path, key), "missing, but it was wanted")
+        return of(**found)

@@ -115,10 +115,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Change:
-    """What an edit makes: the sketch after it, what is selected then, and what people call it.
-
-    The words are in the past, as the status line says it and undo lists it: "3 obstacles moved".
-    """
+    """What an edit makes; the words are in the past, as status line and undo say it: "3 obstacles moved"."""
 
     sketch: Sketch
     selection: Selection

@@ -1,8 +1,4 @@
-"""A map in the making, valid or not.
-
-A sketch is a value: every edit makes another one, and what did not change is shared, so that remembering all
-of them costs little.
-"""
+"""A map in the making, valid or not: a value; every edit makes another, which shares what did not change."""
 
 from __future__ import annotations
 
@@ -178,10 +174,7 @@ class Sketch:
 
     @property
     def bounds(self) -> tuple[float, float, float, float] | None:
-        """Smallest x, smallest y, largest x, largest y of boundary, obstacles, starts and picture, m.
-
-        None where there is nothing.
-        """
+        """Smallest x, y and largest x, y of all that there is, m, with a shown picture; None of nothing."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
@@ -201,11 +194,7 @@ class Sketch:
 
 
 def draft_document(sketch: Sketch) -> dict[str, Any]:
-    """Return the map document of a sketch, whether it can be simulated or not.
-
-    `parser.sketch_of` turns it into an equal sketch, keys aside. Of a sketch that breaks no rule it is the
-    document of its map; what the editor keeps about obstacles, and the picture, are under ``extra``.
-    """
+    """Return the map document of a sketch, valid or not; `parser.sketch_of` reads it back, keys aside."""
     document = to_json(sketch.unchecked())
     if sketch.boundary is None:
         del document["boundary"]
@@ -224,10 +213,7 @@ def kind_and_name(shape: Obstacle) -> str:
 
 
 def geometry_of(shape: Obstacle) -> BaseGeometry:
-    """Return what an obstacle covers as a valid geometry, whatever the obstacle is like.
-
-    What is too large for a map, or too far away, covers nothing: computing with it may take for ever.
-    """
+    """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
     if isinstance(shape, CircleObstacle):
         if not _is_near([shape.center]):
             return GeometryCollection()

@@ -1,8 +1,6 @@
 """What is wrong with a sketch, where, in words: for maps, and for drafts that are far from being one.
 
-The rules are those of `robocov.mapfile.models` and `robocov.mapfile.check`, which know of places in files and
-stop where it makes no sense to go on; here every fault has its place on the map, and the rest is still looked
-at.
+The rules are those of `robocov.mapfile`; here every fault has its place on the map, and all are found.
 """
 
 from __future__ import annotations
@@ -76,11 +74,7 @@ class _Fault(NamedTuple):
 
 
 def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Return all that is wrong, the grave first, and the free space as far as there is one.
-
-    The radius is that of the robots, m, for the warnings. There is a grave problem exactly when
-    ``sketch.environment()`` raises.
-    """
+    """Return all that is wrong, the grave first, and the free space; grave is what no map may have."""
     found = [*_map_faults(sketch), *_part_faults(sketch)]
     if found:
         free = _rough_free(sketch)
@@ -279,10 +273,7 @@ def _drawn(points: Array) -> BaseGeometry | None:
 
 
 def _meetings(points: Array, polygon: Polygon) -> list[Point]:
-    """Return where an outline meets itself, from the left to the right.
-
-    Cut where its edges meet, it has ends there that not just two edges share.
-    """
+    """Return where an outline meets itself, left to right: ends of its noded pieces that not two share."""
     ring = LineString(np.concatenate([points, points[:1]]))
     pieces = shapely.get_parts(shapely.unary_union(ring))
     ends = np.concatenate([np.asarray(piece.coords)[[0, -1]] for piece in pieces])

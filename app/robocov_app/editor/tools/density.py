@@ -48,7 +48,6 @@ class DensityTool(Tool):
 
     @property
     def busy(self) -> bool:
-        """Whether something is dragged, or chosen: then digits are for it."""
         return self._from is not None or self.chosen is not None
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
@@ -80,7 +79,6 @@ class DensityTool(Tool):
         self.press(context, event)
 
     def finish(self, context: ToolContext) -> bool:
-        """Choose nothing any more."""
         had, self.chosen = self.chosen is not None, None
         return had
 
@@ -93,13 +91,11 @@ class DensityTool(Tool):
         return True
 
     def cancel(self, context: ToolContext) -> bool:
-        """Give up what is dragged, then choose nothing."""
         had = self.busy
         self._from = self.change = self.chosen = None
         return had
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Give the chosen feature, or the next one, another weight."""
         weight = weight_of(text)
         if self.chosen is not None:
             context.change(weighed(context.sketch, self.chosen, weight))
@@ -123,7 +119,6 @@ class DensityTool(Tool):
         return Preview(words=words, rings=tuple(map(_outline, features)), dots=dots, chosen=self.chosen)
 
     def shape_of_cursor(self, context: ToolContext) -> str:
-        """A move where something can be taken hold of."""
         return "move" if self._taken is not None and self._from is not None else "cross"
 
     def _wanted(self, context: ToolContext, to: Point) -> Change | None:

@@ -50,12 +50,10 @@ class MotionPathTool(Tool):
 
     @property
     def busy(self) -> bool:
-        """Whether an obstacle is led: then digits are its speed."""
         return self._leads
 
     @property
     def origin(self) -> Point | None:
-        """The way point that the next one comes after."""
         return self._last
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
@@ -85,11 +83,9 @@ class MotionPathTool(Tool):
         self._note(context)
 
     def twice(self, context: ToolContext, event: PointerEvent) -> None:
-        """Finish: the first of the two clicks has added the last way point."""
         self.finish(context)
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
-        """Drag a way point."""
         self._at = event.point
         self._note(context)
         subject, path = _led(context)
@@ -103,7 +99,6 @@ class MotionPathTool(Tool):
             self.change = way_point_moved(context.sketch, subject, self._held, to)
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
-        """Leave a way point where it was dragged to."""
         change, self._held, self.change = self.change, None, None
         if change is not None and not clicked:
             context.change(change)
@@ -136,7 +131,6 @@ class MotionPathTool(Tool):
         return had
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Give the obstacle, or the next path, another speed."""
         speed = speed_of(text)
         subject, path = _led(context)
         if subject is not None and path is not None:
@@ -144,7 +138,6 @@ class MotionPathTool(Tool):
         self.speed = speed
 
     def preview(self, context: ToolContext) -> Preview | None:
-        """Show the way points, and what the dragged or the next leg is like."""
         subject, path = _led(context)
         if subject is None:
             return None
@@ -158,7 +151,6 @@ class MotionPathTool(Tool):
         return Preview(words=words, dots=path.points, chosen=self.chosen)
 
     def shape_of_cursor(self, context: ToolContext) -> str:
-        """A move where a way point can be taken hold of."""
         path = _led(context)[1]
         over = path is not None and way_point_at(path, self._at, 8.0 * context.pixel) is not None
         return "move" if over or self._held is not None else "cross"

@@ -30,7 +30,6 @@ class ReferenceImageTool(Tool):
 
     @property
     def busy(self) -> bool:
-        """Whether a point was clicked."""
         return bool(self._points)
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:

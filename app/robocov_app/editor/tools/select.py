@@ -58,7 +58,6 @@ class Drag:
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self) -> Preview:
-        """Return what to show beside the change."""
         return Preview(words=self.words)
 
     def ended(self, context: ToolContext) -> None:
@@ -173,7 +172,6 @@ class MovingVertices(Drag):
             self.words += f"   {bearing_words(self._origin, to)}"
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Put the vertex where it was typed: a length from the one before, or coordinates."""
         self._put(context, next_point_of(text, self._origin or self._begun, self._at))
 
 
@@ -213,7 +211,6 @@ class Turning(Drag):
         self.change = turned
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Turn by so many degrees."""
         self._turn(context, angle_of(text))
 
 
@@ -435,7 +432,6 @@ class SelectTool(Tool):
         context.change(vertices.inserted(context.sketch, edge))
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """End the drag with what was typed."""
         drag = self.drag
         if drag is None:
             super().enter(context, text)
@@ -457,7 +453,6 @@ class SelectTool(Tool):
         return self.drag.preview() if self.drag is not None else None
 
     def shape_of_cursor(self, context: ToolContext) -> str:
-        """Tell by the cursor what a press would do."""
         handle = self._handle if self.drag is not None else self.near
         if isinstance(self.drag, Moving):
             return "move"

@@ -24,11 +24,7 @@ _MOST_EDGES = 8  # edges near a point that are looked at: more can only be where
 
 
 class Targets:
-    """The vertices and edges of a sketch, to snap to: made once at the begin of a drag.
-
-    Of a wall, its middle line and its outline; of a circle, its centre, its rim and the four ends of that.
-    What is dragged is left out, of a vertex itself and its edges; `more` points are those drawn so far.
-    """
+    """What to snap to, with `more` points, without what is dragged; outlines of walls and circles too."""
 
     def __init__(
         self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
@@ -106,10 +102,7 @@ class Targets:
         return starts[order], ends[order]
 
     def in_line(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
-        """Return the mark whose coordinate on an axis is nearest to the point's, within `reach` metres.
-
-        Only marks within `horizon` metres count; of several in line, the one that is nearest to the point.
-        """
+        """Return the mark within the horizon that is nearest along an axis, within `reach` m, then at all."""
         marks = self._sorted[axis]
         first, last = np.searchsorted(marks[:, axis], (point[axis] - reach, point[axis] + reach))
         some = marks[first:last]

@@ -1,7 +1,4 @@
-"""Where the cursor means: on the grid, at vertices, on edges, at angles, in line with other vertices.
-
-A snap never moves a point farther than its reach.
-"""
+"""Where the cursor means: grid, vertices, edges, angles, in line with others; never beyond its reach."""
 
 from __future__ import annotations
 
@@ -113,18 +110,13 @@ class _Line:
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
     """Return where a point snaps to; angles count from the `origin`, where the line that is drawn comes from.
 
-    Vertices, centres, crossings and middles come before lines, two lines (where they cross) before one, and
-    lines before the grid; along a line, the grid counts too.
+    Points come before lines, two lines (where they cross) before one, lines before the grid.
     """
     return _ranked(point, targets, snapping, origin)[1]
 
 
 def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets, snapping: Snapping) -> Snap:
-    """Return by how much what has these points is to be moved, near (dx, dy) m: its `point` is (dx, dy).
-
-    The point that is nearest to something counts, and for the grid the first. Of very many points, the ones
-    farthest out are looked at. The guides are where the points come to lie.
-    """
+    """Return as `point` the move near (dx, dy) m that snaps the nearest of some points."""
     best: tuple[tuple[int, float], Snap] | None = None
     # what many points meet somewhere means little of one of them
     telling = snapping.to - {"grid", "angle", "middle", "crossing"}
