@@ -82,9 +82,8 @@ class Question(Dialog):
         ui.words(self.title, size=16, bold=True)
         ui.space(6)
         size = ui.px(TEXT + 1)
-        lines = [
-            line for part in self.words.split("\n") for line in wrapped(part, size, ui.px(ui.wide)) or [""]
-        ]
+        wide = ui.px(ui.wide)
+        lines = [line for part in self.words.split("\n") for line in wrapped(part, size, wide) or [""]]
         for line in lines[:_MOST_LINES]:
             ui.words(line, size=TEXT + 1)
         if len(lines) > _MOST_LINES:
@@ -227,10 +226,8 @@ def list_choice(
     """Return a choice of one of some lines: those that hold all words typed."""
 
     def found(typed: str) -> list[Option]:
-        words, lines = (
-            typed.lower().split(),
-            [(each, f"{each.text} {each.aside}".lower()) for each in options()],
-        )
+        words = typed.lower().split()
+        lines = [(each, f"{each.text} {each.aside}".lower()) for each in options()]
         return [each for each, line in lines if all(word in line for word in words)]
 
     def chosen(typed: str, option: Option | None) -> None:

@@ -110,9 +110,8 @@ class BaseWindow(ABC):
         """Fill the screen, or be a window again."""
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
         windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
-        self.screen = (
-            open_window(windowed) if windowed else pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
-        )
+        full = pygame.FULLSCREEN
+        self.screen = open_window(windowed) if windowed else pygame.display.set_mode((0, 0), full)
 
     def save_screenshot(self, folder: Path) -> str:
         """Save what is in the window as a PNG in a folder; return words for it."""

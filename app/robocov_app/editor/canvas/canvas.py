@@ -262,17 +262,15 @@ class EditorCanvas:
             overlay.draw_path(canvas, path, colour)
             if since is not None and goes(path):
                 shift = path.shift(self.editor.now - since)
-                overlay.draw_ghost(
-                    canvas, shapely.transform(item.geometry, lambda places, by=shift: places + by)
-                )
+                moved = shapely.transform(item.geometry, lambda places, by=shift: places + by)
+                overlay.draw_ghost(canvas, moved)
 
     def _draw_team(self, canvas: Canvas, team: Team) -> None:
         theme, scale = canvas.theme, canvas.scale
         places = canvas.camera.to_pixels(np.array(team.places))
         true = np.full(len(places), team.radius * canvas.camera.zoom)
-        radii = np.minimum(
-            fitted_radii(places, true, 2.4 * scale, min(READABLE * scale, 400.0)), true.clip(3.0)
-        )
+        fitted = fitted_radii(places, true, 2.4 * scale, min(READABLE * scale, 400.0))
+        radii = np.minimum(fitted, true.clip(3.0))
         edge = mix(theme.background, theme.ink, 0.55)
         for k, (at, radius) in enumerate(zip(places.tolist(), radii.tolist(), strict=True)):
             fill, number = theme.robots[k % len(theme.robots)], str(k + 1)

@@ -302,9 +302,8 @@ def hatched(view: View, measurement: Measurement) -> tuple[pygame.Surface, pygam
     parts = [(_polygons(area), colour, strength) for area, colour, strength in areas if _polygons(area)]
     if not parts:
         return None
-    low_x, low_y, high_x, high_y = shapely.total_bounds(
-        [each for polygons, _, _ in parts for each in polygons]
-    )
+    every = [each for polygons, _, _ in parts for each in polygons]
+    low_x, low_y, high_x, high_y = shapely.total_bounds(every)
     ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     (left, top), (right, bottom) = bounded(ends).tolist()
     box = pygame.Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
@@ -327,9 +326,8 @@ def hatched(view: View, measurement: Measurement) -> tuple[pygame.Surface, pygam
 
 
 def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
-    return [
-        each for each in shapely.get_parts(area) if isinstance(each, shapely.Polygon) and not each.is_empty
-    ]
+    parts = shapely.get_parts(area)
+    return [each for each in parts if isinstance(each, shapely.Polygon) and not each.is_empty]
 
 
 def sealed_colour(theme: Theme) -> Colour:
@@ -340,10 +338,8 @@ def sealed_colour(theme: Theme) -> Colour:
 def _stencil(canvas: Canvas, area: shapely.Polygon, corner: tuple[int, int]) -> None:
     """Paint an area white, its holes clear; what is thinner than a pixel as a line."""
     white = (255, 255, 255, 255)
-    ring, *holes = (
-        canvas.camera.to_pixels(np.asarray(each.coords)[:-1]) - np.array(corner, dtype=float)
-        for each in (area.exterior, *area.interiors)
-    )
+    rings = [np.asarray(each.coords)[:-1] for each in (area.exterior, *area.interiors)]
+    ring, *holes = (canvas.camera.to_pixels(each) - np.array(corner, dtype=float) for each in rings)
     canvas.polygon(ring, white)
     for hole in holes:
         canvas.polygon(hole, (0, 0, 0, 0))

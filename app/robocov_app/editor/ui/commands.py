@@ -557,13 +557,12 @@ def editor_commands(editor: Editor, of_window: Mapping[str, Callable[[], object]
     for tool, key in zip(editor.tools.values(), _TOOL_KEYS, strict=True):
         choose, title = partial(editor.choose, tool.name), f"{tool.title}: {tool.hint}"
         found.append(Command(f"tool:{tool.name}", title, "Tools", choose, (key,)))
-    snaps = [
-        ("snap", name, f"Snap to {title.lower()}", "Snap", str(k))
-        for k, (name, (title, _)) in enumerate(SNAPS.items(), 1)
-    ]
-    shows = [("show", *shown, "View", key) for shown, key in zip(SHOWN.items(), _SHOWN_KEYS, strict=True)]
-    for kind, name, title, group, key in snaps + shows:
-        found.append(Command(f"{kind}:{name}", title, group, partial(editor.switch, kind, name), (key,)))
+    titles = [(name, f"Snap to {title.lower()}") for name, (title, _) in SNAPS.items()]
+    snaps = [(*titled, str(k)) for k, titled in enumerate(titles, 1)]
+    shows = [(name, title, key) for (name, title), key in zip(SHOWN.items(), _SHOWN_KEYS, strict=True)]
+    for kind, group, switches in (("snap", "Snap", snaps), ("show", "View", shows)):
+        for name, title, key in switches:
+            found.append(Command(f"{kind}:{name}", title, group, partial(editor.switch, kind, name), (key,)))
     return found
 
 

@@ -56,10 +56,8 @@ def coordinate(text: str, now: float) -> float:
 def _selected_things(editor: Editor) -> list[Any]:
     """Return the shapes and starts that are selected, as they are shown."""
     sketch, selection = editor.preview
-    keys = [key for key in selection.items if key in sketch.places]
-    return [sketch.item(key).shape for key in keys] + [
-        spec for name, spec in sketch.starts if name in selection.starts
-    ]
+    shapes = [sketch.item(key).shape for key in selection.items if key in sketch.places]
+    return [*shapes, *(spec for name, spec in sketch.starts if name in selection.starts)]
 
 
 def _corner(editor: Editor) -> Point:

@@ -75,9 +75,8 @@ class ImportDialog(Dialog):
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
         """Return what is set."""
-        values = {
-            each.name: each.value(self.given[each.name]) for each in self.options if each.name in self.given
-        }
+        given = self.given
+        values = {each.name: each.value(given[each.name]) for each in self.options if each.name in given}
         of_reading = {field.name for field in fields(ReadOptions)}
         read = {name: value for name, value in values.items() if name in of_reading}
         return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
@@ -277,11 +276,9 @@ def _maps(
     """Return a picture, else transparent, of the map as it was read and as it became."""
     compared = imported.comparison
     picture = pygame.Surface(size, pygame.SRCALPHA)
-    ways = (
-        (compared.before, compared.lost, theme.trajectory),
-        (compared.after, compared.opened, theme.start),
-    )
-    for camera, (free, marked, colour) in zip(cameras, ways, strict=True):
+    before = (compared.before, compared.lost, theme.trajectory)
+    after = (compared.after, compared.opened, theme.start)
+    for camera, (free, marked, colour) in zip(cameras, (before, after), strict=True):
         _fill(picture, camera, compared.region, theme.obstacle, theme.obstacle)
         _fill(picture, camera, free, theme.background, theme.obstacle)
         for ring in shapely.get_rings(shapely.get_parts(free)):

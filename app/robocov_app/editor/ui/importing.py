@@ -50,12 +50,8 @@ class Option:
 
 def options_of(importer: Importer) -> tuple[Option, ...]:
     """Return the options that mean something for a format, those of reading first."""
-    return tuple(
-        option
-        for settings in (ReadOptions, Shaping)
-        for option in _options(settings)
-        if settings is Shaping or option.name in importer.options
-    )
+    reading = [option for option in _options(ReadOptions) if option.name in importer.options]
+    return (*reading, *_options(Shaping))
 
 
 def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:

@@ -30,13 +30,13 @@ class PlayPresenter(Presenter):
     elsewhere = False  # whether another map was opened meanwhile
 
     def __init__(self, session: Session, costs: Costs, shown: set[str], folder: Path, title: str) -> None:
-        self._tried, self._title = session.environment, title
+        self.tried, self._title = session.environment, title
         super().__init__(session, costs, shown, folder, title, controller_kinds())
 
     def open_map(self, name: str) -> None:
         """Begin anew on another map, or on the one that is tried."""
         if name == self._title:
-            self.session.restart(environment=self._tried)
+            self.session.restart(environment=self.tried)
             self.map_name = name
         else:
             super().open_map(name)

@@ -32,12 +32,14 @@ SHOWN: dict[str, str] = {
 }
 """What can be shown, or not, with its title."""
 
+# settings that are as an attribute of the editor, with its name
 ATTRIBUTES = {
-    **{name: name for name in ("grid", "radius", "robots")},
+    "grid": "grid",
     "angle": "snap_angle",
+    "radius": "radius",
+    "robots": "robots",
     "wall": "wall_width",
 }
-"""Settings that are as an attribute of the editor, with its name."""
 
 MOST_RECENT = 10
 

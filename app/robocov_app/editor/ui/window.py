@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pygame
 
-from robocov.environment import Environment
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
@@ -66,7 +65,6 @@ class EditorWindow(BaseWindow):
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
-        self._tried: Environment | None = None
         self._caption = ""
         self._arrange()
         self.canvas.fit()
@@ -253,7 +251,6 @@ class EditorWindow(BaseWindow):
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
             self.editor.selector.cancel(self.editor)
         trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
-        self._tried = trial.viewer.session.environment
         trial.windowed = self.windowed
         self.trial = trial
 
@@ -270,9 +267,9 @@ class EditorWindow(BaseWindow):
         self.windowed = trial.windowed
         editor = self.editor
         editor.theme = trial.viewer.theme
-        assert self._tried is not None
-        change = brought_back(editor.sketch, self._tried, trial.viewer.session.environment)
-        if change is not None and not trial.viewer.elsewhere:
+        viewer = trial.viewer
+        change = brought_back(editor.sketch, viewer.tried, viewer.session.environment)
+        if change is not None and not viewer.elsewhere:
             editor.change(change)
         self.commands.forget_keys()
         if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
