@@ -16,6 +16,8 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import PlotOptions
+from robocov_app.terminal.output import RIGHT, console, print_table
+from robocov_app.terminal.progress import progress, tell_of_compiling
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,8 +60,6 @@ class Arguments(PlotOptions):
 
 def command(options: Arguments) -> None:
     """Measure, then print and draw; what was measured until Ctrl-C as well."""
-    from robocov_app.terminal.progress import progress, tell_of_compiling
-
     for name in THREADS:  # read when numpy is loaded, which telling of compiling does
         os.environ.setdefault(name, "1")
     tell_of_compiling()
@@ -109,8 +109,6 @@ def machine() -> dict[str, Any]:
 
 def print_tables(rows: Sequence[Row]) -> None:
     """Print the rows for people, one table a part."""
-    from robocov_app.terminal.tables import RIGHT, console, print_table
-
     numbers = [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
     columns = [("", {}), ("", {}), *numbers, ("", {"no_wrap": True}), ("", {})]
     for part, group in groupby(rows, key=lambda row: row.part):

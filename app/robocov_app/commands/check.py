@@ -15,7 +15,7 @@ from robocov.errors import InputError, MapError, place
 from robocov.mapfile import load_map, map_file
 from robocov.mapfile.check import MapReport, check_map
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.tables import console
+from robocov_app.terminal.output import console
 from robocov_app.terminal.watch import changes
 
 _LISTED = 5  # components whose areas are told

@@ -11,6 +11,7 @@ from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED
+from robocov_app.terminal.output import BOLD, RIGHT, finite, listed, print_table
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
@@ -36,7 +37,6 @@ def command(options: Arguments) -> int:
     from robocov.mapfile import load_map
     from robocov_app.runs.artifacts import gains_for, performed, rows_of
     from robocov_app.runs.saved import folder_names
-    from robocov_app.terminal.output import finite, listed
 
     names = options.controllers
     if not names:
@@ -65,7 +65,6 @@ def command(options: Arguments) -> int:
 def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
     """Print the comparison for people."""
     from robocov_app.render.density import density_lines
-    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
     timed = all("mean_time_s" in row for row in rows)
     titles = ["mean distance", *(["mean time"] if timed else []), "above best"]

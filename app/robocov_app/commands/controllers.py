@@ -10,7 +10,7 @@ from rich.text import Text
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
 from robocov.controllers.gains import Gain, Option, value_text
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.tables import console
+from robocov_app.terminal.output import console
 
 
 @dataclass

@@ -12,6 +12,8 @@ import tyro
 from robocov.errors import ParameterError, checked
 from robocov_app.runs.options import LayerOptions, ScenarioOptions, WindowOptions, robots_of
 from robocov_app.terminal.arguments import parsed_gains, window_size
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
+from robocov_app.terminal.progress import progress
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -146,8 +148,6 @@ def rendered(opening: Launcher, options: Arguments) -> int:
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
     from robocov_app.runs.recording import save_moving_picture
-    from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-    from robocov_app.terminal.progress import progress
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.render.density import density_kind
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.tables import BOLD, print_table
+from robocov_app.terminal.output import BOLD, print_table
 
 
 @dataclass

@@ -9,6 +9,8 @@ import tyro
 
 from robocov.errors import checked
 from robocov_app.runs.options import PlotOptions
+from robocov_app.terminal.output import BOLD, RIGHT, print_table, write_csv
+from robocov_app.terminal.progress import counting, progress
 
 
 @dataclass
@@ -39,8 +41,6 @@ def command(options: Arguments) -> None:
     from robocov.record import nearest_moments
     from robocov_app.figures.metrics import Measured
     from robocov_app.runs.saved import load_saved
-    from robocov_app.terminal.output import write_csv
-    from robocov_app.terminal.progress import counting, progress
 
     measured, answers = [], []
     runs = load_saved(options.folder)
@@ -73,7 +73,6 @@ def command(options: Arguments) -> None:
 
 def print_answers(answers: list[dict[str, Any]]) -> None:
     """Print the figures of all runs for people."""
-    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
 
     def text(value: float | None, decimals: int, unit: str) -> str:
         return "–" if value is None else f"{value:.{decimals}f} {unit}"

@@ -13,7 +13,8 @@ import tyro
 
 from robocov.errors import InputError, checked, counted
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.interruption import INTERRUPTED
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
+from robocov_app.terminal.output import BOLD, RIGHT, finite, print_table
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
@@ -71,8 +72,6 @@ def command(options: Arguments) -> int:
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.terminal.output import finite
 
     plan = QUICK if options.quick else FULL
     out, quiet = options.out, options.json
@@ -137,8 +136,6 @@ def command(options: Arguments) -> int:
 
 def print_claims(claims: Sequence[Claim]) -> None:
     """Print the verdicts for people."""
-    from robocov_app.terminal.tables import BOLD, RIGHT, print_table
-
     fold, rows = {"overflow": "fold"}, []
     for claim in claims:
         measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"

@@ -12,8 +12,9 @@ import tyro
 
 from robocov.errors import InputError, ParameterError, listed
 from robocov_app.runs.options import FilmOptions, JsonOption
+from robocov_app.terminal import output
 from robocov_app.terminal.arguments import window_size
-from robocov_app.terminal.interruption import INTERRUPTED
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 
 if TYPE_CHECKING:
     from robocov_app.runs.saved import Saved
@@ -130,8 +131,6 @@ def make_film(options: Arguments, saved: list[Saved]) -> int:
     from robocov_app.runs.film import save_moving
     from robocov_app.runs.run import Run
     from robocov_app.runs.saved import roster_of
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.terminal.output import listed, write_json
 
     out = options.out
     assert out is not None
@@ -143,12 +142,12 @@ def make_film(options: Arguments, saved: list[Saved]) -> int:
     bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
     with results(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
         content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
-        write_json(result.new / "replay.json", content)
+        output.write_json(result.new / "replay.json", content)
         same = bare if len(runs) > 1 else None
         save_moving(runs, None, result.new, options.film, stop, quiet=options.json, bare=same)
     if options.json:
         print(json.dumps({"out": str(out), "interrupted": stop.requested}))
     else:
         done = "stopped; what was done is in" if stop.requested else "saved in"
-        print(f"{done} {out}/: {listed(out)}")
+        print(f"{done} {out}/: {output.listed(out)}")
     return INTERRUPTED if stop.requested else 0

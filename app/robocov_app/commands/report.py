@@ -16,6 +16,8 @@ from robocov.errors import InputError, OutputError, ParameterError, counted
 from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.progress import progress
 
 SESSION = ".robocov"
 
@@ -66,7 +68,6 @@ def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
     if path.suffix != SESSION:
         return story_folders(path)
     from robocov_app.commands import run
-    from robocov_app.terminal.interruption import Interruption
 
     words = run.Arguments(map=str(path), out=temporary / path.stem, all_branches=True, json=True)
     with Interruption() as stop:
@@ -78,7 +79,6 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     """Gather the results of folders, and write the page; words tell which part of a story one is."""
     from robocov_app.report.document import report
     from robocov_app.report.results import gathered, with_references
-    from robocov_app.terminal.progress import progress
 
     results = [replace(gathered(folder), part=words) for folder, words in parts]
     check_target(target, overwrite=options.overwrite)

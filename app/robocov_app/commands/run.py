@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
-from robocov_app.terminal.interruption import INTERRUPTED
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
+from robocov_app.terminal.output import finite, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from robocov_app.runs.run import Run
-    from robocov_app.terminal.interruption import Interruption
 
 
 @dataclass
@@ -45,7 +45,6 @@ def command(options: Arguments) -> int:
     from robocov.mapfile import load_map
     from robocov_app.runs.artifacts import performed
     from robocov_app.runs.saved import folder_names
-    from robocov_app.terminal.output import finite, listed
 
     # everything that the user gave is checked before a folder is made
     spec = options.spec(load_map(options.map), options.controller, parsed_gains(options.gains))
@@ -64,9 +63,6 @@ def command(options: Arguments) -> int:
 
 def remade(options: Arguments) -> int:
     """Make stories of a session again, and save them."""
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.terminal.output import finite, listed
-
     answers = []
     with Interruption() as stop:
         for answer in saved_stories(options, stop):
