@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme
-
-if TYPE_CHECKING:
-    pass
 
 WIDTH = 1100
 

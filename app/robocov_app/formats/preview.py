@@ -11,6 +11,7 @@ import shapely
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -47,11 +48,7 @@ def preview(
     *,
     theme: Theme | str = LIGHT,
 ) -> None:
-    """Draw an import to a file: `plot_import`, saved.
-
-    `path`: a .png, .svg or .pdf. Raises OutputError when the file cannot be written; ParameterError when its
-    suffix is another.
-    """
+    """Draw an import to a .png, .svg or .pdf: `plot_import`, saved."""
     check_figure_path(path)
     save_figure(plot_import(foreign, environment, report, theme=theme), path)
 
@@ -61,8 +58,8 @@ def plot_import(
 ) -> Figure:
     """Plot a map as it was read and as it became, at one scale, and what was done to it in words.
 
-    In the first, free space that is not in the map any more is marked, with a place in each large part of it;
-    in the second, places that were solid and are free, and the narrowest passage.
+    Marked are free space that is not in the map any more, places that were solid and are free, and the
+    narrowest passage.
     """
     theme = theme_named(theme)
     compared = compare(foreign, environment, report)
@@ -81,10 +78,14 @@ def plot_import(
         for (box, slot), (name, facts) in zip(panels, captions, strict=True):
             y = box[1] - 14 * s
             page.text(name, box[0], y, points=TITLE, bold=True)
-            page.text(
-                facts, box[0] + _indent(page, name), y, colour=theme.faint, room=slot - _indent(page, name)
-            )
-        first, second = (_arena(page, box, compared.bounds) for box, _ in panels)
+            beside = _indent(page, name)
+            page.text(facts, box[0] + beside, y, colour=theme.faint, room=slot - beside)
+        first, second = (page.axes(box) for box, _ in panels)
+        low_x, low_y, high_x, high_y = compared.bounds
+        for axes in (first, second):
+            axes.set_xlim(low_x, high_x)
+            axes.set_ylim(low_y, high_y)
+            axes.set_axis_off()
         outside = shapely.difference(compared.region, compared.before)
         _draw(first, outside, theme.obstacle, theme.obstacle_edge)
         _draw_edges(first, compared.before, theme)
@@ -95,7 +96,6 @@ def plot_import(
         _draw_gap(second, compared.gap, theme)
         right = max(box[0] + box[2] for box, _ in panels)
         bottom = max(box[1] + box[3] for box, _ in panels)
-        low_x, _, high_x, _ = compared.bounds
         page.footer(handles, left, right, bottom, panels[0][0][2] / (high_x - low_x))
         for k, line in enumerate(reversed(said)):
             y = page.size[1] - (_LINE * k + 16) * s
@@ -113,9 +113,8 @@ def _laid_out(
     """Return a page, the boxes of two arenas on it with the room above each, and the lines below."""
     page = Page((_WIDTH, _WIDTH), theme, _SCALE)
     s, (x, y, right, top) = page.scale, bounds
-    aspect, words = (right - x) / (top - y), 0.0
-    for name, facts in captions:
-        words = max(words, _indent(page, name) + page.text_width(facts))
+    aspect = (right - x) / (top - y)
+    words = max(_indent(page, name) + page.text_width(facts) for name, facts in captions)
     columns = columns_for(2, aspect, (_WIDTH, _HEIGHT), _ABOVE * s)
     rows = 2 // columns
     # a map that is higher than wide needs no wide page
@@ -138,12 +137,12 @@ def _indent(page: Page, name: str) -> float:
     return page.text_width(name, points=TITLE, bold=True) + 12 * page.scale
 
 
-def _arena(page: Page, box: Box, bounds: Box) -> Axes:
-    axes = page.axes(box)
-    axes.set_xlim(bounds[0], bounds[2])
-    axes.set_ylim(bounds[1], bounds[3])
-    axes.set_axis_off()
-    return axes
+def _style(fill: Colour, edge: Colour, opacity: float) -> dict[str, Any]:
+    return {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
+
+
+def _halo(theme: Theme, width: float) -> list[AbstractPathEffect]:
+    return [withStroke(linewidth=width, foreground=tone(theme.background))]
 
 
 def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
@@ -155,60 +154,38 @@ def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: f
         if isinstance(part, Polygon):
             rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
             outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
-            style = {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
-            axes.add_patch(PathPatch(outline, zorder=2, **style))
+            axes.add_patch(PathPatch(outline, zorder=2, **_style(fill, edge, opacity)))
 
 
 def _draw_places(axes: Axes, places: Sequence[tuple[float, float]], theme: Theme) -> None:
     """Write where the parts are that were left out, as the option ``--inside`` takes it."""
-    from matplotlib.patheffects import withStroke
-
-    halo = [withStroke(linewidth=3.0, foreground=tone(theme.background))]
+    style: dict[str, Any] = {"color": tone(theme.ink), "zorder": 5, "path_effects": _halo(theme, 3.0)}
     for x, y in places:
-        axes.plot([x], [y], color=tone(theme.ink), marker="+", markersize=8.0, zorder=5, path_effects=halo)
-        axes.annotate(
-            f"{x:.10g} {y:.10g}", (x, y), xytext=(6, 6), textcoords="offset points", fontsize=SMALL,
-            color=tone(theme.ink), zorder=5, path_effects=halo,
-        )  # fmt: skip
+        axes.plot([x], [y], marker="+", markersize=8.0, **style)
+        words = f"{x:.10g} {y:.10g}"
+        axes.annotate(words, (x, y), (6, 6), textcoords="offset points", fontsize=SMALL, **style)
 
 
 def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
     """Draw the narrowest passage, in a ring that makes it found."""
     if gap is None:
         return
-    from matplotlib.patheffects import withStroke
-
-    colour = tone(theme.final)
-    halo = [withStroke(linewidth=4.2, foreground=tone(theme.background))]
-    points = np.array(gap.between)
-    axes.plot(*points.T, color=colour, linewidth=2.0, zorder=5, clip_on=False, path_effects=halo)
+    colour, points = tone(theme.final), np.array(gap.between)
+    style: dict[str, Any] = {"zorder": 5, "clip_on": False, "path_effects": _halo(theme, 4.2)}
+    axes.plot(*points.T, color=colour, linewidth=2.0, **style)
     ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
     if np.hypot(*(ends[1] - ends[0])) < _RING:
-        x, y = points.mean(axis=0).tolist()
-        axes.plot([x], [y], zorder=5, clip_on=False, path_effects=halo, **_ring(theme, _RING))
-
-
-def _ring(theme: Theme, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": size,
-        "markerfacecolor": "none",
-        "markeredgecolor": tone(theme.final),
-        "markeredgewidth": 1.8,
-    }
+        style |= {"markerfacecolor": "none", "markeredgecolor": colour, "markeredgewidth": 1.8}
+        axes.plot(*points.mean(axis=0), "o", markersize=_RING, **style)
 
 
 def _draw_edges(axes: Axes, area: BaseGeometry, theme: Theme) -> None:
     """Draw where free space ends, also where the page is what lies beyond."""
     from matplotlib.collections import LineCollection
 
-    rings = shapely.get_rings(shapely.get_parts(area))
-    lines = [shapely.get_coordinates(ring) for ring in rings]
-    axes.add_collection(
-        LineCollection(lines, colors=tone(theme.obstacle_edge), linewidths=0.8, clip_on=False, zorder=2),
-        autolim=False,
-    )
+    lines = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(area))]
+    edges = LineCollection(lines, colors=tone(theme.obstacle_edge), linewidths=0.8, clip_on=False, zorder=2)
+    axes.add_collection(edges, autolim=False)
 
 
 def _number(value: float) -> str:
@@ -231,18 +208,10 @@ def _handles(environment: Environment, theme: Theme, compared: Comparison) -> li
         (compared.opened, "opened: {} m² were solid", theme.start),
     ):
         if not area.is_empty:
-            face = (*tone(colour), _MARK)
-            handles.append(
-                Patch(
-                    facecolor=face,
-                    edgecolor=tone(colour),
-                    linewidth=0.8,
-                    label=words.format(_number(area.area)),
-                )
-            )
-    gap = compared.gap
-    if gap is not None:
-        words = f"narrowest passage, {gap.width:.3g} m"
+            label = words.format(_number(area.area))
+            handles.append(Patch(label=label, **_style(colour, colour, _MARK)))
+    if compared.gap is not None:
+        words = f"narrowest passage, {compared.gap.width:.3g} m"
         handles.append(Line2D([], [], color=tone(theme.final), linewidth=2.0, label=words))
     return handles
 
