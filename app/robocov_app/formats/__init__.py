@@ -38,24 +38,10 @@ from robocov_app.formats.svg import writing as svg_writing
 from robocov_app.formats.unreadable import described, named_kind
 
 __all__ = [
-    "EXPORTERS",
-    "IMPORTERS",
-    "ExportReport",
-    "Exporter",
-    "ForeignMap",
-    "ImportReport",
-    "Importer",
-    "ReadOptions",
-    "Shaping",
-    "WriteOptions",
-    "detect",
-    "export_map",
-    "exporter",
-    "import_map",
-    "importer",
-    "read_map",
-    "shaped",
-]
+    "EXPORTERS", "IMPORTERS", "ExportReport", "Exporter", "ForeignMap", "ImportReport", "Importer",
+    "ReadOptions", "Shaping", "WriteOptions", "detect", "export_map", "exporter", "import_map", "importer",
+    "read_map", "shaped",
+]  # fmt: skip
 
 _Format = TypeVar("_Format", Importer, Exporter)
 
@@ -83,10 +69,7 @@ def _named(formats: dict[str, _Format], name: str) -> _Format:
 
 
 def detect(path: str | Path) -> Importer:
-    """Return the format of the file at `path`: by its content, or else by its suffix.
-
-    The MapError of what cannot be read names what it is where it can, and the way to a known format.
-    """
+    """Return the format of the file at `path`: by its content, or else by its suffix."""
     path = Path(path)
     head = files.head(path)
     kind = named_kind(path, head)
@@ -98,9 +81,8 @@ def detect(path: str | Path) -> Importer:
     named = [candidate for candidate in IMPORTERS.values() if path.suffix.lower() in candidate.suffixes]
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
-    raise MapError(
-        f"{one_line(path)}: unknown format ({described(head)}), but one of {', '.join(IMPORTERS)} was wanted"
-    )
+    wanted = f"one of {', '.join(IMPORTERS)} was wanted"
+    raise MapError(f"{one_line(path)}: unknown format ({described(head)}), but {wanted}")
 
 
 def import_map(

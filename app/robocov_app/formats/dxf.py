@@ -18,7 +18,6 @@ from robocov.errors import MapError, RobocovError, one_line, shown
 from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.files import MAX_DEPTH
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
 from robocov_app.formats.geometry.enclosing import foreign_map
@@ -94,6 +93,7 @@ class DxfDrawing:
 
     def __init__(self, document: Any, shapes: Shapes, scale: float) -> None:
         self.document, self.where, self.shapes, self.scale = document, shapes.where, shapes, scale
+        self.tolerance = TOLERANCE / scale
         self.drawn = 0
         self.curved = False
         self._hidden = {
@@ -121,8 +121,9 @@ class DxfDrawing:
             if name in inside:
                 what = f"block {shown(name)} is inserted within itself, but an end was wanted"
                 raise MapError(f"{self.where}: {what}")
-            if len(inside) >= MAX_DEPTH:
-                raise MapError(f"{self.where}: blocks nested deeper than {MAX_DEPTH}, but less was wanted")
+            if len(inside) >= files.MAX_DEPTH:
+                what = f"blocks nested deeper than {files.MAX_DEPTH}"
+                raise MapError(f"{self.where}: {what}, but less was wanted")
             if name not in counted:
                 block = self.document.blocks.get(name)
                 inside.append(name)
@@ -166,7 +167,6 @@ class DxfDrawing:
             self._add(kind, entity, labels)
 
     def _insert(self, insert: Any, layer: str, blocks: tuple[str, ...]) -> None:
-        """Add what a block holds, wherever it is inserted."""
         block = insert.block()
         if block is None or block.block.is_xref:
             self.shapes.leave_out("block", "missing from the file")
@@ -185,9 +185,10 @@ class DxfDrawing:
             self._arc(kind, entity, labels, at)
         elif kind == "ELLIPSE":
             self._require_near(flat([entity.dxf.center, entity.dxf.major_axis]))
-            self._curve(flat(list(entity.flattening(self._tolerance))), labels, at)
+            self._curve(flat(list(entity.flattening(self.tolerance))), labels, at)
         elif kind == "SPLINE":
-            self._spline(entity, labels, at)
+            self._require_near(flat([*entity.control_points, *entity.fit_points]))
+            self._curve(spline(entity, self.tolerance), labels, at)
         elif kind in ("LWPOLYLINE", "POLYLINE"):
             self._polyline(kind, entity, labels, at)
         elif kind in ("SOLID", "TRACE"):
@@ -198,10 +199,6 @@ class DxfDrawing:
             self.shapes.leave_out("HATCH", "(--hatches takes them as areas)")
         else:
             self.shapes.leave_out(one_line(kind)[:40])
-
-    @property
-    def _tolerance(self) -> float:
-        return TOLERANCE / self.scale
 
     def _metres(self, points: Sequence[Any]) -> Array:
         """Return points of the drawing as (k, 2) m; third coordinates are told of."""
@@ -244,11 +241,7 @@ class DxfDrawing:
             (middle,) = self._metres([entity.ocs().to_wcs(centre)])
             self.shapes.add_circle(middle, radius * self.scale, labels, at=at)
             return
-        self._curve(flat(list(entity.flattening(min(self._tolerance, radius / 8)))), labels, at)
-
-    def _spline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        self._require_near(flat([*entity.control_points, *entity.fit_points]))
-        self._curve(spline(entity, self._tolerance), labels, at)
+        self._curve(flat(list(entity.flattening(min(self.tolerance, radius / 8)))), labels, at)
 
     def _polyline(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
         """Add a polyline with its bulges: columns are x, y, bulge and the widths at both ends of an edge."""
@@ -270,7 +263,7 @@ class DxfDrawing:
             self.shapes.leave_out("line", "without a length")
             return
         self._require_near(rows[:, :2])
-        points = polyline(rows[:, :2], rows[:, 2], self._tolerance)
+        points = polyline(rows[:, :2], rows[:, 2], self.tolerance)
         self.curved |= len(points) > len(rows)
         if plane is not None and plane.transform:
             points = flat(list(plane.points_to_wcs([(x, y, height) for x, y in points.tolist()])))
@@ -285,7 +278,7 @@ class DxfDrawing:
         rings = []
         for path in from_hatch(entity):
             self._require_near(flat(path.control_vertices()))
-            rings.append(self._metres(list(path.flattening(self._tolerance))))
+            rings.append(self._metres(list(path.flattening(self.tolerance))))
         self._outline(rings, labels, at)
 
 
@@ -307,21 +300,11 @@ MOST_ENTITIES = 50_000
 """In the file, on whatever layer: ezdxf takes an eighth of a millisecond and 5 kB for each."""
 
 UNITS = {
-    1: ("inches", 0.0254),
-    2: ("feet", 0.3048),
-    3: ("miles", 1609.344),
-    4: ("millimetres", 0.001),
-    5: ("centimetres", 0.01),
-    6: ("metres", 1.0),
-    7: ("kilometres", 1000.0),
-    9: ("mils", 2.54e-5),
-    10: ("yards", 0.9144),
-    13: ("micrometres", 1e-6),
-    14: ("decimetres", 0.1),
-    15: ("decametres", 10.0),
-    16: ("hectometres", 100.0),
-    21: ("US survey feet", 1200 / 3937),
-}
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
+    5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
+    10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
+    16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
+}  # fmt: skip
 """What the header's $INSUNITS stands for, with its metres."""
 
 _BINARY = b"AutoCAD Binary DXF"
@@ -353,10 +336,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     elif code in UNITS:
         unit, scale = f"in {UNITS[code][0]}", UNITS[code][1]
     else:
-        raise MapError(
-            f"{where}: $INSUNITS: {code}, but a unit was wanted: --scale METRES says what it is, as in "
-            f"--scale 0.001 for millimetres"
-        )
+        wanted = "a unit was wanted: --scale METRES says what it is, as in --scale 0.001 for millimetres"
+        raise MapError(f"{where}: $INSUNITS: {code}, but {wanted}")
     shapes = Shapes(where, options)
     shapes.notes.append(unit)
     DxfDrawing(document, shapes, scale).draw()
@@ -371,23 +352,20 @@ def _check(path: Path, where: str) -> None:
     if not content.startswith(_BINARY):
         if not _TEXT.match(content):
             raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")
-        entities = sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1))
-        if entities > MOST_ENTITIES:
+        if sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1)) > MOST_ENTITIES:
             raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
         points = islice(_POINT.finditer(content), files.MAX_VERTICES + 1)
         files.require_vertices(sum(1 for _ in points), where)
-    lines = content.count(b"\n")
-    if lines > MOST_LINES:
+    if (lines := content.count(b"\n")) > MOST_LINES:
         raise MapError(f"{where}: {lines} lines, but at most {MOST_LINES} were wanted")
 
 
 def _document(path: Path, where: str) -> Any:
     """Return the drawing as ezdxf has it; one with faults as far as it can be recovered."""
     try:
-        ezdxf = extra("ezdxf", "dxf")
+        ezdxf, recover = extra("ezdxf", "dxf"), extra("ezdxf.recover", "dxf")
     except RobocovError as error:
         raise MapError(f"{where}: {error}") from None
-    recover = extra("ezdxf.recover", "dxf")
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # what it notes is no answer of ours
     for read in (ezdxf.readfile, lambda file: recover.readfile(file)[0]):
         try:

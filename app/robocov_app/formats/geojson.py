@@ -231,14 +231,9 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
     with written(path) as part:
         part.write_text(_text(environment, options, features), encoding="utf-8")
-    return ExportReport(
-        EXPORTER.name,
-        (path,),
-        environment.free_area,
-        free_area(areas[0], areas[1:]),
-        dropped=tuple(thing for thing in not_held(environment) if not thing.startswith("names")),
-        notes=tuple(notes),
-    )
+    dropped = tuple(thing for thing in not_held(environment) if not thing.startswith("names"))
+    area = free_area(areas[0], areas[1:])
+    return ExportReport("geojson", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:

@@ -20,7 +20,6 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, counted, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.files import Value, named_file
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.raster import free_area, vertices_of
@@ -100,7 +99,8 @@ def _picture(source: _Node, step: _Node, path: Path, options: ReadOptions) -> tu
             name = shown(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
-    file, moved = named_file(path, source.text(), anywhere=options.anywhere, at=source.at, what="picture")
+    at, anywhere = source.at, options.anywhere
+    file, moved = files.named_file(path, source.text(), anywhere=anywhere, at=at, what="picture")
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:
@@ -168,7 +168,7 @@ def _frame(x: float, y: float, turn: float) -> Array:
 class _Node:
     """A value of the file and its place; what is not given is None."""
 
-    value: Value | None
+    value: files.Value | None
     at: str
 
     @property

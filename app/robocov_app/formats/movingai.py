@@ -50,10 +50,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     if bad.any():
         row, column = (int(k) for k in np.argwhere(bad)[0])
         letter = chr(letters[row, column])
-        raise MapError(
-            f"{where}: line {line + row}, column {column + 1}: {shown(letter)}, "
-            f"but one of . G S @ O T W was wanted"
-        )
+        place = f"{where}: line {line + row}, column {column + 1}"
+        raise MapError(f"{place}: {shown(letter)}, but one of . G S @ O T W was wanted")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     return foreign_map(
@@ -94,9 +92,8 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
                 raise MapError(f"{place}: {key} {shown(words[1])}, but a smaller one was wanted")
             sizes[key] = int(words[1])
         else:
-            raise MapError(
-                f"{place}: {shown(' '.join(words))}, but type octile, height N, width N or map was wanted"
-            )
+            wanted = "type octile, height N, width N or map was wanted"
+            raise MapError(f"{place}: {shown(' '.join(words))}, but {wanted}")
     raise MapError(f"{where}: no line map, but one after type, height and width was wanted")
 
 

@@ -33,7 +33,6 @@ from robocov.environment import Environment
 from robocov.errors import MapError, OutputError, ParameterError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
-from robocov_app.formats.files import named_file
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import Grid, free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
@@ -70,13 +69,11 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     occupied = _number(given, "occupied_thresh", where, _OCCUPIED)
     free = _number(given, "free_thresh", where, _FREE)
     if not 0.0 <= free <= occupied <= 1.0:
-        raise MapError(
-            f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, "
-            f"but numbers from 0 to 1 were wanted, the first not the larger"
-        )
+        wanted = "numbers from 0 to 1 were wanted, the first not the larger"
+        raise MapError(f"{where}: free_thresh, occupied_thresh: {free:g}, {occupied:g}, but {wanted}")
     name = _text(given, "image", where)
     at = f"{where}: image"
-    image, moved = named_file(path, name, anywhere=options.anywhere, at=at, what="picture")
+    image, moved = files.named_file(path, name, anywhere=options.anywhere, at=at, what="picture")
     picture = read_picture(image, one_line(image))
     threshold = 0.5 if options.threshold is None else options.threshold
     notes = [f"{one_line(key)}: no key of map_server, not looked at" for key in given if key not in _KNOWN]
@@ -90,7 +87,9 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     else:
         cells = _raw(picture, threshold)
     repaired = [] if moved is None else [moved]
-    missing = [key for key in ("occupied_thresh", "free_thresh") if key not in given and mode != "raw"]
+    for key, taken in (("occupied_thresh", _OCCUPIED), ("free_thresh", _FREE)):
+        if key not in given and mode != "raw":
+            repaired.append(f"{key} is missing, {taken:g} taken")
     return foreign_map(
         cells,
         name=path.stem,
@@ -102,10 +101,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         unknown=options.unknown or "obstacle",
         noise=_NOISE,
         where=where,
-        repaired=(
-            *repaired,
-            *(f"{key} is missing, {_OCCUPIED if key[0] == 'o' else _FREE:g} taken" for key in missing),
-        ),
+        repaired=tuple(repaired),
         notes=tuple(notes),
     )
 
@@ -151,10 +147,8 @@ def _doubted(picture: Brightness, negate: bool, free: float) -> list[str]:
     doubtful = int(np.count_nonzero(picture.level == _SAVED_UNKNOWN))
     if doubtful < picture.level.size / 100:
         return []
-    return [
-        f"{doubtful} cells have the value {_SAVED_UNKNOWN}, which is saved for unknown cells, "
-        f"and are free by free_thresh {free:g}"
-    ]
+    what = f"{doubtful} cells have the value {_SAVED_UNKNOWN}, which is saved for unknown cells"
+    return [f"{what}, and are free by free_thresh {free:g}"]
 
 
 def _origin(given: dict[str, files.Value], where: str) -> tuple[float, float, float]:
@@ -206,7 +200,7 @@ IMPORTER = Importer(
 )  # fmt: skip
 
 
-_WHITE, _GREY, _BLACK = 254, 205, 0
+_WHITE, _GREY, _BLACK = 254, _SAVED_UNKNOWN, 0
 """What map_saver writes for free, unknown and occupied."""
 
 _FINER = 4

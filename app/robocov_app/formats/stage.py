@@ -23,7 +23,6 @@ from robocov.arrays import Array
 from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.files import named_file
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.enclosing import foreign_map, surrounding
 from robocov_app.formats.geometry.polygons import polygons_of
@@ -151,7 +150,7 @@ class _World:
 
     def _named(self, token: _Token, what: str) -> Path:
         anywhere = self.shapes.options.anywhere
-        file, note = named_file(self.path, token.text, anywhere=anywhere, at=token.at, what=what)
+        file, note = files.named_file(self.path, token.text, anywhere=anywhere, at=token.at, what=what)
         self.shapes.notes += [] if note is None or note in self.shapes.notes else [note]
         return file
 

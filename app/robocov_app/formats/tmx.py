@@ -23,7 +23,6 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
 from robocov_app.formats import files
-from robocov_app.formats.files import named_file
 from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.raster import free_area, vertices_of
@@ -59,8 +58,7 @@ _IDs: TypeAlias = NDArray[np.uint32]
 class _Tile:
     """A tile that is solid: as a whole, or in the shape of its collision objects, if it has `parts`.
 
-    `size`, `offset`, (x, y) px: of its picture, and by how much that is drawn away from the lower left of the
-    cell.
+    `size`, `offset`, px: of its picture, and how far that is drawn from the lower left of the cell.
     """
 
     parts: tuple[Element, ...]
@@ -71,10 +69,9 @@ class _Tile:
 
 @dataclass(frozen=True, eq=False)
 class _Layer:
-    """A layer of tiles or objects.
+    """A layer of tiles or objects, with its labels and those of the groups around it; `offset` px, y down.
 
-    `labels`: its name and class, and those of the groups around it. `offset`, (x, y) px: to the right and
-    down. `wall`: whether it is asked for, or says itself that it is solid.
+    `wall`: whether it is asked for, or says itself that it is solid.
     """
 
     element: Element
@@ -154,7 +151,7 @@ class _Map:
             if source is not None:
                 at = f"{self.where}:{element.line}"
                 anywhere = self.shapes.options.anywhere
-                file, note = named_file(self.path, source, anywhere=anywhere, at=at, what="tileset")
+                file, note = files.named_file(self.path, source, anywhere=anywhere, at=at, what="tileset")
                 self.shapes.notes += [] if note is None else [note]
                 tileset, where = read_xml_tree(file, "tileset", "TSX")
             size = np.array([_number(tileset, name, where) for name in ("tilewidth", "tileheight")])
@@ -344,9 +341,9 @@ class _Map:
 
 
 def _figure(element: Element, where: str) -> tuple[str, Array] | None:
-    """Return the kind of an object and its points in pixels, of a circle the centre and one of the rim.
+    """Return the kind of an object (polygon, line, circle, point) and its points in pixels; None of others.
 
-    It is a polygon, a line, a circle or a point; None is something else.
+    Of a circle they are its centre and one of the rim.
     """
     names = ("x", "y", "width", "height", "rotation")
     x, y, width, height, turn = (_number(element, name, where) for name in names)

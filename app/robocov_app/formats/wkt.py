@@ -38,6 +38,7 @@ CURVED = ("CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULT
 
 _SPACE = re.compile(r"\s*")
 _WORD = re.compile(r"[A-Za-z_]+")
+_KIND = re.compile(rf"((?ai:{'|'.join(KINDS)}))\s*((?ai:ZM|Z|M))?(?![A-Za-z_])")
 _POINTS = re.compile(r"\(([-+.\deE\s,]*)\)", re.ASCII)
 _NO_POINT = re.compile(r"[^-+.\deE\s,]", re.ASCII)
 _BEYOND = 1e100
@@ -109,19 +110,12 @@ class WktText:
 
     def _kind(self) -> tuple[str, bool]:
         """Read the word that begins a geometry; return it, and whether its last coordinate is a measure."""
+        if match := _KIND.match(self.text, self.at):
+            self.at = match.end()
+            self._skip_space()
+            return match[1].upper(), (match[2] or "").upper() == "M"
         word = _WORD.match(self.text, self.at)
         found = word[0].upper() if word else ""
-        for kind in KINDS:
-            dimensions = found.removeprefix(kind)
-            if found.startswith(kind) and dimensions in ("", "Z", "M", "ZM") and word:
-                self.at = word.end()
-                self._skip_space()
-                apart = _WORD.match(self.text, self.at)
-                if not dimensions and apart and apart[0].upper() in ("Z", "M", "ZM"):
-                    dimensions = apart[0].upper()
-                    self.at = apart.end()
-                    self._skip_space()
-                return kind, dimensions == "M"
         if found.rstrip("ZM") in CURVED:
             raise self._refusal(f"{found}, but a geometry of straight edges was wanted")
         raise self._refusal(f"{self._found()}, but one of {', '.join(KINDS)} was wanted")
@@ -277,24 +271,15 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     notes = [f"in metres, {digits} decimals"]
     if len(parts) > 1:
         notes.append(f"the free space has {len(parts)} parts: some programs take one polygon only")
-    return ExportReport(
-        EXPORTER.name,
-        (path,),
-        environment.free_area,
-        float(MultiPolygon(free).area),
-        dropped=(
-            *not_held(environment),
-            "the boundary and the obstacles as such: only what is free is there",
-        ),
-        notes=tuple(notes),
-    )
+    dropped = *not_held(environment), "the boundary and the obstacles as such: only what is free is there"
+    area = float(MultiPolygon(free).area)
+    return ExportReport("wkt", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 def _text(polygon: Polygon, digits: int) -> str:
-    parts = (
-        ", ".join(f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring) for ring in rings(polygon)
-    )
-    return f"({', '.join(f'({part})' for part in parts)})"
+    points = [[f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring] for ring in rings(polygon)]
+    parts = [f"({', '.join(ring)})" for ring in points]
+    return f"({', '.join(parts)})"
 
 
 EXPORTER = Exporter(
