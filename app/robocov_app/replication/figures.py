@@ -6,9 +6,14 @@ Starts are green, final positions blue, trajectories red; RAPF's cost is blue, R
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from robocov.environment import Environment
 from robocov.metrics import CostHistory
@@ -24,11 +29,6 @@ from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication.claims import amount
 from robocov_app.replication.outcomes import FIRST_MINUTE, matched_distance, mean_until
 from robocov_app.replication.results import FigureRun
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DOTS = 3.0  # scale of the pages: 300 dots an inch
 WIDE, NARROW = 2148, 1050  # pixels of two columns of a journal (7.16 inches) and of one (3.5 inches)
@@ -99,9 +99,6 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -
 @plain_style()
 def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
     """Draw the Voronoi partition of a run's first moment with robots and centroids (figure 1)."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.lines import Line2D
-
     environment, robots = first.environment, first.positions[0]
     ink, edge = tone(theme.ink), tone(theme.cell_edge)
     dot: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": ink}

@@ -13,9 +13,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from robocov import __version__
 from robocov.files.atomic import written
@@ -38,9 +39,6 @@ from robocov_app.report.theme_css import theme_rules
 from robocov_app.sweep.study import UNITS
 from robocov_app.terminal.output import finite
 from robocov_app.terminal.progress import progress
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAGE, BEYOND_PAGE, CLAIMS = "index.html", "beyond.html", "claims.json"
 

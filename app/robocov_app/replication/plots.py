@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from robocov.arrays import Array
 from robocov.errors import counted
@@ -26,12 +29,8 @@ from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import BeyondResults, Degradation, PaperResults
 from robocov_app.sweep.study import UNITS
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-Plots: TypeAlias = "Mapping[str, Callable[[], Figure]]"
-"""How every plot is drawn, by its name; those without a run are left out."""
+# how every plot is drawn, by its name; those without a run are left out
+Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
 
 # what is said of the plots
 WORDS = {
@@ -181,8 +180,6 @@ def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
 @plain_style()
 def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     """Draw the gaps of all contenders as boxes, in percent, on an axis of square roots."""
-    from matplotlib.ticker import FixedLocator, NullLocator
-
     styles = [style_of(sample.controller) for sample in samples]
     label = "J/J_ref − 1 at the end (%)"
     size = (WIDE, None)

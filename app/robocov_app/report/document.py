@@ -16,19 +16,10 @@ from robocov import __version__
 from robocov.errors import ParameterError
 from robocov_app.figures.styles import MARKS
 from robocov_app.render.theme import theme_named
-from robocov_app.report import facts, plots, tables
+from robocov_app.report import facts, plots, replay, tables
 from robocov_app.report import groups as grouped
 from robocov_app.report.pictures import has_path, lives, map_picture, run_picture
-from robocov_app.report.replay import (
-    BUDGET,
-    MOST_PANES,
-    ReplayRun,
-    asset,
-    replay_css,
-    replay_js,
-    replay_part,
-    script,
-)
+from robocov_app.report.replay import MOST_PANES, ReplayRun
 from robocov_app.report.results import Result
 from robocov_app.report.theme_css import theme_rules
 
@@ -50,16 +41,16 @@ def report(results: Sequence[Result], *, title: str | None = None, theme: str = 
         raise ParameterError("report: no results were given, but at least one was wanted")
     if theme != "auto":
         theme_named(theme)
-    budget = BUDGET // len(results)
+    budget = replay.BUDGET // len(results)
     sections = [_section(result, f"r{number}", budget) for number, result in enumerate(results, start=1)]
     default = sections[0]["title"] if len(results) == 1 else f"{len(results)} results"
-    code = script(replay_js() + asset("report.js") + "startReport(startReplays());")
+    code = replay.script(replay.replay_js() + replay.asset("report.js") + "startReport(startReplays());")
     html = template("report.html.jinja").render(
         title=title or default,
         sections=sections,
         single=len(results) == 1,
         version=__version__,
-        style=theme_rules(":root", theme) + replay_css() + asset("report.css"),
+        style=theme_rules(":root", theme) + replay.replay_css() + replay.asset("report.css"),
         script=code,
         digest=base64.b64encode(hashlib.sha256(code.encode()).digest()).decode(),
         marks=MARKS,
@@ -119,7 +110,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
             }
             for run, entry in zip(replayed, choice.entries, strict=True)
         ],
-        "replay": replay_part(replayed, choice.panes, budget) if replayed else "",
+        "replay": replay.replay_part(replayed, choice.panes, budget) if replayed else "",
         "shown": len(replayed),
     }
 
@@ -127,7 +118,7 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
 @cache
 def template(name: str) -> Template:
     """Return a template of pages."""
-    loader = FunctionLoader(asset)
+    loader = FunctionLoader(replay.asset)
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)
     environment.filters["short"] = _shortened

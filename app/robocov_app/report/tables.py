@@ -11,15 +11,7 @@ import numpy as np
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import (
-    Comparison,
-    Group,
-    gain_text,
-    ratio_text,
-    setting_label,
-    settings,
-    shown_groups,
-)
+from robocov_app.report.groups import Comparison, Group, gain_text, ratio_text, setting_label, settings
 from robocov_app.report.results import RESTARTS, Entry, Result
 
 NOTHING = "–"  # stands where there is no number
@@ -44,7 +36,7 @@ Column: TypeAlias = tuple[str, Callable[[Sequence[Entry]], str]]  # head, and te
 
 def controllers_table(result: Result) -> Table:
     """Return the controllers with their gains, or between which values these are."""
-    groups = shown_groups(result)
+    groups = grouped.shown_groups(result)
     known = {group.controller for group in groups}
     lost = {e.controller: Group(e.label, e.controller, None, (e,)) for e in reversed(result.failed)}
     order = dict.fromkeys(entry.controller for entry in result.failed if entry.controller not in known)
@@ -54,7 +46,7 @@ def controllers_table(result: Result) -> Table:
 def gains_table(result: Result) -> Table | None:
     """Return all sets of gains by letters, None where `controllers_table` has them or they are many."""
     apart = grouped.variants(result)
-    if len(apart) == len(shown_groups(result)) or len(apart) > MOST_SETS:
+    if len(apart) == len(grouped.shown_groups(result)) or len(apart) > MOST_SETS:
         return None
     return _gains_table("Sets of gains", apart, result)
 
@@ -69,7 +61,7 @@ def _gains_table(caption: str, groups: Sequence[Group], result: Result) -> Table
 
 def summary_tables(result: Result) -> list[Table]:
     """Return what came of each group, over everything and in each setting."""
-    groups, every = shown_groups(result), settings(result)
+    groups, every = grouped.shown_groups(result), settings(result)
     distance, over_run, *others = _figure_columns(result)
 
     def above(entries: Sequence[Entry]) -> str:
