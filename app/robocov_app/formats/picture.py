@@ -121,7 +121,6 @@ def _netpbm(data: bytes, where: str) -> Brightness:
 
 
 def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
-    """Return the pixels of a plain PGM, (count,)."""
     # a digit and a blank each
     if len(text) < 2 * count - 1:
         raise MapError(f"{where}: cut off: {len(text)} bytes are too few for {count} pixels")
@@ -153,7 +152,6 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
 
 
 def _decoded(data: bytes, name: str, where: str) -> Brightness:
-    """Return a picture that Pillow reads, of the format that it calls `name`."""
     import PIL.Image
 
     try:

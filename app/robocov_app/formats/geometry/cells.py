@@ -142,7 +142,6 @@ def lost_passages(environment: Environment, grid: Grid, free: BoolArray) -> tupl
 
 
 def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
-    """Return which parts of the free space, with room for a robot, are not in one piece in free cells."""
     parts = np.array(environment.free.geoms)
     parts = parts[shapely.area(parts) >= _LEAST]
     islands, _ = ndimage.label(free)

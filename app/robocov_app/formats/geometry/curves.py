@@ -31,8 +31,6 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
     two Bézier curves or surfaces, Zhejiang University Journal, 1984.) Raises ValueError when there would be
     more than `most`.
 
-    Examples
-    --------
     >>> beziers(np.array([[[0.0, 0.0], [2.0, 3.0], [4.0, 3.0], [6.0, 0.0]]]), 0.6)[0].tolist()
     [[3.0, 2.25], [6.0, 0.0]]
     """
@@ -92,7 +90,6 @@ def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) ->
 
 
 def _counted(count: Array, most: int) -> IntArray:
-    """Return how many steps are made, at least one each."""
     whole = np.ceil(np.clip(count, 1.0, most + 1.0))
     if not whole.sum() <= most:  # nan is too many
         raise ValueError(f"more than {most} points, but fewer were wanted")

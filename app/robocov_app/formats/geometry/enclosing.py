@@ -152,7 +152,6 @@ def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) ->
 
 
 def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
-    """Return how the shapes were taken."""
     told = [f"the boundary is {boundary.words}"] if boundary and boundary.words and solid else []
     if blocks and (boundary is None or boundary.words):  # else the format says what all of it is
         told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
@@ -171,7 +170,6 @@ def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int
 
 
 def _named(shapes: Shapes) -> _Enclosure | None:
-    """Return the boundary that has the wanted name, or the usual one."""
     wanted = shapes.options.boundary
     key = (wanted or BOUNDARY).casefold()
     outlines = frozenset(o for o in shapes.outlines if key in map(str.casefold, o.labels))
@@ -208,12 +206,10 @@ def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
 
 
 def _filled(outline: Outline) -> float:
-    """Return the area within the outer rings of an outline, m²."""
     return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
 
 
 def _walled(shapes: Shapes) -> _Enclosure | None:
-    """Return the outer edge of the walls if they close."""
     solid = _together([*shapes.areas, *(line.solid for line in shapes.lines)])
     fills = [Polygon(part.exterior) for part in solid.geoms]
     if not fills:  # what there is is thinner than the grid
@@ -225,7 +221,6 @@ def _walled(shapes: Shapes) -> _Enclosure | None:
 
 
 def _rectangle(shapes: Shapes) -> _Enclosure:
-    """Return a rectangle around everything."""
     around = AROUND if shapes.options.around is None else shapes.options.around
     x, y, right, top = shapely.total_bounds([*shapes.areas, *(line.solid for line in shapes.lines)])
     box = shapely.box(x - around, y - around, right + around, top + around)

@@ -96,8 +96,6 @@ def enclosed(
     Returns the area, the largest part first; where rings of a polygon with holes meet, in words; and how many
     holes take nothing out of it, by the reason.
 
-    Examples
-    --------
     >>> square = np.array([[0, 0], [4, 0], [4, 4], [0, 4]])
     >>> [enclosed([square, 1 + square / 2], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
     [12.0, 12.0, 16.0]
@@ -152,7 +150,6 @@ def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
 
 
 def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
-    """Return the faces between rings that the rule fills, as one area."""
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.union_all(lines))))
     if not len(faces):
         return MultiPolygon()
@@ -226,8 +223,6 @@ def bounded(
     It is `given`, m, without holes, or else the outline of `free`, or of several parts the convex hull; or
     the `hull` of that; with so much `margin`, m, around it.
 
-    Examples
-    --------
     >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
     >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
     >>> boundary.area, [part.area for part in solid]

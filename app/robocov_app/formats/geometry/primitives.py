@@ -37,8 +37,6 @@ def with_primitives(
     along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
     where a robot of that radius would have more than so many `places`, apart from each other.
 
-    Examples
-    --------
     >>> wall = WallObstacle(((1.0, 2.0), (3.0, 2.0)), 0.2)
     >>> desk, drawn = shapely.box(5, 1, 6, 2), shapely.box(1, 1.9, 3, 2.1)
     >>> kept, rest = with_primitives([drawn, desk], [wall], shapely.box(0, 0, 8, 4), 0.02, 4, 1, 0.1)
@@ -93,12 +91,10 @@ def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obst
 
 
 def _points(primitive: Primitive) -> np.ndarray:
-    """Return the points that a primitive is given by, (k, 2)."""
     return np.array([primitive.center] if isinstance(primitive, CircleObstacle) else primitive.points)
 
 
 def _fits(primitive: Primitive) -> bool:
-    """Return whether a map may have it."""
     points = _points(primitive)
     if isinstance(primitive, CircleObstacle):
         sizes = [primitive.radius]

@@ -145,7 +145,6 @@ def _traced(cells: BoolArray, where: str) -> MultiPolygon:
 
 
 def _counts(number: list[int], rows: int, columns: int, cell: float, called: str, unknown: str) -> str:
-    """Return what cells there are, in words."""
     total = rows * columns
     words = f"{columns} x {rows} cells of {cell:.6g} m: {_share(number[FREE], total)} free"
     words += f", {_share(number[BLOCKED], total)} blocked"
@@ -174,8 +173,6 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
     true corner, none lies within a straight wall, and no two rings touch: necks join obstacles that touch at
     a corner. Raises MapError when there are more than `files.MAX_VERTICES`.
 
-    Examples
-    --------
     >>> traced(np.array([[True, True], [True, False]]), "grid").wkt
     'MULTIPOLYGON (((0 0, 2 0, 2 1, 1 1, 1 2, 0 2, 0 0)))'
     """

@@ -195,7 +195,6 @@ class _Shaper:
         )
 
     def _valid_boundary(self) -> Polygon | None:
-        """Return the boundary that the format gives, valid and without holes."""
         outer = self.foreign.boundary
         if outer is None or outer.is_valid:
             return None if outer is None else Polygon(outer.exterior)
@@ -225,11 +224,9 @@ class _Shaper:
         return valid
 
     def _specks(self) -> float:
-        """Return the area below which obstacles are dropped, m²."""
         return self.foreign.specks if self.shaping.specks is None else self.shaping.specks
 
     def _kept(self, free: MultiPolygon) -> list[Polygon]:
-        """Return the parts of the free space that stay, the largest first."""
         parts, robots = np.array(free.geoms, dtype=object), self.foreign.robots
         area = shapely.area(parts)
         if self.shaping.keep == "all":
@@ -283,7 +280,6 @@ class _Shaper:
             )
 
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
-        """Return `parts` without the holes that are too small."""
         cell, least = self.foreign.cell, self._specks()
         crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
         result, specks, crumbs, tiny = [], [], [], 0
@@ -332,7 +328,6 @@ class _Shaper:
         return max(DEFAULT_RADIUS, self.shaping.radius) * (1 + START_GAP)
 
     def _require_room(self, parts: list[Polygon]) -> None:
-        """Check that a robot fits somewhere in the free space."""
         clearance, widest = self._clearance(), 0.0
         for part in parts:
             if math.sqrt(part.area / math.pi) > widest:
@@ -394,14 +389,12 @@ class _Shaper:
 
 
 def _reason(geometry: BaseGeometry) -> str:
-    """Return why `geometry` is not valid, as a message shows it."""
     what, _, place = shapely.is_valid_reason(geometry).partition("[")
     x, _, y = place.rstrip("]").partition(" ")
     return f"{what.lower()} at [{float(x):.6g}, {float(y):.6g}]" if y else what.lower()
 
 
 def _place_in(part: Polygon) -> tuple[float, float]:
-    """Return a place in a part, to the centimetre."""
     point = shapely.point_on_surface(part)
     return round(point.x, 2), round(point.y, 2)
 

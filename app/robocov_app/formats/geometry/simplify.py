@@ -220,7 +220,6 @@ class _Check:
         return wrong, far
 
     def _distance(self) -> Array:
-        """Return how far each vertex of the outline is from what is drawn for it, (k,) m."""
         drawing, points = self.drawing, self.outline.points
         nearest = np.full(len(points), np.inf)
         # where a corner was made whole, the side before or after may be the nearer one
@@ -232,7 +231,6 @@ class _Check:
         return nearest
 
     def met(self) -> tuple[MultiPolygon, BoolArray]:
-        """Return the drawing as polygons, and what is drawn across something else."""
         outline, drawing, allowed = self.outline, with_necks(self.outline, self.drawing), self.allowed
         parts = polygons_from(outline, drawing)
         if parts.is_valid:
@@ -488,7 +486,6 @@ def _meeting(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
 
 
 def _foot(p: Array, a: Array, u: Array) -> Array:
-    """Return the points nearest to p on the lines through a along u."""
     return np.asarray(a + _dot(p - a, u)[:, None] * u)
 
 
@@ -506,8 +503,6 @@ def sharpened(plan: Polygon, tolerance: float) -> Polygon:
     A run of short edges becomes the point where the long edges before and after it meet, if all of the run is
     near that: unlike a plain simplification, it keeps the directions of the walls.
 
-    Examples
-    --------
     >>> cut = Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)])
     >>> sharpened(cut, 0.02).area
     12.0
@@ -518,7 +513,6 @@ def sharpened(plan: Polygon, tolerance: float) -> Polygon:
 
 
 def _sharpened(ring: Array, tolerance: float) -> Array:
-    """Return the (k, 2) ring with its cut corners made whole."""
     side = np.roll(ring, -1, axis=0) - ring
     length = np.hypot(*side.T)
     long = np.flatnonzero(length > _SHORT * tolerance)

@@ -153,8 +153,6 @@ def subpaths(
     `tolerance`: largest distance of a curve from its points. `most`, `draws`: points and commands at most.
     Raises ValueError where it is no path data, or has more; the message says which character.
 
-    Examples
-    --------
     >>> [(points, closed)], _ = subpaths("m0 0h4v2z", 0.1, 100)
     >>> points.tolist(), closed
     ([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]], True)
@@ -204,7 +202,6 @@ class _Pen:
         self._arcs: list[tuple[float, ...]] = []
 
     def arguments(self, text: str, at: int, command: str, most: int, draws: int) -> tuple[list[float], int]:
-        """Return the numbers that follow a command, for one or more times, and where they end."""
         values: list[float] = []
         kind = command.upper()
         count, flags = _ARGUMENTS[kind], (3, 4) if kind == "A" else ()
@@ -222,7 +219,6 @@ class _Pen:
         return values, at
 
     def draw(self, command: str, v: list[float]) -> None:
-        """Draw what a command says."""
         kind = command.upper()
         x, y = self.at if command.islower() else (0.0, 0.0)
         self.draws += 1
@@ -255,13 +251,11 @@ class _Pen:
         self.last = "L"
 
     def close(self) -> None:
-        """Close the subpath."""
         self._closed[-1] = True
         self.at = self.start
         self.last = "Z"
 
     def finished(self, tolerance: float, most: int) -> list[tuple[Array, bool]]:
-        """Return all subpaths, curves flattened."""
         vertices = np.array(self.vertices).reshape(-1, 2)
         count = np.ones(len(vertices), dtype=np.intp)
         curves = []

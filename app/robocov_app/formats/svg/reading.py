@@ -179,7 +179,6 @@ class _Drawing:
             self._draw(child, _Place(matrix, style, labels, width, height))
 
     def notes(self) -> list[str]:
-        """Return what is worth knowing of how things were taken."""
         told = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
         strange = "style rules of other kinds than tag, .class and #id not applied"
         for count, words in (
@@ -224,7 +223,6 @@ class _Drawing:
         return self.named.get(element.attributes.get("href", "").strip().removeprefix("#"))
 
     def _draw(self, element: Element, outer: _Place) -> None:
-        """Add an element, with all in it."""
         if element.tag in _PICTURES:
             self.shapes.leave_out(element.tag)
         if element.tag not in _GROUPS and element.tag not in _SHAPES:
@@ -254,7 +252,6 @@ class _Drawing:
             self._draw(child, place)
 
     def _inside(self, element: Element, place: _Place) -> tuple[list[Element], _Place]:
-        """Return what is drawn in a group, a use or a nested picture, and where."""
         given = element.attributes
         if element.tag in ("use", "svg"):
             place = place.shifted(*place.lengths(element, "x", "y"))
@@ -304,7 +301,6 @@ class _Drawing:
             self.shapes.leave_out("shape", "without an area")
 
     def _strokes(self, parts: list[tuple[Array, bool]], place: _Place, at: str) -> None:
-        """Add subpaths in the units of `place` as walls."""
         style, given = place.style, self.shapes.options.thickness
         least, most = stretch(place.matrix)
         own = length(style["stroke-width"], place.diagonal)
@@ -338,7 +334,6 @@ class _Drawing:
         return True
 
     def _points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
-        """Return the subpaths of a shape, in its own units, and whether they are closed."""
         most = stretch(place.matrix)[1]
         tolerance = TOLERANCE / most if most > 0.0 else np.inf
         given = element.attributes

@@ -43,7 +43,6 @@ class _Pen:
         return f"M{' L'.join(places)}{end}"
 
     def shape(self, obstacle: Obstacle) -> str:
-        """Return the element of an obstacle."""
         if isinstance(obstacle, CircleObstacle):
             x, y = obstacle.center
             kind = f'circle cx="{self.length(x)}" cy="{self.length(-y)}" r="{self.length(obstacle.radius)}"'
@@ -112,7 +111,6 @@ def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
 
 
 def _colours(theme: Theme) -> list[str]:
-    """Return rules with the colours of a theme."""
     ground, page, edge, solid = (
         "#{:02x}{:02x}{:02x}".format(*colour)
         for colour in (theme.panel, theme.background, theme.boundary, theme.obstacle)
@@ -126,7 +124,6 @@ def _colours(theme: Theme) -> list[str]:
 
 
 def _plain(text: str) -> str:
-    """Return text as XML can hold it."""
     return escape("".join(char if char.isprintable() else " " for char in text))
 
 
