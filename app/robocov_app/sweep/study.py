@@ -73,7 +73,7 @@ def _group_text(group: Mapping[str, Any]) -> str:
     return f"{group['count']} {'with ' + ', '.join(own) if own else 'as the rest'}"
 
 
-def condition_axes(given: Mapping[str, Any], robots: Sequence[int]) -> dict[str, list[TeamValue]]:
+def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     """Return the values of each condition that is given, or raise ParameterError with the place."""
     axes: dict[str, list[TeamValue]] = {}
     for name, values in given.items():
@@ -300,7 +300,7 @@ class Study:
         axes: list[Sequence[TeamValue]] = [
             axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in TEAM
         ]
-        conditions = condition_axes(self.conditions, self.robots)
+        conditions = condition_axes(self.conditions)
         if self.group:
             conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
         names = (*TEAM, *conditions)

@@ -60,7 +60,7 @@ def test_a_run_is_under_its_conditions() -> None:
 )
 def test_what_cannot_be_is_named(given: dict[str, object], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        condition_axes(given, (6,))
+        condition_axes(given)
 
 
 def test_robots_that_are_not_there_cannot_fail() -> None:
@@ -89,4 +89,4 @@ def test_a_file_says_it_in_a_table() -> None:
 def test_all_conditions_can_be_swept() -> None:
     usual = {"fail": "1@1", "join": "2@1", "message_rate": 2.0}
     for name in CONDITIONS:
-        assert condition_axes({name: usual.get(name, 1.0)}, (6,))[name] == [usual.get(name, 1.0)]
+        assert condition_axes({name: usual.get(name, 1.0)})[name] == [usual.get(name, 1.0)]
