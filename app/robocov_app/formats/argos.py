@@ -22,11 +22,8 @@ from robocov_app.formats.geometry.shapes import Shapes
 from robocov_app.formats.options import Importer, ReadOptions
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
-MOST_PLACED = 4_000
-"""Entities that a file places in a grid or at one place."""
-
-_UPRIGHT = 1e-6
-"""Bodies that are turned about other axes than z by more are tilted, in degrees."""
+MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
+_UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are tilted, in degrees
 
 
 def _sniff(path: Path, head: bytes) -> bool:

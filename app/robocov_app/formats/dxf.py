@@ -24,8 +24,7 @@ from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.options import Importer, ReadOptions
 
-_BULGE = 1e-9
-"""Edges of polylines that are bent less are straight."""
+_BULGE = 1e-9  # edges of polylines that are bent less are straight
 
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
@@ -75,17 +74,10 @@ def flat(points: Sequence[Any]) -> Array:
     return np.array([(point[0], point[1]) for point in points], dtype=float).reshape(-1, 2)
 
 
-MOST_DRAWN = 200_000
-"""That are drawn, blocks and all."""
-
-_FRAME = 16
-"""Flag of a vertex that only shapes the spline of an old polyline."""
-
-_LEVEL = 1.0 - 1e-9
-"""Upward part of the direction, of length 1, that a circle is seen from as one."""
-
-_CLOSED = 1e-9
-"""Curves whose ends are nearer, in parts of their coordinates, are closed."""
+MOST_DRAWN = 200_000  # that are drawn, blocks and all
+_FRAME = 16  # flag of a vertex that only shapes the spline of an old polyline
+_LEVEL = 1.0 - 1e-9  # upward part of the direction, of length 1, that a circle is seen from as one
+_CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, are closed
 
 
 class DxfDrawing:
@@ -293,9 +285,7 @@ def _rows(entity: Any) -> Array:
     return np.array(found, dtype=float).reshape(-1, 5)
 
 
-MOST_LINES = 8_000_000
-"""Of text: a line of the drawing takes about 24, a vertex 4."""
-
+MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000
 """In the file, on whatever layer: ezdxf takes an eighth of a millisecond and 5 kB for each."""
 

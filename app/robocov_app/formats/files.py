@@ -22,26 +22,13 @@ from robocov.errors import MapError, Mistake, one_line, shown, shown_json
 from robocov.files.strictjson import located, parse
 from robocov.mapfile.models import FARTHEST, LARGEST
 
-MAX_BYTES = 256_000_000
-"""Largest file of a raster, in bytes: `MAX_CELLS` in plain text."""
-
-MAX_TEXT_BYTES = 50_000_000
-"""Largest file of a vector format, in bytes; as of the project's own maps."""
-
-MAX_CELLS = 64_000_000
-"""Largest raster, in cells: 8000 x 8000."""
-
-MAX_VERTICES = 500_000
-"""Most vertices of a foreign map."""
-
-MAX_SHAPES = 20_000
-"""Most shapes of a drawing, of a file: each costs a quarter of a millisecond, whatever its size."""
-
-MAX_DEPTH = 32
-"""Deepest nesting of collections, groups, blocks, lists."""
-
-HEAD = 1 << 20
-"""So much of a file is looked at, in bytes, to know its format."""
+MAX_BYTES = 256_000_000  # largest file of a raster, in bytes: `MAX_CELLS` in plain text
+MAX_TEXT_BYTES = 50_000_000  # largest file of a vector format, in bytes; as of the project's own maps
+MAX_CELLS = 64_000_000  # largest raster, in cells: 8000 x 8000
+MAX_VERTICES = 500_000  # most vertices of a foreign map
+MAX_SHAPES = 20_000  # of a drawing, of a file: each costs a quarter of a millisecond, whatever its size
+MAX_DEPTH = 32  # deepest nesting of collections, groups, blocks, lists
+HEAD = 1 << 20  # so much of a file is looked at, in bytes, to know its format
 
 
 def head(path: Path) -> bytes:
@@ -140,8 +127,7 @@ def name_of_map(path: Path) -> str:
     return one_line(path.stem)[:60] or "map"
 
 
-_LONG = 400
-"""Longest name of a file, in characters."""
+_LONG = 400  # longest name of a file, in characters
 
 
 def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> tuple[Path, str | None]:
@@ -241,11 +227,8 @@ def refused(where: str, at: Steps, value: object, wanted: str) -> MapError:
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"
 """Text as it is written, or a list or a mapping of values."""
 
-MAX_YAML_BYTES = 262_144
-"""Longest text that is read, in bytes, which takes a second: a map has 200, a world some thousand."""
-
-DEEPEST = 12
-"""Deepest nesting of lists and mappings."""
+MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
+DEEPEST = 12  # deepest nesting of lists and mappings
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:

@@ -31,8 +31,7 @@ from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOp
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
 _TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
-_NAMES = ("name", "kind", "id")
-"""Properties of a feature that name its shapes; its own id does too."""
+_NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -66,8 +65,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 class _Found:
     def __init__(self, where: str, shapes: Shapes) -> None:
-        self.where = where
-        self.shapes = shapes
+        self.where, self.shapes = where, shapes
         self.figures: list[Figure] = []
         self.crs: str | None = None
 
@@ -198,8 +196,7 @@ IMPORTER = Importer(
 )  # fmt: skip
 
 
-_FINER = 6
-"""So many more decimals have degrees: one is about a hundred kilometres."""
+_FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:

@@ -19,19 +19,14 @@ from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes import Figure
 from robocov_app.formats.options import ReadOptions
 
-DEGREES = "OGC:CRS84"
-"""Longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)."""
-
+DEGREES = "OGC:CRS84"  # longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)
 _IN_DEGREES = (DEGREES, "EPSG:4326")
 _AS_THEY_ARE = "--units metres takes coordinates as they are"
 _AUTHORITIES = ("EPSG", "ESRI", "IGNF", "OGC")
 _URN = re.compile(r"(?:urn:(?:x-)?ogc:def:crs:)?([A-Z]{3,4}):(?:[\d.]*:)?([A-Z]*\d{1,9})", re.IGNORECASE)
 _ADDRESS = re.compile(r"https?://www\.opengis\.net/def/crs/([A-Za-z]+)/[\d.]+/([A-Za-z]*\d{1,9})")
-_DIGITS = 6
-"""Decimals of metres: free space is known to a micrometre."""
-
-_EARTH = 6_371_000.0
-"""Mean radius in metres, to tell degrees from metres; nothing else is computed with it."""
+_DIGITS = 6  # decimals of metres: free space is known to a micrometre
+_EARTH = 6_371_000.0  # mean radius in metres, to tell degrees from metres; nothing else is computed with it
 
 
 def in_metres(

@@ -16,8 +16,7 @@ from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.polygons import Crossings, enclosed
 from robocov_app.formats.options import Importer, ReadOptions
 
-_MIN_HOLE = 1e-4
-"""Holes smaller than this, in m², come of rounding."""
+_MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
 
 
 def _sniff(path: Path, head: bytes) -> bool:

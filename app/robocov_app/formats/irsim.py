@@ -27,9 +27,7 @@ from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.options import Importer, ReadOptions
 from robocov_app.formats.picture import read_picture
 
-MOST_OBJECTS = 4_000
-"""Robots and obstacles of a world."""
-
+MOST_OBJECTS = 4_000  # robots and obstacles of a world
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
 

@@ -23,9 +23,7 @@ from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_repor
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
-CELL = 1.0
-"""Side of a cell in metres where none is given: the format has no unit."""
-
+CELL = 1.0  # side of a cell in metres where none is given: the format has no unit
 _PASSABLE, _SOLID = b".GS", b"@O"
 _BAD = 255
 

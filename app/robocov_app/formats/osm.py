@@ -29,9 +29,7 @@ _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail",
 _POSTS = {"bollard", "block", "tree"}
 _KEYS = {"area", "barrier", "building", "layer", "location", "name", "natural", "tunnel", "type", "width"}
 _KEYS |= {"waterway", "water"}
-_OPEN = {"no", "roof"}
-"""Buildings that robots pass: a roof stands on posts."""
-
+_OPEN = {"no", "roof"}  # buildings that robots pass: a roof stands on posts
 _METRES = re.compile(r"(\d{1,3}(?:\.\d+)?)\s*m?")
 
 

@@ -30,14 +30,9 @@ _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
 _SCALE, _TOP, _ABOVE, _LINE = 1.3, 66.0, 34.0, 17.0
 """Of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report."""
 
-_MARK = 0.55
-"""Opacity of what is marked."""
-
-_MOST_LINES = 12
-"""Of the report; what is beyond is counted."""
-
-_RING = 20.0
-"""Size of the ring around a passage that is too short to be seen, in points."""
+_MARK = 0.55  # opacity of what is marked
+_MOST_LINES = 12  # of the report; what is beyond is counted
+_RING = 20.0  # size of the ring around a passage that is too short to be seen, in points
 
 
 def preview(

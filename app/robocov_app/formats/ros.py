@@ -39,16 +39,11 @@ from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, f
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.picture import Brightness, read_picture
 
-_OCCUPIED, _FREE = 0.65, 0.196
-"""Thresholds of a file that gives none, as map_server writes them."""
-
+_OCCUPIED, _FREE = 0.65, 0.196  # thresholds of a file that gives none, as map_server writes them
 _KNOWN = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
 
-_NOISE = 1.5
-"""In maps that robots made single cells are noise."""
-
-_SAVED_UNKNOWN = 205
-"""What savers write for unknown cells, of 255."""
+_NOISE = 1.5  # in maps that robots made single cells are noise
+_SAVED_UNKNOWN = 205  # what savers write for unknown cells, of 255
 
 
 def _sniff(path: Path, head: bytes) -> bool:
@@ -200,9 +195,7 @@ IMPORTER = Importer(
 )  # fmt: skip
 
 
-_WHITE, _GREY, _BLACK = 254, _SAVED_UNKNOWN, 0
-"""What map_saver writes for free, unknown and occupied."""
-
+_WHITE, _GREY, _BLACK = 254, _SAVED_UNKNOWN, 0  # what map_saver writes for free, unknown and occupied
 _FINER = 4
 """Of scale and raw a cell's occupancy is the part of so many by so many of its places that is solid."""
 
@@ -240,13 +233,9 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     _save(image, pixels[::-1], None if alpha is None else alpha[::-1], grid)
     with written(path) as part:
         part.write_text(
-            f"image: {text_name}\n"
-            f"mode: {mode}\n"
-            f"resolution: {grid.cell!r}\n"
+            f"image: {text_name}\nmode: {mode}\nresolution: {grid.cell!r}\n"
             f"origin: [{grid.origin[0]!r}, {grid.origin[1]!r}, 0.0]\n"
-            f"negate: 0\n"
-            f"occupied_thresh: {_OCCUPIED}\n"
-            f"free_thresh: {_FREE}\n",
+            f"negate: 0\noccupied_thresh: {_OCCUPIED}\nfree_thresh: {_FREE}\n",
             encoding="utf-8",
         )
     return grid_report("ros", (path, image), environment, grid, free, notes=notes)

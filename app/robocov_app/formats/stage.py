@@ -31,18 +31,15 @@ from robocov_app.formats.geometry.shapes import Outline, Shapes
 from robocov_app.formats.options import Importer, ReadOptions
 from robocov_app.formats.picture import read_picture
 
-MAX_BYTES = 5_000_000
-"""Largest file of a world, in bytes."""
-
+MAX_BYTES = 5_000_000  # largest file of a world, in bytes
 MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000
 """Words and numbers in a world and all that it includes; models and blocks that macros make of them."""
 
-_DARK = 127 / 255
-"""Pixels that are not brighter are solid."""
+_DARK = 127 / 255  # pixels that are not brighter are solid
 
 _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
-    r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])'
+    r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])|(?P<strange>[\s\S])'
 )
 _MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -130,11 +127,9 @@ class _World:
     """Reads a world and places its models."""
 
     def __init__(self, path: Path, shapes: Shapes) -> None:
-        self.path = path
-        self.shapes = shapes
+        self.path, self.shapes = path, shapes
         self.tokens: list[_Token] = []
-        self.entities = 0
-        self.pixels = 0
+        self.entities = self.pixels = 0
         self.macros: dict[str, _Entity] = {}
         self.bitmaps: dict[Path, tuple[MultiPolygon, int, int]] = {}
         self.metre, self.turn = 1.0, math.pi / 180
@@ -157,16 +152,16 @@ class _World:
     def _split(self, path: Path, depth: int) -> None:
         """Add the tokens of a file, and of those that it includes."""
         text = files.content(path, MAX_BYTES).decode("utf-8", "replace")
-        at, line, name, include = 0, 1, one_line(path), False
-        while at < len(text):
-            found = _TOKEN.match(text, at)
-            if found is None:
-                _Token("", text[at : at + 20], f"{name}:{line}").refuse("a word, a number or a bracket")
+        line, name, include = 1, one_line(path), False
+        for found in _TOKEN.finditer(text):
             kind = str(found.lastgroup)
             token = _Token(kind, found[kind], f"{name}:{line}")
-            at, line = found.end(), line + found[0].count("\n")
+            line += found[0].count("\n")
             if kind == "blank":
                 continue
+            if kind == "strange":
+                strange = text[found.start() : found.start() + 20]
+                token._replace(text=strange).refuse("a word, a number or a bracket")
             if include:
                 if kind != "string" or depth >= files.MAX_DEPTH:
                     token.refuse("a file to include, which does not include itself,")

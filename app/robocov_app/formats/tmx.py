@@ -30,15 +30,11 @@ from robocov_app.formats.geometry.shapes import Line, Shapes, folded
 from robocov_app.formats.options import Importer, ReadOptions
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
-MOST_TILES, MOST_READ = 4_000_000, 16_000_000
-"""Of a map, and of all its layers together."""
-
+MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
 MOST_PARTS = 10_000
 """Collision objects of tiles, each as often as its tile is on the map, and tiles beside the grid."""
 
-CELL = 1.0
-"""Width of a tile in metres where none is given: the format has only pixels."""
-
+CELL = 1.0  # width of a tile in metres where none is given: the format has only pixels
 _FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
 """Bits of a global tile ID: the three flips, and the tile."""
 

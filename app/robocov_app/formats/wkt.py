@@ -55,8 +55,7 @@ class WktText:
     def __init__(self, text: str, where: str, shapes: Shapes) -> None:
         # as many spaces instead, so that places stay what they are
         self.text = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
-        self.where = where
-        self.shapes = shapes
+        self.where, self.shapes = where, shapes
         self.at = 0
         self.srid: int | None = None
         self._figures: list[Figure] = []

@@ -15,14 +15,10 @@ from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
 
-MOST_ELEMENTS = 100_000
-"""In a file, and drawn of it where parts are used again."""
-
+MOST_ELEMENTS = 100_000  # in a file, and drawn of it where parts are used again
 MOST_ATTRIBUTES = 1_000_000
 
-DEEPEST = 100
-"""Deepest nesting of elements and uses; drawing programs stay below 30."""
-
+DEEPEST = 100  # deepest nesting of elements and uses; drawing programs stay below 30
 _SVG = "http://www.w3.org/2000/svg"
 _EXPANDED = 1_000_000
 """Most characters that entities and default attributes may add to a file: those of drawing programs stand
@@ -101,10 +97,8 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
 
 class _Reader:
     def __init__(self, where: str, content: bytes, wanted: str, kind: str, texts: Collection[str]) -> None:
-        self.where = where
-        self.content = content
-        self.wanted, self.kind = wanted, kind
-        self.texts = texts
+        self.where, self.content = where, content
+        self.wanted, self.kind, self.texts = wanted, kind, texts
         self.references = content.count(b"&")
         self.room = len(content) + _EXPANDED
         self.parser = expat.ParserCreate(namespace_separator=" ")
@@ -115,11 +109,10 @@ class _Reader:
         self.parser.EntityDeclHandler = self._entity
         self.parser.AttlistDeclHandler = self._declared
         self.parser.StartNamespaceDeclHandler = self._namespace
-        self.declarations = 0
         self.open: list[Element | None] = []
         self.pieces: list[str] = []
         self.first: Element | None = None
-        self.count = 0
+        self.count = self.declarations = 0
 
     def root(self) -> Element:
         try:
