@@ -13,7 +13,7 @@ from driven_window import MODIFIERS, Driver
 
 from robocov.mapfile import load_map
 from robocov_app.editor.model.document import FIRST_SHEET, Document
-from robocov_app.editor.model.measurement_worker import measurement_worker
+from robocov_app.editor.model.measurement import measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.editor import Editor

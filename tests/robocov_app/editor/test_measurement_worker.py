@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.edits import properties, transform
-from robocov_app.editor.model.measurement import measure
-from robocov_app.editor.model.measurement_worker import MeasurementWire, Measuring, measurement_worker
+from robocov_app.editor.model.measurement import MeasurementWire, Measuring, measure, measurement_worker
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.toolkit.worker import Line

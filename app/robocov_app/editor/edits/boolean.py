@@ -129,7 +129,6 @@ def _intersection(a: BaseGeometry, b: BaseGeometry) -> BaseGeometry:
 
 
 def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
-    """Return the selected obstacles, the lowest first."""
     items = [item for item in sketch.obstacles if item.key in selection.items]
     if len(items) < 2:
         raise MapError(f"select two or more obstacles to {verb}")

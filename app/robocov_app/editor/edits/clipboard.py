@@ -67,7 +67,6 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
 
 
 def _part(text: str) -> Sketch:
-    """Return what a text stands for, as a sketch of its own."""
     if not text.strip():
         raise MapError("there is nothing to paste")
     if text.lstrip()[:1] not in ("{", "["):
@@ -79,7 +78,6 @@ def _part(text: str) -> Sketch:
 
 
 def _map_of(value: Any) -> dict[str, Any]:
-    """Return the map document that holds a pasted value."""
     empty = {"format": MAP_FORMAT, "version": VERSION}
     if isinstance(value, dict):
         if value.get("format") == FORMAT:

@@ -41,8 +41,7 @@ def spread_of(peak: Gaussian) -> float:
 def peak_added(sketch: Sketch, center: Point, sigma: float, weight: float) -> Change:
     """Add a hot spot; without a density, to one that is 1 everywhere."""
     if isinstance(sketch.density, WeightedPolygons | Raster) and not sketch.density.uniform:
-        kind = f"this map's density is a {sketch.density.kind}"
-        raise MapError(f"{kind}, hot spots are not: “density none” takes it away first")
+        raise _other_kind(sketch.density, ", hot spots are not")
     peak = Gaussian(point_near(center), _weight(weight, least=LIGHTEST), _sigma(sigma))
     return _put(sketch, (*features_of(sketch), peak), _base(sketch), "hot spot added")
 
@@ -50,8 +49,7 @@ def peak_added(sketch: Sketch, center: Point, sigma: float, weight: float) -> Ch
 def area_added(sketch: Sketch, points: Sequence[Point], weight: float) -> Change:
     """Add an area of constant weight on top; without a density, to one that is 1 everywhere."""
     if isinstance(sketch.density, Gaussians | Raster):
-        kind = f"this map's density is a {sketch.density.kind}"
-        raise MapError(f"{kind}, areas are not: “density none” takes it away first")
+        raise _other_kind(sketch.density, ", areas are not")
     area = _sound(WeightedArea(distinct(ring_near(np.array(points, dtype=float).reshape(-1, 2))), weight))
     return _put(sketch, (*features_of(sketch), area), _base(sketch), "area added")
 
@@ -160,7 +158,6 @@ def density_label(density: Density | None) -> str:
 
 
 def _base(sketch: Sketch) -> float:
-    """Return what every place counts without the features."""
     density = sketch.density
     if isinstance(density, Gaussians):
         return density.floor
@@ -168,7 +165,11 @@ def _base(sketch: Sketch) -> float:
         return density.background
     if density is None or density.uniform:
         return 1.0 if density is None else density.highest
-    raise MapError(f"this map's density is a {density.kind}: “density none” takes it away first")
+    raise _other_kind(density)
+
+
+def _other_kind(density: Density, wanted: str = "") -> MapError:
+    return MapError(f"this map's density is a {density.kind}{wanted}: “density none” takes it away first")
 
 
 def _put(sketch: Sketch, features: Sequence[Feature], base: float, words: str) -> Change:

@@ -27,9 +27,7 @@ def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
 def door_at(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
     """Return both sides of a door whose middle is as near to a point as the wall allows."""
     line = _line(sketch, key)
-    width = min(width, line.length)
-    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
-    a, b = (line.interpolate(middle + by) for by in (-width / 2, width / 2))
+    a, b = map(line.interpolate, _span(line, point, min(width, line.length)))
     return (float(a.x), float(a.y)), (float(b.x), float(b.y))
 
 
@@ -49,11 +47,10 @@ def door_width(width: float) -> float:
 
 def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
     """Open a door of a width, m, its middle as near to a point as the wall allows."""
-    if door_width(width) > _line(sketch, key).length - SMALLEST:
-        raise MapError(f"the {display_name(sketch, key)} is not longer than a door of {width:g} m")
     line = _line(sketch, key)
-    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
-    return _opened(sketch, key, middle - width / 2, middle + width / 2)
+    if door_width(width) > line.length - SMALLEST:
+        raise MapError(f"the {display_name(sketch, key)} is not longer than a door of {width:g} m")
+    return _opened(sketch, key, *_span(line, point, width))
 
 
 def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
@@ -62,6 +59,11 @@ def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     begin, end = sorted(line.project(shapely.Point(place)) for place in (a, b))
     door_width(end - begin)
     return _opened(sketch, key, begin, end)
+
+
+def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
+    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
+    return middle - width / 2, middle + width / 2
 
 
 def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:

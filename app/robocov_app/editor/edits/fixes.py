@@ -99,7 +99,6 @@ def _boundary_drawn(sketch: Sketch) -> Change:
 
 
 def _filled(sketch: Sketch, where: BaseGeometry) -> Change:
-    """Put polygons where nothing is to be free."""
     shapes = outlines(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
     if not shapes:
         raise MapError("there is nothing to fill")
@@ -121,20 +120,15 @@ def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) 
     if isinstance(spec, PointsStart):
         x, y = shapely.get_coordinates(where)[-1].tolist()
         number = max(k for k, at in enumerate(spec.positions) if at == (x, y))
-        others = [at for k, at in enumerate(spec.positions) if k != number]
-        room -= (
-            shapely.union_all(shapely.buffer(shapely.points(np.array(others)), 2.01 * radius + _SPARE))
-            if others
-            else MultiPolygon()
-        )
+        others = shapely.points(np.delete(np.array(spec.positions), number, axis=0))
+        room -= shapely.union_all(shapely.buffer(others, 2.01 * radius + _SPARE))
         place = _nearest(room, (x, y))
         if place is None:
             return None
         positions = (*spec.positions[:number], place, *spec.positions[number + 1 :])
         words = f"start “{name}”: place {number + 1} moved to where a robot fits"
         return Change(sketch.with_start(name, PointsStart(positions)), Selection.of(name), words)
-    center = _nearest(room, spec.center) if isinstance(spec, DiscStart) else None
-    if center is None or not isinstance(spec, DiscStart):
+    if not isinstance(spec, DiscStart) or (center := _nearest(room, spec.center)) is None:
         return None
     words = f"start “{name}” moved to where a robot fits"
     return Change(sketch.with_start(name, replace(spec, center=center)), Selection.of(name), words)
@@ -156,10 +150,8 @@ def _widened(sketch: Sketch, gap: LineString, width: float) -> Change | None:
         if shorter is not None:
             words = f"{numbered_name(sketch, item.key)} shortened by {lack:.2g} m"
             return Change(sketch.with_shapes({item.key: shorter}), Selection.of(item.key), words)
-    both = {item.key for item, a, _ in sides if a == gap.coords[0]} & {
-        item.key for item, a, _ in sides if a != gap.coords[0]
-    }
-    alone = [side for side in sides if side[0].key not in both]
+    here, there = ({item.key for item, a, _ in sides if a == end} for end, _ in ends)
+    alone = [side for side in sides if side[0].key not in here & there]
     if not alone or gap.length == 0.0:
         return None
     item, a, b = min(alone, key=lambda side: side[0].geometry.area)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from robocov.environment import ObstaclePath, Point
+from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.model.geometry import nearest_on, point_near
@@ -38,10 +38,8 @@ def way_point_added(
     """Add a way point, last or before `at`; the first makes a path from the obstacle's middle, at m/s."""
     path = path_of(sketch, key)
     if path is None:
-        path = ObstaclePath(
-            (_middle_of(sketch.item(key)), point_near(point)), _speed(speed), "back-and-forth"
-        )
-        return _put(sketch, key, path, "moves")
+        ends = _middle_of(sketch.item(key)), point_near(point)
+        return _put(sketch, key, ObstaclePath(ends, _speed(speed), "back-and-forth"), "moves")
     where = len(path.points) if at is None else at
     points = (*path.points[:where], point_near(point), *path.points[where:])
     return _put(sketch, key, replace(path, points=points), "way point added")
@@ -71,11 +69,10 @@ def path_removed(sketch: Sketch, selection: Selection) -> Change:
 def path_turned(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles come back the way they went, or if they do that go in a loop."""
     paths = _moving_of(sketch, selection)
-    if all(path.repeat == "back-and-forth" for path in paths.values()):
-        loops = {key: replace(path, repeat="loop") for key, path in paths.items()}
-        return _with_paths(sketch, selection, loops, "goes in a loop")
-    turned = {key: replace(path, repeat="back-and-forth") for key, path in paths.items()}
-    return _with_paths(sketch, selection, turned, "goes back and forth")
+    both_ways = all(path.repeat == "back-and-forth" for path in paths.values())
+    repeat: Repeat = "loop" if both_ways else "back-and-forth"
+    turned = {key: replace(path, repeat=repeat) for key, path in paths.items()}
+    return _with_paths(sketch, selection, turned, "goes in a loop" if both_ways else "goes back and forth")
 
 
 def path_paced(sketch: Sketch, selection: Selection, speed: float) -> Change:
@@ -136,7 +133,6 @@ def _path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
 
 
 def _middle_of(item: Item) -> Point:
-    """Return the middle of an obstacle's bounding box, m."""
     if item.geometry.is_empty:
         raise MapError("what covers nothing cannot move")
     low_x, low_y, high_x, high_y = item.geometry.bounds
@@ -167,7 +163,5 @@ def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
     extent = np.ptp(np.array(path.points), axis=0).max()
     if extent < SMALLEST or shapely.LineString(path.points).length < SMALLEST:
         raise MapError("the way points lie in one place: click somewhere else")
-    shape = replace(sketch.item(key).shape, path=path)
-    return Change(
-        sketch.with_shapes({key: shape}), Selection.of(key), f"{display_name(sketch, key)}: {words}"
-    )
+    after = sketch.with_shapes({key: replace(sketch.item(key).shape, path=path)})
+    return Change(after, Selection.of(key), f"{display_name(sketch, key)}: {words}")

@@ -106,7 +106,6 @@ def _fewer(ring: Ring, tolerance: float, *, closed: bool) -> Ring:
 
 
 def _straight(ring: Ring, degrees: float, *, closed: bool) -> Ring:
-    """Return a ring with its nearly level and upright edges made so."""
     points = np.array(ring, dtype=float).reshape(-1, 2)
     if len(points) < 2:
         return ring

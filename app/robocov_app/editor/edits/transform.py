@@ -374,7 +374,6 @@ def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, S
 
 
 def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
-    """Return the sketch with things moved, each by its own (dx, dy) m."""
     for owner, (dx, dy) in by.items():
         if dx or dy:
             sketch = _placed(sketch, Selection.of(owner), Affine.shift(dx, dy))
@@ -389,7 +388,6 @@ def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) ->
 
 
 def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
-    """Return the sketch with what is selected taken elsewhere."""
     owners = selection.owners
     single = [vertex for vertex in selection.vertices if vertex.of not in owners]
     places = {vertex: affine.point(place_of(sketch, vertex)) for vertex in single}

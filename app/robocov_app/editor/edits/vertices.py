@@ -84,7 +84,6 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
 
 
 def _with_rim(round_one: CircleObstacle | DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
-    """Return centre and radius after some of its handles have moved."""
     by_index = {vertex.index: place for vertex, place in moves.items()}
     place = point_near(by_index[min(by_index)])
     if 0 in by_index:
@@ -119,7 +118,6 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
 
 
 def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int, set[int]]]:
-    """Return the indices of vertices by owner and ring."""
     found: dict[Owner, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
     for vertex in vertices:
         place_of(sketch, vertex)
@@ -128,7 +126,6 @@ def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int
 
 
 def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> Sketch:
-    """Return the sketch without some vertices of something, by ring and index."""
     rings = [
         tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ()))
         for number, ring in enumerate(ring_points(sketch, owner))

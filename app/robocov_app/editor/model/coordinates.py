@@ -121,7 +121,6 @@ def angle_of(text: str) -> float:
 
 
 def _clean(text: str) -> str:
-    """Return what was typed with plain signs, in lower case."""
     return " ".join(text.translate(str.maketrans("−–″”′’∠", "--\"\"''<")).lower().split())
 
 

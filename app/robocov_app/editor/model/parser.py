@@ -107,7 +107,6 @@ class _Reader:
         return value
 
     def members(self, value: Any, path: JsonPath, known: Iterable[str]) -> Mapping[str, Any]:
-        """Return an object that has known keys only."""
         known = list(known)
         for key in self.object(value, path):
             if key not in known:

@@ -266,7 +266,6 @@ def _far_faults(points: Ring) -> Iterator[_Fault]:
 
 
 def _drawn(points: Array) -> BaseGeometry | None:
-    """Return what there is of an outline that encloses nothing."""
     if not len(points):
         return None
     return LineString(points) if len(points) > 1 else shapely.Point(points[0])
@@ -350,7 +349,6 @@ def _no_room(
 
 
 def _tight_places(name: str, spec: PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    """Warn of places where a robot meets a wall, or another robot: each where it is."""
     points = shapely.points(np.array(spec.positions, dtype=float))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():

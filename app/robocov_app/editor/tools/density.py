@@ -51,7 +51,6 @@ class DensityTool(Tool):
         return self._from is not None or self.chosen is not None
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        """Take hold of what is there, else begin a feature."""
         self._from, self._at, self.change = event.point, event.point, None
         self._taken, self._corner = _under(features_of(context.sketch), event)
         if self._taken is not None and self._corner is None:
@@ -83,7 +82,6 @@ class DensityTool(Tool):
         return had
 
     def back(self, context: ToolContext) -> bool:
-        """Take the chosen one away."""
         chosen, self.chosen = self.chosen, None
         if chosen is None or chosen >= len(features_of(context.sketch)):
             return False
@@ -102,7 +100,6 @@ class DensityTool(Tool):
         self.weight = weight
 
     def preview(self, context: ToolContext) -> Preview | None:
-        """Show all features, hot spots at one standard deviation, and what the dragged one will be."""
         features = features_of(self.change.sketch if self.change is not None else context.sketch)
         dots = tuple(map(_middle, features))
         dots += tuple(p for each in features if isinstance(each, WeightedArea) for p in each.vertices)
@@ -122,7 +119,6 @@ class DensityTool(Tool):
         return "move" if self._taken is not None and self._from is not None else "cross"
 
     def _wanted(self, context: ToolContext, to: Point) -> Change | None:
-        """Return what the drag to a place makes."""
         assert self._from is not None
         sketch, begun, number = context.sketch, self._from, self._taken
         if number is None and isinstance(sketch.density, WeightedPolygons):

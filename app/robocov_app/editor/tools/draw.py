@@ -47,7 +47,6 @@ class DrawTool(Tool, ABC):
         self.outline = Outline(self.least, self.most, self.closes, self.drags)
 
     def made(self, context: ToolContext, points: Sequence[Point]) -> Change | None:
-        """Return what the points make of the map."""
         return None
 
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
@@ -61,7 +60,6 @@ class DrawTool(Tool, ABC):
         return [a, b]
 
     def placed(self, event: PointerEvent) -> Point:
-        """Return where the next point goes."""
         return constrained_point(event, self.origin)
 
     def end_for(self, text: str) -> Point | None:
@@ -70,7 +68,6 @@ class DrawTool(Tool, ABC):
 
     @property
     def points(self) -> list[Point]:
-        """What has been drawn so far."""
         return self.outline.points
 
     @property
@@ -187,7 +184,6 @@ class MeasureTool(DrawTool):
 
     @property
     def measured(self) -> tuple[Point, ...]:
-        """The points of the tape."""
         return tuple(self.points) or self._kept
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:

@@ -56,16 +56,12 @@ def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle,
     frame = frame_of(sketch, selection, pixel)
     if frame is not None:
         low_x, low_y, high_x, high_y = frame
-        xs, ys = (
-            {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x},
-            {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y},
-        )
-        roomy = high_x - low_x > ROOMY * pixel, high_y - low_y > ROOMY * pixel
-        for x in (-1, 0, 1):
-            for y in (-1, 0, 1):
-                middle = (x == 0 and not roomy[0]) or (y == 0 and not roomy[1])
-                if (x or y) and not middle:
-                    found.append(Handle("scale", (xs[x], ys[y]), side=(x, y)))
+        xs = {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x}
+        ys = {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y}
+        columns = (-1, 0, 1) if high_x - low_x > ROOMY * pixel else (-1, 1)
+        rows = (-1, 0, 1) if high_y - low_y > ROOMY * pixel else (-1, 1)
+        sides = [(x, y) for x in columns for y in rows if x or y]
+        found += [Handle("scale", (xs[x], ys[y]), side=(x, y)) for x, y in sides]
         found.append(Handle("turn", (xs[0], high_y + KNOB * pixel)))
     for owner in handled(selection):
         if selection.vertices or not _is_small(sketch, owner, pixel):
@@ -81,6 +77,5 @@ def handle_at(found: tuple[Handle, ...], point: Point, reach: float) -> Handle |
 
 
 def _is_small(sketch: Sketch, owner: Owner, pixel: float) -> bool:
-    """Return whether an obstacle or a disc is too small on the screen to be taken between its vertices."""
     box = None if owner == BOUNDARY else box_of(sketch, owner)
     return box is not None and max(box[2] - box[0], box[3] - box[1]) < SMALL * pixel

@@ -57,7 +57,6 @@ class MotionPathTool(Tool):
         return self._last
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        """Take hold of a way point, choose another obstacle, or add a way point."""
         subject, path = _led(context)
         self._held = self.change = None
         if path is not None:
@@ -105,7 +104,6 @@ class MotionPathTool(Tool):
         self._note(context)
 
     def finish(self, context: ToolContext) -> bool:
-        """Let the obstacle go: another one can be chosen."""
         had = _led(context)[0] is not None
         if had:
             context.select(Selection())
@@ -113,7 +111,6 @@ class MotionPathTool(Tool):
         return had
 
     def back(self, context: ToolContext) -> bool:
-        """Take the chosen way point away, or the last one."""
         subject, path = _led(context)
         if subject is None or path is None:
             return False
@@ -156,7 +153,6 @@ class MotionPathTool(Tool):
         return "move" if over or self._held is not None else "cross"
 
     def _note(self, context: ToolContext) -> None:
-        """Note what the next way point comes after."""
         subject, path = _led(context)
         self._leads = subject is not None
         self._last = None if path is None else path.points[-1]

@@ -46,7 +46,6 @@ class ReferenceImageTool(Tool):
         self.moved = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
 
     def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
-        """Let the picture lie there, or take the point that was clicked."""
         begun, moved = self._from, self.moved
         self._from = self.moved = None
         if begun is None:

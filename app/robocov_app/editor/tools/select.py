@@ -61,7 +61,6 @@ class Drag:
         return Preview(words=self.words)
 
     def ended(self, context: ToolContext) -> None:
-        """Let go: what was changed is done."""
         if self.change is not None:
             context.change(self.change)
 
@@ -265,7 +264,6 @@ class Scaling(Drag):
         self.words = f"{length_words(abs(wide * fx))} x {length_words(abs(high * fy))}   {factor}"
 
     def enter(self, context: ToolContext, text: str) -> None:
-        """Scale to so many metres along the side that is dragged: ``2.5``, ``150%``, ``*2``."""
         axis = 0 if self._side[0] else 1
         now = self._bounds[2 + axis] - self._bounds[axis]
         factor = length_of(text, now=now) / now
@@ -333,7 +331,6 @@ class SelectTool(Tool):
         return self.drag is not None
 
     def press(self, context: ToolContext, event: PointerEvent) -> None:
-        """Take hold of a handle, or of what is there; else begin a box."""
         self._pressed, self.drag, self._narrows, self._gone = event, None, False, False
         self._handle = handle_at(context.handles, event.raw, NEAR * event.reach)
         if self._handle is not None:
@@ -364,7 +361,6 @@ class SelectTool(Tool):
             context.select(own)
 
     def move(self, context: ToolContext, event: PointerEvent) -> None:
-        """Drag; or show what a press would take."""
         if self._pressed is None:
             self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
             found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
@@ -379,7 +375,6 @@ class SelectTool(Tool):
             self.guides = self.drag.guides
 
     def _begun(self, context: ToolContext, pressed: PointerEvent) -> Drag:
-        """Return the drag that the press has begun."""
         handle, whole = self._handle, context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
             return MovingVertices(context, handle.vertex, context.selection)

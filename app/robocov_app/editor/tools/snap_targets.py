@@ -154,7 +154,6 @@ def vertex_count(sketch: Sketch) -> int:
 
 
 def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
-    """Return the (k, 2) starts and ends of the edges of polygons."""
     rings = shapely.get_rings(np.array(geometries, dtype=object))
     points, ring = shapely.get_coordinates(rings, return_index=True)
     is_edge = ring[1:] == ring[:-1]

@@ -62,7 +62,6 @@ class _Line:
     length: float = math.inf
 
     def foot(self, point: Point) -> Point:
-        """Return the place on it that is nearest to a point."""
         dx, dy = point[0] - self.through[0], point[1] - self.through[1]
         along = dx * self.direction[0] + dy * self.direction[1]
         if self.kind == "edge":
@@ -70,7 +69,6 @@ class _Line:
         return self.at(along)
 
     def at(self, along: float) -> Point:
-        """Return the place so many metres along."""
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
 
     def crossing(self, other: _Line) -> Point | None:
@@ -102,7 +100,6 @@ class _Line:
         return None if beyond else place
 
     def shown(self, at: Point) -> Guide:
-        """Return the guide for a point that came to lie on it."""
         line = self.guide if self.kind == "edge" else (*self.guide, at)
         return Guide(self.kind, line, self.words)
 
@@ -220,7 +217,6 @@ def _on_grid(point: Point, targets: Targets, snapping: Snapping, origin: Point |
 
 
 def _ray(point: Point, origin: Point, step: float) -> _Line:
-    """Return the nearest line through the origin at a multiple of some degrees."""
     degrees = math.degrees(math.atan2(point[1] - origin[1], point[0] - origin[0]))
     nearest = step * round(degrees / step)
     words = f"{math.remainder(nearest, 360.0) % 360.0:g}°"
@@ -228,7 +224,6 @@ def _ray(point: Point, origin: Point, step: float) -> _Line:
 
 
 def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line]:
-    """Yield the edges near a point, the nearest first."""
     starts, ends = targets.edges_near(point, snapping.reach)
     for (ax, ay), (bx, by) in zip(starts.tolist(), ends.tolist(), strict=True):
         length = math.hypot(bx - ax, by - ay)

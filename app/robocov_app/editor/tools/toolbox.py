@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from robocov_app.editor.tools.density import DensityTool
-from robocov_app.editor.tools.draw import (
-    BoundaryTool,
-    CircleTool,
-    DiscTool,
-    DoorTool,
-    MeasureTool,
-    PlacesTool,
-    PolygonTool,
-    RectangleTool,
-    WallTool,
-)
-from robocov_app.editor.tools.motion_path import MotionPathTool
-from robocov_app.editor.tools.reference_image import ReferenceImageTool
-from robocov_app.editor.tools.select import PanTool, SelectTool
+from robocov_app.editor.tools import density, draw, motion_path, reference_image, select
 from robocov_app.editor.tools.tool import Tool
 
 TOOLS: tuple[type[Tool], ...] = (
-    *(SelectTool, PanTool, PolygonTool, RectangleTool, CircleTool, WallTool, DoorTool, BoundaryTool),
-    *(MeasureTool, DiscTool, PlacesTool, DensityTool, MotionPathTool, ReferenceImageTool),
+    *(select.SelectTool, select.PanTool, draw.PolygonTool, draw.RectangleTool, draw.CircleTool),
+    *(draw.WallTool, draw.DoorTool, draw.BoundaryTool, draw.MeasureTool, draw.DiscTool, draw.PlacesTool),
+    *(density.DensityTool, motion_path.MotionPathTool, reference_image.ReferenceImageTool),
 )
 
 

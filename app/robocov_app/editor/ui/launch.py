@@ -9,7 +9,7 @@ from pathlib import Path
 from robocov.errors import InputError
 from robocov_app.editor.model.autosave import Autosave, opened_elsewhere, recoverable
 from robocov_app.editor.model.document import Document
-from robocov_app.editor.model.measurement_worker import measurement_worker
+from robocov_app.editor.model.measurement import measurement_worker
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
 from robocov_app.editor.ui.settings import ATTRIBUTES, FILE, SHOWN, SNAPS, EditorSettings
