@@ -1,7 +1,5 @@
 """What a plot shows of the world: the map, and a whole run in it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,8 +25,6 @@ from robocov_app.render.theme import ONE_HUE_EACH, Colour, Theme, mix, readable_
 # radius of a robot where it has room and in the densest crowd, and least size of its number, in points
 _DISC, _SMALLEST_DISC, _SMALLEST_NUMBER = 6.4, 1.7, 4.2
 _START, _AIM = 6.2, 8.0  # sizes of marks where they have room, in points
-
-
 _ARROW = 16.0  # length of the arrow on an obstacle that moves, in points
 _DOTS = 400  # dots of the shading of a density along the longer side of a map
 
@@ -43,12 +39,10 @@ def ticks_in_metres(axes: Axes, environment: Environment, theme: Theme) -> None:
 
 
 def _static_style(theme: Theme) -> dict[str, Any]:
-    """Return the look of obstacles."""
     return {"facecolor": tone(theme.obstacle), "edgecolor": tone(theme.obstacle_edge), "linewidth": 0.8}
 
 
 def _path_style(theme: Theme) -> dict[str, Any]:
-    """Return the look of the path of an obstacle that moves."""
     return {"color": tone(theme.ink), "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 
@@ -84,19 +78,13 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
     half = 0.5 * _ARROW * obstacle.heading
     origin, one = _in_points(axes, np.eye(2)[::-1])
     half /= abs(float(one[0] - origin[0]))
-    arrow: Any = {
-        "arrowstyle": "-|>",
-        "color": tone(theme.ink),
-        "linewidth": 1.4,
-        "shrinkA": 0.0,
-        "shrinkB": 0.0,
-    }
+    arrow: Any = {"arrowstyle": "-|>", "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
+    arrow["color"] = tone(theme.ink)
     begin, end = (obstacle.middle - half).tolist(), (obstacle.middle + half).tolist()
     axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
 
 
 def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
-
     if environment.density is None or environment.density.uniform:
         return
     low_x, low_y, high_x, high_y = environment.region.bounds

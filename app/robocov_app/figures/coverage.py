@@ -17,14 +17,7 @@ from robocov.arrays import IntArray
 from robocov.environment import Environment
 from robocov.record import Record
 from robocov.robots import Team
-from robocov_app.figures.arena import (
-    draw_map,
-    draw_robots,
-    label_of,
-    map_handles,
-    robot_handle,
-    ticks_in_metres,
-)
+from robocov_app.figures import arena
 from robocov_app.figures.curves import DISTANCE, TIME, WEIGHED, Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, TEXT, Box, Page, check_some, tone
@@ -76,8 +69,7 @@ class _Rooms(NamedTuple):
 
     curves: Box | None
     maps: Box
-    bar: float
-    """Height at which the scale of colours is."""
+    bar: float  # height at which the scale of colours is
 
 
 @plain_style()
@@ -133,7 +125,7 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     """Plot distances on axes of somebody else, which get ticks in metres and a scale of colours."""
     theme = theme_named(theme)
     limit = _limit([moment])
-    ticks_in_metres(axes, moment.environment, theme)
+    arena.ticks_in_metres(axes, moment.environment, theme)
     axes.apply_aspect()
     extent, scale = axes.get_window_extent(), axes.figure.dpi / 100
     # small axes may be saved large
@@ -158,10 +150,10 @@ def _limit(moments: Sequence[Moment]) -> float:
 
 def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
     line = Line2D([], [], color=tone(border_colour(theme)), linewidth=1.6, label="geodesic cell border")
-    handles: list[Artist] = [robot_handle("robot", theme.final, theme), line]
-    every = [map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
-    for handle in united(every, label_of):
-        handle.set_label(label_of(handle).removesuffix(" (unknown to robots)"))
+    handles: list[Artist] = [arena.robot_handle("robot", theme.final, theme), line]
+    every = [arena.map_handles(moment.environment, theme, density=False)[1:] for moment in moments]
+    for handle in united(every, arena.label_of):
+        handle.set_label(arena.label_of(handle).removesuffix(" (unknown to robots)"))
         handles.append(handle)
     if any((moment.field.result.owner < 0).any() for moment in moments):
         colour, edge = tone(theme.unreached), tone(theme.obstacle_edge)
@@ -263,9 +255,9 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     extent = low_x, high_x, low_y, high_y
     image = axes.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased", zorder=0)
     image.set_clip_path(Polygon(moment.environment.region.vertices, transform=axes.transData))
-    draw_map(axes, moment.environment, theme, density=False, time=moment.time)
+    arena.draw_map(axes, moment.environment, theme, density=False, time=moment.time)
     places = moment.field.result.positions
-    draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
+    arena.draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
 
 
 def _draw_bar(page: Page, limit: float, rooms: _Rooms) -> float:

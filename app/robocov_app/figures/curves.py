@@ -1,7 +1,5 @@
 """Cost curves: mean distance against time, each named at its end."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 

@@ -34,11 +34,7 @@ _STYLE: Any = {
 
 @contextmanager
 def plain_style() -> Iterator[None]:
-    """Give a context in which matplotlib draws alike whatever style its user has set.
-
-    Names of maps and controllers are words: dollars in them are no formula, and letters that the font
-    has not are boxes and no reason for a warning.
-    """
+    """Let matplotlib draw alike whatever style is set; dollars are no formula, missing letters no warning."""
     import matplotlib.style
 
     style: Any = {"font.family": "DejaVu Sans", "text.usetex": False, "text.parse_math": False}

@@ -1,7 +1,5 @@
 """Plots of what a result depends on: gains, team sizes, limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -132,8 +130,8 @@ def plot_gain_grid(
         axes.text(column, row, text, fontweight=weight, **style)
     axes.set_xlim(-0.5, len(first) - 0.5)
     axes.set_ylim(-0.5, len(second) - 0.5)
-    axes.set_xticks(range(len(first)), [_gain_text(value) for value in first])
-    axes.set_yticks(range(len(second)), [_gain_text(value) for value in second])
+    axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
+    axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
     x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
     quiet_axes(axes, theme, x, y)
     axes.tick_params(length=0.0)
@@ -181,7 +179,8 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
     marks = [*ticks, *([null] if null is not None else [])]
     axes.xaxis.set_major_locator(FixedLocator(marks))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticklabels([*(_gain_text(value) for value in ticks), *(["none"] if null is not None else [])])
+    texts = [value_text(value, digits=4) for value in ticks]
+    axes.set_xticklabels([*texts, *(["none"] if null is not None else [])])
     return null
 
 
@@ -189,10 +188,6 @@ def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
     logarithmic = axes.get_xscale() == "log"
     locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
     return [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
-
-
-def _gain_text(value: Value) -> str:
-    return value_text(value, digits=4)
 
 
 def _draw_dependence(

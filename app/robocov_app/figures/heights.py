@@ -1,7 +1,5 @@
 """The best place for a sensor over a cell, by its height: the optimum of equation (14)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """A sheet of maps, side by side at one scale."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

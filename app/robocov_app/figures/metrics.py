@@ -1,7 +1,5 @@
 """Metrics of runs against time, in small panels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The page of a plot: a matplotlib figure of an exact size, laid out in pixels from its top left."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, TypeAlias, cast
 
@@ -181,13 +179,9 @@ class Page:
         align: str = "left",
     ) -> None:
         """Write one line, its middle at height `y`; with `room` it is cut to so many pixels."""
-        style: Any = {
-            "fontsize": points,
-            "fontweight": "bold" if bold else "normal",
-            "ha": align,
-            "va": "center",
-        }
-        written = self.figure.text(*self.at(x, y), text, color=tone(colour or self.theme.ink), **style)
+        style: Any = {"fontsize": points, "fontweight": "bold" if bold else "normal", "ha": align}
+        style |= {"va": "center", "color": tone(colour or self.theme.ink)}
+        written = self.figure.text(*self.at(x, y), text, **style)
         # the same words are up to a pixel wider in one place than in another
         while room is not None and len(text) > 1 and self.width_of(written) > room + 1:
             text = text[:-1]

@@ -4,8 +4,6 @@ They take plain numbers. What a result depends on (gains, team sizes) is in `rob
 Heights of rows are counted from the top; names stand to the left, level, names of groups above their rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

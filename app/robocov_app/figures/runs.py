@@ -1,7 +1,5 @@
 """Publication plots: trajectories, cost curves and comparisons, as matplotlib figures (never pyplot's)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

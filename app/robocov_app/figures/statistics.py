@@ -4,8 +4,6 @@ Runs on one map are alike: resampling them one by one would make the intervals t
 are given, whole clusters are drawn (Field and Welsh, 2007); intervals are percentiles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias

@@ -1,7 +1,5 @@
 """How curves of controllers look: colours, dashes and marks, the same in every picture."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple

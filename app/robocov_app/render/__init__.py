@@ -1,7 +1,5 @@
 """Drawing: theme, camera and layers that show an environment, a team and one moment of a run."""
 
-from __future__ import annotations
-
 import os
 
 # pygame greets on stdout, which belongs to the answers of commands

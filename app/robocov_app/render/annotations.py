@@ -1,7 +1,5 @@
 """What stands around the arena: scale bar, status line and legend, each in a strip of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The canvas: a surface with a camera and a theme, and the strokes that layers are made of."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -203,7 +201,7 @@ class Canvas:
         pygame.draw.rect(self.surface, edge, box, self.width(1.0))
 
     def arrow(self, start: Pixel, end: Pixel, colour: Colour, width: float, head: str = "full") -> None:
-        """Draw an arrow; `head` is ``full``, ``open`` or ``dot``: terms differ by more than hue."""
+        """Draw an arrow with a head that is ``full`` or ``open``, a ``dot`` or a ``bar``."""
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         length = float(np.hypot(*(b - a)))
         if length < 1.0 or ((a <= -500.0) | (a >= np.add(self.surface.get_size(), 500.0))).any():
@@ -213,17 +211,19 @@ class Canvas:
         size = min(2.6 * width + 4 * self.scale, length)
         left, right = b - size * along + 0.48 * size * across, b - size * along - 0.48 * size * across
         shaft = [a, b - 0.7 * size * along] if head == "full" else [a, b]
-        barbs = np.array([left, b, right]).tolist()
+        if head == "bar":
+            left, right = (b + side * (1.1 * width + 1.7 * self.scale) * across for side in (-1, 1))
+        barbs = np.array([left, right] if head == "bar" else [left, b, right]).tolist()
         sketch = sprites.Sketch.around([a.tolist(), *barbs], 2 * width)
         if sketch is None:
             return
         sketch.path(np.array(shaft).tolist(), colour, width)
         if head == "full":
             sketch.polygon(barbs, colour)
-        elif head == "open":
-            sketch.path(barbs, colour, width)
-        else:
+        elif head == "dot":
             sketch.dot(barbs[1], 1.5 * width, colour)
+        else:
+            sketch.path(barbs, colour, width)
         sketch.onto(self.surface)
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:

@@ -1,7 +1,5 @@
 """The density in colours and in words, and the words for costs that it weighs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import TypeAlias

@@ -161,7 +161,7 @@ class Field:
         for high, wide in product(ends[:2], ends[2:]):
             some |= numbered[row[high][:, None], column[wide]]
         high, wide = some.nonzero()
-        middle_x, middle_y = (_middles(places) for places in (x, y))
+        middle_x, middle_y = (middles(places, _BLOCK) for places in (x, y))
         column, row = self.lattice.squares(middle_x, middle_y)
         known = numbered[row[high], column[wide]]
         blocks = self._bordering(high[known], wide[known], middle_x, middle_y)
@@ -244,10 +244,10 @@ class Fields:
         return Field(self._lattices[1], result)
 
 
-def _middles(places: Array) -> Array:
-    """Return the middles of blocks of pixels; the last block may stick out."""
+def middles(places: Array, count: int) -> Array:
+    """Return the middles of `count` pixels each; the last of them may stick out."""
     step = places[1] - places[0] if len(places) > 1 else 0.0
-    return np.asarray(places[::_BLOCK] + 0.5 * (_BLOCK - 1) * step)
+    return np.asarray(places[::count] + 0.5 * (count - 1) * step)
 
 
 def _spread(row: IntArray, column: IntArray, height: int, width: int) -> tuple[IntArray, IntArray, IntArray]:

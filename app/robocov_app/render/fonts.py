@@ -1,7 +1,5 @@
 """Text: DejaVu Sans, which comes with matplotlib (a bare Linux has no fonts), and rendered labels."""
 
-from __future__ import annotations
-
 import importlib.util
 from functools import lru_cache
 from pathlib import Path

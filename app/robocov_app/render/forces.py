@@ -1,7 +1,5 @@
 """Layers that explain a decision: force terms, velocities, ranges, neighbours, what was sensed."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -26,36 +24,18 @@ def _arrows(canvas: Canvas, scene: Scene, vectors: Array, colour: Colour, width:
     for center, vector, length, radius in zip(centers, vectors, lengths, radii, strict=True):
         if length >= 3.0:
             start = center + vector * (radius / length)
-            _arrow(canvas, start, start + vector, colour, width, head)
-
-
-def _arrow(canvas: Canvas, start: Array, end: Array, colour: Colour, width: float, head: str) -> None:
-    """Draw an arrow as `Canvas.arrow`, or with ``bar`` for a head: what slows down pulls nowhere."""
-    if head != "bar":
-        canvas.arrow(start.tolist(), end.tolist(), colour, width, head)
-        return
-    if np.any(end < -500.0) or np.any(end > np.array(canvas.surface.get_size()) + 500.0):
-        return
-    along = end - start
-    half = (1.1 * width + 1.7 * canvas.scale) / np.hypot(*along) * np.array([-along[1], along[0]])
-    bar = [(end - half).tolist(), (end + half).tolist()]
-    sketch = sprites.Sketch.around([start.tolist(), *bar], 2 * width)
-    if sketch is not None:
-        sketch.path([start.tolist(), end.tolist()], colour, width)
-        sketch.path(bar, colour, width)
-        sketch.onto(canvas.surface)
+            canvas.arrow(start.tolist(), (start + vector).tolist(), colour, width, head)
 
 
 def _level_arrow(canvas: Canvas, x: float, y: float, colour: Colour, width: float, head: str) -> None:
     half = 9 * canvas.scale
-    _arrow(canvas, np.array([x - half, y]), np.array([x + half, y]), colour, width, head)
+    canvas.arrow((x - half, y), (x + half, y), colour, width, head)
 
 
 def force_layer(term: str, title: str, head: str) -> Layer:
-    """Return one term of the controller's force as arrows, or their sum; or the world's viscosity.
+    """Return a term of the controller's force, their sum, or the world's viscosity, as arrows.
 
-    Lengths saturate, since repulsion grows without limit: a force that would give the largest
-    acceleration has 63 % of `FORCE_LENGTH`.
+    Lengths saturate: a force that would give the largest acceleration has 63 % of `FORCE_LENGTH`.
     """
 
     def forces_of(scene: Scene) -> Array | None:

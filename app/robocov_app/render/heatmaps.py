@@ -16,10 +16,10 @@ from robocov_app.render.annotations import STRIP
 from robocov_app.render.camera import length_label
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import colours, density_label, parts
-from robocov_app.render.distance_field import Field, levels, palette, strength, ticks
+from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
-from robocov_app.render.theme import border_colour
+from robocov_app.render.theme import Theme, border_colour
 
 # on a surface the density is looked at in at most about so many places; between them it is interpolated
 _DOTS = 60_000
@@ -43,13 +43,18 @@ def density_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def density_entry(words: str) -> LegendEntry:
-    """Return the legend's entry."""
+    """Return the legend's entry of a density."""
+    return _strip_entry(words, lambda theme, count: colours(np.linspace(0.0, 1.0, count), theme))
+
+
+def _strip_entry(words: str, row: Callable[[Theme, int], NDArray[np.uint8]]) -> LegendEntry:
+    """Return the legend's entry of a scale of colours, of which `row` gives so many."""
 
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
-        strip = np.broadcast_to(colours(np.linspace(0.0, 1.0, wide), canvas.theme)[None], (high, wide, 4))
-        page = pygame.image.frombytes(np.ascontiguousarray(strip).tobytes(), (wide, high), "RGBA")
-        canvas.surface.blit(page, (round(x - wide / 2), round(y - high / 2)))
+        strip = row(canvas.theme, wide)
+        picture = _coloured(np.broadcast_to(strip, (high, *strip.shape)))
+        canvas.surface.blit(picture, (round(x - wide / 2), round(y - high / 2)))
 
     return LegendEntry(words, glyph)
 
@@ -72,7 +77,7 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
     table = colours(np.arange(256) / 255.0, canvas.theme).astype(np.uint16)
     table[:, :3] = table[:, :3] * table[:, 3:] // 255
     pixels = table.astype(np.uint8)[np.rint(fine).astype(np.uint8)]
-    page = pygame.image.frombytes(pixels.tobytes(), box.size, "RGBA")
+    page = _coloured(pixels)
     corners = canvas.camera.to_pixels(ring) - np.array(box.topleft)
     mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(np.clip(corners, -3e4, 3e4)).tolist())
@@ -139,7 +144,7 @@ class FieldPicture:
 def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
     """Return how far every place is from the nearest robot, around obstacles, as colours."""
     # smooth as it is, every second pixel will do
-    coarse = levels(field, _thinned(x), _thinned(y), scene.field_limit, _HATCH)
+    coarse = levels(field, middles(x, 2), middles(y, 2), scene.field_limit, _HATCH)
     small = _paletted(coarse, palette(canvas.theme)).convert(canvas.surface)
     large = pygame.transform.smoothscale(small, (2 * small.get_width(), 2 * small.get_height()))
     return large.subsurface((0, 0, len(x), len(y)))
@@ -148,15 +153,10 @@ def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Arra
 def distances_legend(scene: Scene) -> list[LegendEntry]:
     """Return the entries of the colours, and of where no robot can come."""
 
-    def glyph(canvas: Canvas, x: float, y: float) -> None:
-        wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
-        strip = np.broadcast_to(canvas.theme.heat_table(wide), (high, wide, 3))
-        canvas.surface.blit(_coloured(strip), (round(x - wide / 2), round(y - high / 2)))
-
     def closed(canvas: Canvas, x: float, y: float) -> None:
         canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
 
-    entries = [LegendEntry("distance to the nearest robot", glyph)]
+    entries = [_strip_entry("distance to the nearest robot", Theme.heat_table)]
     if scene.field is not None and (scene.field.result.owner < 0).any():
         entries.append(LegendEntry("no robot can come", closed))
     return entries
@@ -259,21 +259,15 @@ def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
         )
 
 
-def _thinned(places: Array) -> Array:
-    """Return the middles of pairs of pixels; the last pair may stick out."""
-    step = places[1] - places[0] if len(places) > 1 else 0.0
-    return np.asarray(places[::2] + 0.5 * step)
-
-
 def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:
     """Return (h, w) numbers of colours as a surface."""
     height, width = numbers.shape
-    surface = pygame.image.frombytes(np.ascontiguousarray(numbers).tobytes(), (width, height), "P")
+    surface = pygame.image.frombytes(numbers.tobytes(), (width, height), "P")
     surface.set_palette([tuple(colour) for colour in colours.tolist()])
     return surface
 
 
 def _coloured(picture: NDArray[np.uint8]) -> pygame.Surface:
-    """Return (h, w, 3) RGB as a surface."""
-    height, width, _ = picture.shape
-    return pygame.image.frombytes(np.ascontiguousarray(picture).tobytes(), (width, height), "RGB")
+    """Return (h, w, 3) RGB, or (h, w, 4) RGBA, as a surface."""
+    height, width, depth = picture.shape
+    return pygame.image.frombytes(picture.tobytes(), (width, height), "RGBA"[:depth])  # type: ignore[arg-type]

@@ -1,7 +1,5 @@
 """Layers of what robots know: ray scans, sensed obstacle points, the discovered map, the cursor's path."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise

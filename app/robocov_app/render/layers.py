@@ -1,7 +1,5 @@
 """Layers: what a picture can show of a scene, and those of the map: cells, grid, obstacles, boundary."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Sizes of marks in a crowd, panels on a page, and one legend for several pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import TypeVar
 

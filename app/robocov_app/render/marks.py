@@ -1,7 +1,5 @@
 """Marks of single robots: themselves, where they began and head, which failed, which one is selected."""
 
-from __future__ import annotations
-
 from functools import lru_cache, partial
 from typing import Any
 

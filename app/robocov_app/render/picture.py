@@ -1,7 +1,5 @@
 """The painter: puts the layers together on any pygame surface, and gives frames without a display."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -14,26 +12,11 @@ from numpy.typing import NDArray
 from robocov.arrays import IntArray
 from robocov.environment import Environment
 from robocov.errors import ParameterError, unknown_name
-from robocov_app.render import forces, heatmaps, knowledge, layers, marks
-from robocov_app.render.annotations import (
-    LEGEND_ROW,
-    MARGIN,
-    STRIP,
-    LegendStrip,
-    draw_brief_status,
-    draw_caption,
-    draw_scale_bar,
-    draw_status,
-    is_small,
-    legend_rows,
-)
+from robocov_app.render import annotations, forces, heatmaps, knowledge, layers, marks
+from robocov_app.render.annotations import LEGEND_ROW, MARGIN, STRIP
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
-from robocov_app.render.forces import force_layer, range_layer
-from robocov_app.render.heatmaps import FieldPicture, bar_room
-from robocov_app.render.knowledge import SensedObstacles
 from robocov_app.render.layers import Layer
-from robocov_app.render.marks import Starts
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
@@ -45,7 +28,9 @@ _strip = partial(Layer, in_world=False)
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
     """Return one of each layer, from the lowest to the topmost; `trails` are colours of `Trajectories`."""
-    distances, geodesic = FieldPicture(heatmaps.draw_distances), FieldPicture(heatmaps.draw_geodesic_cells)
+    distances = heatmaps.FieldPicture(heatmaps.draw_distances)
+    geodesic = heatmaps.FieldPicture(heatmaps.draw_geodesic_cells)
+    sensed = knowledge.SensedObstacles()
     trajectories, snapshot = Trajectories(trails), ("snapshot",)
     return [
         _extra("distances", "Distance map", distances.draw, ("field",), heatmaps.distances_legend),
@@ -55,36 +40,30 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         _fixed("density", "Density φ", heatmaps.draw_density, (), heatmaps.density_legend),
         _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), layers.obstacles_legend),
         _fixed("boundary", "Boundary", layers.draw_boundary),
-        _extra(
-            "sensed",
-            "Known obstacles",
-            SensedObstacles().draw,
-            ("sensed", "snapshot"),
-            knowledge.sensed_legend,
-        ),
+        _extra("sensed", "Known obstacles", sensed.draw, ("sensed", "snapshot"), knowledge.sensed_legend),
         _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),
-        range_layer("sensing", "Sensing range"),
-        range_layer("communication", "Comm. range"),
+        forces.range_layer("sensing", "Sensing range"),
+        forces.range_layer("communication", "Comm. range"),
         _extra("links", "Neighbours", forces.draw_links, snapshot, forces.links_legend),
         Layer("trajectories", "Trajectories", trajectories.draw, ("trail",), trajectories.legend),
-        Layer("starts", "Starts", Starts().draw, ("starts",), marks.starts_legend),
+        Layer("starts", "Starts", marks.Starts().draw, ("starts",), marks.starts_legend),
         _extra("obstacle_points", "Nearest obstacle", forces.draw_points, snapshot, forces.points_legend),
         _extra("goals", "Goals", marks.draw_goals, snapshot, marks.goals_legend),
         Layer("centroids", "Centroids", marks.draw_centroids, snapshot, marks.centroids_legend),
         _extra("velocities", "Velocities", forces.draw_velocities, snapshot, forces.velocities_legend),
-        force_layer("attraction", "Attraction", "full"),
-        force_layer("repulsion_robots", "Robot repulsion", "open"),
-        force_layer("repulsion_obstacle", "Obstacle repulsion", "dot"),
-        force_layer("viscosity", "Viscosity", "bar"),
-        force_layer("resultant", "Resultant force", "full"),
+        forces.force_layer("attraction", "Attraction", "full"),
+        forces.force_layer("repulsion_robots", "Robot repulsion", "open"),
+        forces.force_layer("repulsion_obstacle", "Obstacle repulsion", "dot"),
+        forces.force_layer("viscosity", "Viscosity", "bar"),
+        forces.force_layer("resultant", "Resultant force", "full"),
         _extra("path", "Path from cursor", knowledge.draw_path, ("path",), knowledge.path_legend),
         Layer("failed", "Failed robots", marks.draw_failed, ("failed",), marks.failed_legend),
         Layer("selection", "Selection", marks.draw_selection, ("snapshot", "selected"), marks.belief_legend),
         Layer("robots", "Robots", marks.draw_robots, snapshot, marks.robots_legend),
         _strip("colour_bar", "Colour scale", heatmaps.draw_colour_bar, ("field",)),
-        _strip("legend", "Legend", LegendStrip().draw),
-        _strip("scale_bar", "Scale bar", draw_scale_bar),
-        _strip("status", "Status line", draw_status),
+        _strip("legend", "Legend", annotations.LegendStrip().draw),
+        _strip("scale_bar", "Scale bar", annotations.draw_scale_bar),
+        _strip("status", "Status line", annotations.draw_status),
     ]
 
 
@@ -102,8 +81,8 @@ def pane_layers(trails: str = "robots") -> list[Layer]:
     """Return the layers of one picture among several: a caption in place of the legend, which they share."""
     return [
         *(layer for layer in standard_layers(trails) if layer.name not in ("legend", "status")),
-        _strip("caption", "Caption", draw_caption),
-        _strip("status", "Status line", draw_brief_status),
+        _strip("caption", "Caption", annotations.draw_caption),
+        _strip("status", "Status line", annotations.draw_brief_status),
     ]
 
 
@@ -200,8 +179,10 @@ class Painter:
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
         names = {layer.name for layer in self._shown()}
-        rows = 1 if "caption" in names else len(legend_rows(canvas, entries)) if "legend" in names else 0
-        self._place_view(*self._steady(rows, bar_room(canvas, scene)))
+        rows = int("caption" in names)
+        if not rows and "legend" in names:
+            rows = len(annotations.legend_rows(canvas, entries))
+        self._place_view(*self._steady(rows, heatmaps.bar_room(canvas, scene)))
         canvas = replace(canvas, camera=self.camera)
         surface.fill(self.theme.background)
         for static, group in groupby(self._shown(), key=lambda layer: layer.static):
@@ -233,7 +214,7 @@ class Painter:
         top = MARGIN * self.scale
         if rows:
             top = (6 + LEGEND_ROW * rows + 6) * self.scale
-        small = is_small(height, self.scale, self.visible)
+        small = annotations.is_small(height, self.scale, self.visible)
         below = bool({"scale_bar", "status"} & self.visible) and not small
         bottom = (STRIP if below else MARGIN) * self.scale
         view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))

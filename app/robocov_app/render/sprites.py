@@ -19,6 +19,7 @@ from robocov_app.render.theme import Colour, readable_on
 FINE = 4  # each sprite is drawn so many times larger; also the number of shifts within a pixel
 LARGE = 60.0  # radius in pixels from which on nobody sees quarters of a pixel, and a sprite takes megabytes
 STROKE_FINE = 3  # the same for strokes, which may span the whole picture
+Shift: TypeAlias = tuple[int, int]  # quarters of a pixel to the right and down
 Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface's corner
 
 
@@ -67,10 +68,10 @@ class Sketch:
         surface.blit(picture, self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _blank(radius: float, fine: int = FINE) -> tuple[pygame.Surface, int]:
-    """Return a large transparent square for a sprite of `radius` pixels and its half side in pixels."""
-    half = int(radius) + 2
-    return pygame.Surface((2 * half * fine, 2 * half * fine), pygame.SRCALPHA, 32), half
+def _blank(radius: float, shift: Shift, fine: int = FINE) -> tuple[pygame.Surface, tuple[int, int]]:
+    """Return a large transparent square for a sprite of `radius` pixels, and where its middle is."""
+    half = (int(radius) + 2) * fine
+    return pygame.Surface((2 * half, 2 * half), pygame.SRCALPHA, 32), (half + shift[0], half + shift[1])
 
 
 def _shrunk(large: pygame.Surface, fine: int = FINE) -> pygame.Surface:
@@ -84,35 +85,21 @@ def number_size(inside: Any, digits: Any) -> Any:
 
 
 def disc(
-    radius: float,
-    fill: Colour,
-    ring: Colour,
-    ring_width: float,
-    edge: Colour,
-    text: str,
-    shift: tuple[int, int],
+    radius: float, fill: Colour, ring: Colour, ring_width: float, edge: Colour, text: str, shift: Shift
 ) -> pygame.Surface:
     """Return a disc with a ring around it, a hair line around that, and a number in it.
 
-    `radius`, px: of the disc with its ring. `shift`: quarters of a pixel to the right and down; what is
-    `LARGE` keeps to whole pixels.
+    `radius`, px: of the disc with its ring. What is `LARGE` keeps to whole pixels.
     """
     return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
 
 
 @kept(24_000_000)
 def _disc(
-    radius: float,
-    fill: Colour,
-    ring: Colour,
-    ring_width: float,
-    edge: Colour,
-    text: str,
-    shift: tuple[int, int],
+    radius: float, fill: Colour, ring: Colour, ring_width: float, edge: Colour, text: str, shift: Shift
 ) -> pygame.Surface:
     fine = _fineness(radius)
-    large, half = _blank(radius + 1, fine)
-    center = (half * fine + shift[0], half * fine + shift[1])
+    large, center = _blank(radius + 1, shift, fine)
     pygame.draw.circle(large, edge, center, (radius + 0.6) * fine)
     pygame.draw.circle(large, ring, center, radius * fine)
     pygame.draw.circle(large, fill, center, (radius - ring_width) * fine)
@@ -125,16 +112,15 @@ def _disc(
     return _shrunk(large, fine)
 
 
-def ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
+def ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
     """Return a circle's line, its middle at `radius` pixels."""
     return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
 
 
 @kept(6_000_000)
-def _ring(radius: float, colour: Colour, width: float, shift: tuple[int, int]) -> pygame.Surface:
+def _ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
     fine = _fineness(radius)
-    large, half = _blank(radius + width / 2, fine)
-    center = (half * fine + shift[0], half * fine + shift[1])
+    large, center = _blank(radius + width / 2, shift, fine)
     pygame.draw.circle(large, colour, center, (radius + width / 2) * fine)
     pygame.draw.circle(large, (0, 0, 0, 0), center, (radius - width / 2) * fine)
     return _shrunk(large, fine)
@@ -145,21 +131,19 @@ def _fineness(radius: float) -> int:
 
 
 @kept(4_000_000)
-def dot(radius: float, colour: Colour, shift: tuple[int, int]) -> pygame.Surface:
+def dot(radius: float, colour: Colour, shift: Shift) -> pygame.Surface:
     """Return a filled circle."""
-    large, half = _blank(radius)
-    center = (half * FINE + shift[0], half * FINE + shift[1])
+    large, center = _blank(radius, shift)
     pygame.draw.circle(large, colour, center, radius * FINE)
     return _shrunk(large)
 
 
 @kept(4_000_000)
 def cross(
-    arm: float, colour: Colour, halo: Colour, width: float, diagonal: bool, shift: tuple[int, int]
+    arm: float, colour: Colour, halo: Colour, width: float, diagonal: bool, shift: Shift
 ) -> pygame.Surface:
     """Return a plus, or a times sign, with a thin halo that keeps it readable on any fill."""
-    large, half = _blank(arm + width)
-    x, y = half * FINE + shift[0], half * FINE + shift[1]
+    large, (x, y) = _blank(arm + width, shift)
     reach = arm * FINE * (0.75 if diagonal else 1.0)
     turned = ((-1, -1), (1, -1)) if diagonal else ((1, 0), (0, 1))
     for shade, thick in ((halo, width * FINE + FINE * 1.6), (colour, width * FINE)):
@@ -168,11 +152,6 @@ def cross(
             half_thick = thick / 2 / (2**0.5 if diagonal else 1.0)
             nx, ny = -dy * half_thick, dx * half_thick
             a, b = (x - dx * more, y - dy * more), (x + dx * more, y + dy * more)
-            corners = [
-                (a[0] + nx, a[1] + ny),
-                (b[0] + nx, b[1] + ny),
-                (b[0] - nx, b[1] - ny),
-                (a[0] - nx, a[1] - ny),
-            ]
-            pygame.draw.polygon(large, shade, corners)
+            ends = (a, 1), (b, 1), (b, -1), (a, -1)
+            pygame.draw.polygon(large, shade, [(px + side * nx, py + side * ny) for (px, py), side in ends])
     return _shrunk(large)

@@ -1,7 +1,5 @@
 """Pictures that are kept as long as there is room: so many bytes, not so many pictures."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import wraps

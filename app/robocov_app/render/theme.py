@@ -1,7 +1,5 @@
 """Colours, line widths and text sizes, shared by the window, the films and the plots."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush

@@ -1,7 +1,5 @@
 """The trajectories layer: what is old is kept on a page of its own, only new pieces are drawn."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
