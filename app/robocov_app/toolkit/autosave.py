@@ -5,8 +5,6 @@ so two programs never meet, and what one left behind that ended without a word c
 worked on. The environment variable ``ROBOCOV_DRAFTS`` names another folder, or none if it is empty.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import secrets

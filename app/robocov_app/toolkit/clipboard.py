@@ -1,7 +1,5 @@
 """Text on the system's clipboard, or within the program where the display has none."""
 
-from __future__ import annotations
-
 import pygame
 
 _ours = ""

@@ -14,8 +14,6 @@ How a window writes its list::
     commands.offered("map of")                  # what the palette lists, with completion
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

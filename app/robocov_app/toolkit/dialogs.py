@@ -10,8 +10,6 @@
 `accept` of a choice may raise a RobocovError: it is told in the dialog, which keeps what was typed.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

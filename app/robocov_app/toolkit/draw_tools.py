@@ -1,7 +1,5 @@
 """Outlines drawn with the mouse, point by point or with a single drag; tools make shapes of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from math import dist
 from typing import TypeAlias

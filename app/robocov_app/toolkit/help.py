@@ -1,7 +1,5 @@
 """The page of keys, as F1 shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import pygame

@@ -1,7 +1,5 @@
 """Names of keys, and the state of the mouse that every window keeps."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import pygame

@@ -1,7 +1,5 @@
 """What is costly to make, kept until it is of something else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Generic, TypeVar
 

@@ -1,7 +1,5 @@
 """Where everything stands in the window: arena, panel, plot, time line and status line. Pure arithmetic."""
 
-from __future__ import annotations
-
 from math import floor
 from typing import NamedTuple, TypeAlias
 

@@ -1,7 +1,5 @@
 """A menu at the cursor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import pygame

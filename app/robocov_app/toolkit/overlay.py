@@ -1,7 +1,5 @@
 """What lies over a window for a while: cards, tags, messages, a veil."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The palette: commands found by typing, with completion of what they take."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from robocov.errors import InputError

@@ -1,7 +1,5 @@
 """What a window remembers from one time to the next, as JSON in the user's folder for settings."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import TypeVar

@@ -1,9 +1,8 @@
 """The text of a one-line field: caret, selection, clipboard, undo, and what an input method composes."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
+from typing import Self
 
 from robocov_app.toolkit import clipboard
 
@@ -23,7 +22,7 @@ class TextEdit:
     _typing: bool = False
 
     @classmethod
-    def of(cls, text: str) -> TextEdit:
+    def of(cls, text: str) -> Self:
         """Return an edit of a text, all of it selected."""
         return cls(text, len(text), 0)
 

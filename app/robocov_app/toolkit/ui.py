@@ -28,8 +28,6 @@ Keys of widgets are unique within a page. Lengths are pixels at scale 1. Where `
 disabled, and says so in its tool tip. Tab and Shift Tab move the focus once a widget has it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -110,7 +108,7 @@ class _List:
 class Ui:
     """Runs a page in a box of the window."""
 
-    def __init__(self, page: Callable[[Ui], None], theme: Theme, scale: float = 1.0) -> None:
+    def __init__(self, page: Callable[["Ui"], None], theme: Theme, scale: float = 1.0) -> None:
         self.page, self.theme, self.scale = page, theme, scale
         self.box = pygame.Rect(0, 0, 1, 1)  # where the page is, px
         self.background: Colour | None = theme.panel

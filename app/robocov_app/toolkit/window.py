@@ -1,7 +1,5 @@
 """A window and its loop: display, size and scale; events in, and a picture where something is different."""
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

@@ -4,8 +4,6 @@ A *service* is a class without arguments whose objects answer questions (see `Se
 runs one in another process, `DirectWorker` in this one; `started` and `asked` are for callers that may wait.
 """
 
-from __future__ import annotations
-
 import ctypes
 import faulthandler
 import importlib
@@ -39,7 +37,7 @@ class Service(Protocol):
 
     failing: str
 
-    def __call__(self, questions: list[Any], line: Line) -> object:
+    def __call__(self, questions: list[Any], line: "Line") -> object:
         """Learn from all questions since the last answer, one at least, and answer the last of them."""
 
 

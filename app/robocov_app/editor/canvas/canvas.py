@@ -1,7 +1,5 @@
 """The canvas: the sheet under a camera, and all that is drawn on top of it while it is edited."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The rings of a sketch's obstacles as arrays, to be drawn many at once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Overlay of the sheet: selection and its handles, guides, what is drawn; what validation found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import partial
 from itertools import pairwise

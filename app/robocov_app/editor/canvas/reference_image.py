@@ -1,7 +1,5 @@
 """The picture under the map, as large as the camera asks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,7 +79,7 @@ class ReferenceImage:
         self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
 
 
-def _on_white(picture: Image.Image) -> Image.Image:
+def _on_white(picture: "Image.Image") -> "Image.Image":
     """Return a picture in colours, what is clear in it white."""
     from PIL import Image
 

@@ -1,7 +1,5 @@
 """The sheet: floor, picture, grid, obstacles and boundary on one page; only what changed is drawn anew."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

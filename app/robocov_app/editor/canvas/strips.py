@@ -1,7 +1,5 @@
 """The strips above and below the sheet: the legend; scale bar, whose map it is and what it is like."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pygame

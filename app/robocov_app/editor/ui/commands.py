@@ -1,7 +1,5 @@
 """Everything that the editor does, by key, menu, button, palette or typed value."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple, TypeVar

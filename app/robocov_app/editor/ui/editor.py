@@ -1,7 +1,5 @@
 """The editor: what is open, selected and shown, and how every change is made. Knows no pygame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the fields of the panel show, and what becomes of what is typed into them. Knows no pygame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

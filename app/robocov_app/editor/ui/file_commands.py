@@ -1,12 +1,9 @@
 """Documents opened, saved and left, with the questions that have to be asked."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
@@ -20,11 +17,9 @@ from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
 from robocov_app.editor.ui.settings import MOST_RECENT
+from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect, export_map
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
-
-if TYPE_CHECKING:
-    from robocov_app.formats import Importer
 
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
@@ -94,8 +89,6 @@ class FileCommands:
 
     def ask_file(self) -> None:
         """Ask which file to open."""
-        from robocov_app.formats import IMPORTERS
-
         foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
         self._ask_path("Open a map", self.open, [SUFFIX, *foreign])
 
@@ -208,8 +201,6 @@ class FileCommands:
 
     def ask_export(self) -> None:
         """Ask where to write the map in a foreign format, which goes by the suffix."""
-        from robocov_app.formats import EXPORTERS
-
         self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
@@ -217,8 +208,6 @@ class FileCommands:
         self._ask_path(title, self._export, suffixes, f"{name}.svg")
 
     def _export(self, path: Path, *, over: bool = False) -> str | None:
-        from robocov_app.formats import export_map
-
         if path.exists() and not over:
             over_it = ("Replace it", "r", lambda: self._export(path, over=True))
             answers = (("Another name…", "a", self.ask_export), over_it, _CANCEL)
@@ -303,8 +292,6 @@ def opened(path: Path, drafts: Path | None) -> Document | Importer:
         return Document.opened(path, drafts)
     except MapError as error:
         if path.is_file() and not (path.suffix.lower() == SUFFIX and _is_map(path)):
-            from robocov_app.formats import detect
-
             try:
                 return detect(path)
             except MapError:  # which names it for what it is

@@ -1,7 +1,5 @@
 """The import dialog: options at the left, the map before and after at the right, the report below."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Options of an import, and the worker that imports beside the window."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

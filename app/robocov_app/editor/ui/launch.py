@@ -1,7 +1,5 @@
 """Opening the editor: with a display or without, from the command line's options."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The editor's panel: file and tools stay in sight, the rest is on pages that follow the selection."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pygame

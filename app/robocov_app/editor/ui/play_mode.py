@@ -1,7 +1,5 @@
 """The demo on the map that is being drawn, in the same window; and back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The editor's mouse: what is pressed, dragged and let go where, and what that means."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import dist
 

@@ -1,7 +1,5 @@
 """What the editor remembers from one time to the next, beside what the demo does."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field

@@ -1,7 +1,5 @@
 """The editor's status line: the cursor's place, what is selected, what the tool waits for. No pygame."""
 
-from __future__ import annotations
-
 from robocov_app.editor.tools.tool import place_words
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.team import Team

@@ -1,7 +1,5 @@
 """How a team would stand at a start: drawn in a thread, so that the window does not wait. Knows no pygame."""
 
-from __future__ import annotations
-
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 

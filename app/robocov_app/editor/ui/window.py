@@ -1,7 +1,5 @@
 """The editor's window: events in, frames out. What happens between is the editor's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
