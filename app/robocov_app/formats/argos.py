@@ -90,11 +90,10 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
     """Add a body at a position, m, turned about z, y, x, degrees."""
     where, tag = shapes.where, element.tag
     labels = [element.attributes.get("id", tag), tag]
-    if tag not in ("box", "cylinder"):
-        if shapes.wants(labels):
-            shapes.robots.append((float(position[0]), float(position[1])))
-    elif not shapes.wants(labels):
+    if not shapes.wants(labels):
         return
+    if tag not in ("box", "cylinder"):
+        shapes.robots.append((float(position[0]), float(position[1])))
     elif (np.abs((turn[1:] + 90) % 180 - 90) > _UPRIGHT).any():
         shapes.leave_out(tag, "that is tilted")
     elif tag == "box":

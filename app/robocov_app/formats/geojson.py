@@ -52,7 +52,11 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     found = _Found(where, shapes)
     with located_errors(content, where):
         found.read(document)
-        options = _with_units(options, document, where)
+        units = document.get("units")
+        if units is not None and options.units is None:
+            if units not in ("metres", "degrees"):
+                raise refused(where, ("units",), units, "metres or degrees was wanted")
+            options = replace(options, units=units)
         origin = _origin(document, where)
     figures, shapes.notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
     shapes.add_all(figures)
@@ -147,8 +151,7 @@ class _Found:
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
         points = positions(value, at, self.where, least=least, dimensions=(2, 4))
-        if points.shape[1] > 2:
-            self.shapes.leave_heights(points[:, 2])
+        self.shapes.leave_heights(points[:, 2:3])
         return points[:, :2]
 
     def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
@@ -164,16 +167,6 @@ class _Found:
             wanted = f"the same system as before, {self.crs}, was wanted"
             raise refused(self.where, (*at, "crs"), given, wanted)
         self.crs = name
-
-
-def _with_units(options: ReadOptions, document: dict[str, Any], where: str) -> ReadOptions:
-    """Return the options with the units that the file gives, where they do not give them."""
-    units = document.get("units")
-    if units is None or options.units is not None:
-        return options
-    if units not in ("metres", "degrees"):
-        raise refused(where, ("units",), units, "metres or degrees was wanted")
-    return replace(options, units=units)
 
 
 def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:

@@ -13,7 +13,14 @@ from robocov_app.formats.foreign import ForeignMap, document_of, square_metres, 
 
 
 @dataclass(frozen=True)
-class ReadOptions:
+class _Options:
+    def given(self) -> tuple[str, ...]:
+        """Return the names of the options that are not as by default."""
+        return tuple(each.name for each in fields(self) if getattr(self, each.name) != each.default)
+
+
+@dataclass(frozen=True)
+class ReadOptions(_Options):
     """What a file does not say of itself; what is not given is as its format has it."""
 
     cell: float | None = None
@@ -56,10 +63,6 @@ class ReadOptions:
         lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), (1e-6, 1e4, "m"))
         check_options(self, lengths | {"threshold": (0.0, 1.0, "")})
 
-    def given(self) -> tuple[str, ...]:
-        """Return the names of the options that are not as by default."""
-        return _given(self)
-
 
 @dataclass(frozen=True)
 class Importer:
@@ -79,7 +82,7 @@ class Importer:
 
 
 @dataclass(frozen=True)
-class WriteOptions:
+class WriteOptions(_Options):
     """How a map is written; what is not given is as its format has it."""
 
     cell: float | None = None
@@ -101,14 +104,6 @@ class WriteOptions:
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
             wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
             raise ParameterError(f"origin: {shown(self.origin)}, but {wanted}")
-
-    def given(self) -> tuple[str, ...]:
-        """Return the names of the options that are not as by default."""
-        return _given(self)
-
-
-def _given(options: ReadOptions | WriteOptions) -> tuple[str, ...]:
-    return tuple(each.name for each in fields(options) if getattr(options, each.name) != each.default)
 
 
 def check_options(options: object, ranges: Mapping[str, tuple[float, float, str]]) -> None:

@@ -164,9 +164,8 @@ class _Extract:
     def _take(self, name: str, given: dict[str, str]) -> None:
         thing = self.thing
         if name == "bounds":
-            longitudes = [_degrees(given, key, 360.0) for key in ("minlon", "maxlon")]
-            latitudes = [_degrees(given, key, 90.0) for key in ("minlat", "maxlat")]
-            self.bounds.append([*longitudes, *latitudes])
+            most = {"minlon": 360.0, "maxlon": 360.0, "minlat": 90.0, "maxlat": 90.0}
+            self.bounds.append([_degrees(given, key, value) for key, value in most.items()])
         elif self.depth == 2 and name in self.things:
             number = int(given["id"])
             self.thing = _Thing(name, number)

@@ -79,8 +79,7 @@ def _rings(value: Any, at: Steps, where: str, shapes: Shapes) -> list[Array]:
 
 def _ring(value: Any, at: Steps, where: str, shapes: Shapes) -> Array:
     points = positions(value, at, where, least=1, dimensions=(2, 3))
-    if points.shape[1] == 3:
-        shapes.leave_heights(points[:, 2])
+    shapes.leave_heights(points[:, 2:3])
     return points[:, :2]
 
 
@@ -104,8 +103,7 @@ def _pairs(value: Any, at: Steps, where: str, dimensions: int, shapes: Shapes) -
         raise refused(where, at, value, f"at least 3 times {dimensions} numbers were wanted")
     pairs = [value[k : k + dimensions] for k in range(0, len(value), dimensions)]
     points = positions(pairs, at, where, least=3, dimensions=(dimensions, dimensions))
-    if dimensions == 3:
-        shapes.leave_heights(points[:, 2])
+    shapes.leave_heights(points[:, 2:3])
     return np.ascontiguousarray(points[:, :2])
 
 

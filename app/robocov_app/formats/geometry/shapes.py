@@ -207,7 +207,7 @@ class Shapes:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
 
     def leave_heights(self, heights: Array) -> None:
-        """Count third coordinates, (k,), which no map has; nan is none."""
+        """Count third coordinates, which no map has; nan is none."""
         heights = heights[~np.isnan(heights)]
         if len(heights):
             self._heights.append(heights)
