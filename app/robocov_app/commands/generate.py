@@ -18,9 +18,6 @@ from robocov_app.runs.options import PlotOptions
 from robocov_app.terminal.output import require_fresh
 from robocov_app.terminal.progress import progress
 
-Job: TypeAlias = tuple[str, Callable[[], Environment]]
-"""The name of a map, and what makes it."""
-
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
 
 MOST = 10_000  # maps that are generated in one call at most
@@ -152,8 +149,8 @@ def _require_map(path: Path) -> None:
             ) from None
 
 
-def jobs_of(options: Arguments) -> list[Job]:
-    """Return what makes the maps of the seeds, or those that a study of the paper draws by chance."""
+def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:
+    """Return names of maps, and what makes them: of the seeds, or of a study of the paper."""
     if options.study is None:
         seeds = range(options.seed, options.seed + (options.count or 1))
         digits = len(str(seeds[-1]))
