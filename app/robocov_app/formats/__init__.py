@@ -33,8 +33,7 @@ from robocov_app.formats import (
 from robocov_app.formats.foreign import ForeignMap, ImportReport
 from robocov_app.formats.geometry.shaping import Shaping, shaped
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
-from robocov_app.formats.svg import reading as svg_reading
-from robocov_app.formats.svg import writing as svg_writing
+from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unreadable import described, named_kind
 
 __all__ = [
@@ -46,12 +45,12 @@ __all__ = [
 _Format = TypeVar("_Format", Importer, Exporter)
 
 # the first whose `sniff` says yes has it: the surest come first
-_SURE = (irsim, ros, movingai, stage, argos, tmx, picture, osm, svg_reading, dxf, wkt, geojson)
+_SURE = (irsim, ros, movingai, stage, argos, tmx, picture, osm, svg, dxf, wkt, geojson)
 
 IMPORTERS: dict[str, Importer] = {each.IMPORTER.name: each.IMPORTER for each in (*_SURE, houseexpo, rings)}
 """The formats that can be read, by name."""
 
-_EXPORT = (ros, movingai, picture, svg_writing, wkt, geojson)
+_EXPORT = (ros, movingai, picture, svg, wkt, geojson)
 
 EXPORTERS: dict[str, Exporter] = {each.EXPORTER.name: each.EXPORTER for each in _EXPORT}
 """The formats that can be written, by name."""
