@@ -243,10 +243,13 @@ def file_choice(
     *,
     endings: Sequence[str] = (),
     recent: Sequence[Path] = (),
-    saves: bool = False,
     text: str = "",
 ) -> Choice:
-    """Return a choice of a file; folders are walked into, and what is typed is a path from `folder`."""
+    """Return a choice of a file, with the `text` of a name of one to be saved.
+
+    Folders are walked into, and what is typed is a path from `folder`.
+    """
+    saves = bool(text)
 
     def path_of(typed: str) -> Path:
         try:

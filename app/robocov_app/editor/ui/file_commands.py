@@ -100,9 +100,7 @@ class FileCommands:
         def chosen(path: Path) -> None:
             self.editor.carry_out(lambda: call(path))
 
-        folder, saves = self.editor.folder, bool(text)
-        asked = file_choice(title, folder, chosen, endings=endings, text=text, saves=saves)
-        self.editor.dialogs.ask(asked)
+        self.editor.dialogs.ask(file_choice(title, self.editor.folder, chosen, endings=endings, text=text))
 
     def ask_recent(self) -> None:
         """Ask which of the maps to open that were open lately, or come with robocov."""
