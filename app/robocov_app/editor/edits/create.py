@@ -23,7 +23,7 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
+from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, tenths
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
@@ -47,8 +47,7 @@ def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
     low, high = ring_near(np.array([np.minimum(a, b), np.maximum(a, b)]))
     if min(high[0] - low[0], high[1] - low[1]) < SHORTEST:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
-    ring = (low, (high[0], low[1]), high, (low[0], high[1]))
-    return replace(drawn(sketch, PolygonObstacle(ring)), words="rectangle drawn")
+    return replace(drawn(sketch, PolygonObstacle(rectangle(low, high))), words="rectangle drawn")
 
 
 def circle_drawn(sketch: Sketch, center: Point, radius: float) -> Change:

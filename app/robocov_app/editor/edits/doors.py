@@ -13,14 +13,14 @@ from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import SHORTEST
 from robocov_app.editor.model.geometry import rounded
-from robocov_app.editor.model.hit_test import owners_at
+from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, display_name, replace_obstacles
-from robocov_app.editor.model.sketch import BOUNDARY, Sketch
+from robocov_app.editor.model.sketch import Sketch
 
 
 def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
     """Return the wall within `reach` metres of a point, the topmost."""
-    keys = [each for each in owners_at(sketch, point, reach) if isinstance(each, int) and each != BOUNDARY]
+    keys = obstacles_at(sketch, point, reach)
     return next((key for key in keys if isinstance(sketch.item(key).shape, WallObstacle)), None)
 
 

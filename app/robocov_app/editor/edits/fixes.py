@@ -14,7 +14,7 @@ from shapely.ops import substring
 from robocov.environment import SAGITTA, DiscStart, Point, PointsStart, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform
-from robocov_app.editor.model.geometry import distinct, outlines, rounded
+from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
 from robocov_app.editor.model.measurement import reach_of
 from robocov_app.editor.model.selection import (
     Change,
@@ -93,8 +93,7 @@ def _fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
 def _boundary_drawn(sketch: Sketch) -> Change:
     low_x, low_y, high_x, high_y = sketch.bounds or (0.0, 0.0, 10.0, 10.0)
     by = _MARGIN if sketch.bounds else 0.0
-    low, high = rounded((low_x - by, low_y - by)), rounded((high_x + by, high_y + by))
-    ring = (low, (high[0], low[1]), high, (low[0], high[1]))
+    ring = rectangle(rounded((low_x - by, low_y - by)), rounded((high_x + by, high_y + by)))
     return Change(replace(sketch, boundary=ring), Selection(boundary=True), "boundary drawn round everything")
 
 

@@ -99,6 +99,11 @@ def angle_to_level(a: Point, b: Point) -> float:
     return 90.0 * round(angle / 90.0) - angle
 
 
+def rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
+    """Return the corners of the rectangle with two opposite corners, beginning with the first."""
+    return a, (b[0], a[1]), b, (a[0], b[1])
+
+
 def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
     """Return the polygons of a valid geometry, the largest first, snapped to tenths of a millimetre.
 

@@ -9,7 +9,7 @@ from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Step:
     before: Sketch
     selected_before: Selection
@@ -67,21 +67,14 @@ class History:
 
     def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
         """Change the sketch as it is and at every step, without a step of its own."""
-        changed: dict[int, Sketch] = {}  # the same sketch stays the same in all steps
-
-        def new(sketch: Sketch) -> Sketch:
-            if id(sketch) not in changed:
-                changed[id(sketch)] = change(sketch)
-            return changed[id(sketch)]
-
-        for steps in (self._done, self._undone):
-            steps[:] = [
-                replace(
-                    step, before=new(step.before), after=replace(step.after, sketch=new(step.after.sketch))
-                )
-                for step in steps
-            ]
-        self.sketch = new(self.sketch)
+        steps = [*self._done, *self._undone]
+        sketches = [self.sketch, *(step.before for step in steps), *(step.after.sketch for step in steps)]
+        # the same sketch stays the same in all steps
+        new = {id(sketch): change(sketch) for sketch in {id(each): each for each in sketches}.values()}
+        for step in steps:
+            step.before = new[id(step.before)]
+            step.after = replace(step.after, sketch=new[id(step.after.sketch)])
+        self.sketch = new[id(self.sketch)]
 
     @property
     def past(self) -> tuple[str, ...]:

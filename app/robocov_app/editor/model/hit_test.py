@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import numpy as np
 import shapely
@@ -45,10 +45,19 @@ def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
     return tuple(found)
 
 
+def obstacles_at(sketch: Sketch, point: Point, reach: float) -> list[int]:
+    """Return the obstacles of `owners_at`, by their keys."""
+    return [each for each in owners_at(sketch, point, reach) if isinstance(each, int) and each != BOUNDARY]
+
+
 def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Edge | None:
     """Return the nearest place on an edge of some things within `reach` metres; None if there is none."""
     best, nearest = reach, None
-    for owner in _near(sketch, point, reach, owners):
+    wanted = list(owners)
+    if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
+        near = {sketch.obstacles[k].key for k in sketch.tree.query(_box_round(point, reach)).tolist()}
+        wanted = [each for each in wanted if each in near or each not in sketch.places]
+    for owner in wanted:
         for ring, points, closed in rings_of(sketch, owner):
             starts = np.array(points, dtype=float).reshape(-1, 2)
             ends = np.roll(starts, -1, axis=0)
@@ -106,15 +115,6 @@ def _start_in_box(spec: StartSpec, low: Array, high: Array, box: BaseGeometry, *
         inside = ((np.array(spec.positions) >= low) & (np.array(spec.positions) <= high)).all(axis=1)
         return bool(inside.any() if touched else inside.all())
     return False
-
-
-def _near(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner]) -> Iterator[Owner]:
-    """Yield those owners that may have something within reach: of many obstacles, few."""
-    wanted = list(owners)
-    if len(wanted) > 8:
-        near = {sketch.obstacles[k].key for k in sketch.tree.query(_box_round(point, reach)).tolist()}
-        wanted = [each for each in wanted if each in near or each == BOUNDARY or isinstance(each, str)]
-    yield from wanted
 
 
 def _box_round(point: Point, reach: float) -> BaseGeometry:

@@ -21,7 +21,7 @@ from robocov_app.editor.edits.density import (
     weighed,
     weight_of,
 )
-from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.model.geometry import distance, rectangle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
 
@@ -122,8 +122,7 @@ class DensityTool(Tool):
         assert self._from is not None
         sketch, begun, number = context.sketch, self._from, self._taken
         if number is None and isinstance(sketch.density, WeightedPolygons):
-            (ax, ay), (bx, by) = begun, to
-            return area_added(sketch, ((ax, ay), (bx, ay), (bx, by), (ax, by)), self.weight)
+            return area_added(sketch, rectangle(begun, to), self.weight)
         if number is None:
             return peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
         if number >= len(features_of(sketch)):
@@ -151,12 +150,9 @@ def _under(features: tuple[Feature, ...], event: PointerEvent) -> tuple[int | No
             rims.append((abs(distance(each.center, event.raw) - each.sigma), k, 0))
     if rims and min(rims)[0] < 0.6 * event.reach:
         return min(rims)[1:]
-    inside = [k for k, each in enumerate(features) if isinstance(each, WeightedArea) and _covers(each, event)]
+    areas = [(k, each.polygon) for k, each in enumerate(features) if isinstance(each, WeightedArea)]
+    inside = [k for k, polygon in areas if polygon.contains(shapely.Point(event.raw))]
     return (inside[-1] if inside else None), None
-
-
-def _covers(area: WeightedArea, event: PointerEvent) -> bool:
-    return bool(area.polygon.contains(shapely.Point(event.raw)))
 
 
 def _middle(feature: Feature) -> Point:
@@ -168,10 +164,8 @@ def _middle(feature: Feature) -> Point:
 
 def _outline(feature: Feature) -> Ring:
     """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
-    return feature.vertices if isinstance(feature, WeightedArea) else _ellipse(feature)
-
-
-def _ellipse(peak: Gaussian) -> Ring:
+    if isinstance(feature, WeightedArea):
+        return feature.vertices
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    points: Array = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(peak.matrix).T
-    return tuple((x, y) for x, y in (points + np.array(peak.center)).tolist())
+    points: Array = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(feature.matrix).T
+    return tuple((x, y) for x, y in (points + np.array(feature.center)).tolist())

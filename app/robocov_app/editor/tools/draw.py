@@ -19,7 +19,7 @@ from robocov.environment import (
 from robocov.errors import MapError, counted
 from robocov_app.editor.edits import create, doors
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
-from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.model.geometry import distance, rectangle
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.tools.tool import (
     PointerEvent,
@@ -239,7 +239,7 @@ class BoundaryTool(DrawTool):
         return create.boundary_drawn(context.sketch, points)
 
     def dragged(self, a: Point, b: Point) -> list[Point]:
-        return list(_rectangle(a, b))
+        return list(rectangle(a, b))
 
     def placed(self, event: PointerEvent) -> Point:
         return event.point if self.outline.dragging else super().placed(event)
@@ -252,7 +252,7 @@ class BoundaryTool(DrawTool):
             return super().shown(context, points)
         (ax, ay), (bx, by) = points
         words = f"{length_words(abs(bx - ax))} x {length_words(abs(by - ay))}"
-        return Preview(_rectangle(*points), True, words=words)
+        return Preview(rectangle(*points), True, words=words)
 
 
 class RectangleTool(DrawTool):
@@ -280,7 +280,7 @@ class RectangleTool(DrawTool):
     def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
         wide, high = abs(bx - ax), abs(by - ay)
-        ring = _rectangle(*points)
+        ring = rectangle(*points)
         shapes: tuple[Obstacle, ...] = (PolygonObstacle(ring),) if min(wide, high) > SAME else ()
         words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
         return Preview(ring, True, shapes=shapes, words=words)
@@ -378,7 +378,3 @@ class DoorTool(Tool):
         if self._from is not None and distance(self._from, self._at) > 0.1 * self.width:
             a, b = (doors.on_wall(context.sketch, self._wall, place) for place in (self._from, self._at))
         return Preview((a, b), words=f"door, {length_words(distance(a, b))}")
-
-
-def _rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
-    return a, (b[0], a[1]), b, (a[0], b[1])

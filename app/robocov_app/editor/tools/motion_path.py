@@ -16,9 +16,8 @@ from robocov_app.editor.edits.motion_path import (
     way_point_removed,
 )
 from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.model.hit_test import owners_at
+from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import BOUNDARY
 from robocov_app.editor.tools.tool import (
     PointerEvent,
     Preview,
@@ -64,7 +63,7 @@ class MotionPathTool(Tool):
             if self._held is not None:
                 self.chosen = self._held
                 return
-        over = [each for each in owners_at(context.sketch, event.raw, 0.0) if _is_obstacle(each)]
+        over = obstacles_at(context.sketch, event.raw, 0.0)
         if subject is None or (over and subject not in over):
             self.chosen = None
             if over:
@@ -165,7 +164,3 @@ def _led(context: ToolContext) -> tuple[int | None, ObstaclePath | None]:
         return None, None
     (key,) = chosen.items
     return key, path_of(context.sketch, key)
-
-
-def _is_obstacle(owner: int | str) -> bool:
-    return isinstance(owner, int) and owner != BOUNDARY
