@@ -24,7 +24,27 @@ from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.shapes import Line, Shapes
 from robocov_app.formats.options import Importer, ReadOptions
 
+MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
+MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
+MOST_DRAWN = 200_000  # that are drawn, blocks and all
+
+UNITS = {
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
+    5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
+    10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
+    16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
+}  # fmt: skip
+"""What the header's $INSUNITS stands for, with its metres."""
+
+_BINARY = b"AutoCAD Binary DXF"
+_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
+_ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
+_POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
+
 _BULGE = 1e-9  # edges of polylines that are bent less are straight
+_FRAME = 16  # flag of a vertex that only shapes the spline of an old polyline
+_LEVEL = 1.0 - 1e-9  # upward part of the direction, of length 1, that a circle is seen from as one
+_CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, are closed
 
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
@@ -74,12 +94,6 @@ def flat(points: Sequence[Any]) -> Array:
     return np.array([(point[0], point[1]) for point in points], dtype=float).reshape(-1, 2)
 
 
-MOST_DRAWN = 200_000  # that are drawn, blocks and all
-_FRAME = 16  # flag of a vertex that only shapes the spline of an old polyline
-_LEVEL = 1.0 - 1e-9  # upward part of the direction, of length 1, that a circle is seen from as one
-_CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, are closed
-
-
 class DxfDrawing:
     """Goes through the entities and adds them to the shapes; `scale` is metres a unit."""
 
@@ -93,7 +107,7 @@ class DxfDrawing:
         }
 
     def draw(self) -> None:
-        """Add all that is drawn."""
+        """Add all that is drawn, and a word about it."""
         space = self.document.modelspace()
         self._require_few(space)
         self._draw(space, "0", ())
@@ -283,24 +297,6 @@ def _rows(entity: Any) -> Array:
             others = (float(vertex.dxf.get(key, 0.0)) for key in ("bulge", "start_width", "end_width"))
             found.append((place.x, place.y, *others))
     return np.array(found, dtype=float).reshape(-1, 5)
-
-
-MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
-MOST_ENTITIES = 50_000
-"""In the file, on whatever layer: ezdxf takes an eighth of a millisecond and 5 kB for each."""
-
-UNITS = {
-    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
-    5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
-    10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
-    16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
-}  # fmt: skip
-"""What the header's $INSUNITS stands for, with its metres."""
-
-_BINARY = b"AutoCAD Binary DXF"
-_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
-_ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
-_POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
 
 
 def _sniff(path: Path, head: bytes) -> bool:
