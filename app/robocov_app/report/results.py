@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -389,11 +390,9 @@ def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | Non
 
 def _versions(entries: list[Entry]) -> Any:
     for entry in entries:
-        if entry.error is None:
-            try:
+        with suppress(InputError):
+            if entry.error is None:
                 return _json(entry.folder / "run.json").get("versions")
-            except InputError:
-                continue
     return None
 
 
