@@ -19,7 +19,7 @@ from robocov.planning.placement import CoverageDemand, OwnPlace, own_place, team
 from robocov.planning.wayfinding import GridPlanner, Window
 from robocov.robots import Team
 
-FINEST_CELL, MOST_CELLS = 0.1, 250_000  # side of a cell of the maps, m, larger where a region is very large
+FINEST_CELL, MOST_CELLS = 0.05, 1_000_000  # side of a cell of the maps, m, larger in very large regions
 TEAM_NODES, GROUP_NODES, OWN_NODES = 1000, 500, 2500  # of lattices: for a team, for its group, for itself
 MAX_PLANNING_GROUP = 8  # a robot plans for itself and up to so many less one that it hears
 STILL_FOR, STILL_WITHIN = 3.0, 0.1  # who does not get so many metres away for so many seconds rests
@@ -144,7 +144,7 @@ class Atlas(Law):
     name = "atlas"
     label = "Atlas"
     summary = "plans the team's placement on the map that each robot discovers itself"
-    scanning = Scanning(rays=120, period=0.5)
+    scanning = Scanning(rays=240, period=0.5)
 
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
@@ -155,7 +155,7 @@ class Atlas(Law):
     settling: float = gain(
         40.0, "s", "time in which what a relocation, or a new goal, must save doubles", low=0.01, high=1e6
     )
-    clearance: float = gain(0.06, "m", "that routes keep between rim and walls", high=10.0)
+    clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
     response_time: float = response_time_gain()
 
