@@ -1,7 +1,5 @@
 """The coverage cost as one page: its curves, and maps of the distances that it is the mean of."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -53,7 +51,7 @@ class Moment:
         mean_distance: float,
         counted: IntArray | None = None,
         mean_time: float | None = None,
-    ) -> Moment:
+    ) -> "Moment":
         """Return the last moment of a run, its mean distance, m, and time, s, of `counted` rows."""
         cost = cost_label(mean_label(record.environment), mean_distance, mean_time)
         cost = cost.replace(", mean time", ", time")  # three maps side by side leave little room

@@ -143,11 +143,10 @@ class Page:
     def panels(
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
     ) -> list[tuple[Box, float]]:
-        """Return equal boxes in rows, and how wide the lines above each may be.
+        """Return equal boxes, `aspect` wide by high, in rows, and how wide lines above each may be, px.
 
-        `aspect` is width by height of a box; `words` is how wide the lines above would be: slots grow for
-        them as far as there is room; `above` is the height of those lines; `top` and `below` stay free. All
-        in px.
+        `words`: how wide these would be: slots grow for them as far as there is room; `above`: their height.
+        `top` and `below` stay free.
         """
         rows = -(-count // columns)
         gap = 14 * self.scale
@@ -215,10 +214,9 @@ class Page:
         zoom: float,
         begin: float | None = None,
     ) -> None:
-        """Draw the scale bar and the legend: beside each other where that fits, else below each other.
+        """Draw the scale bar, at `zoom` px/m, and the legend: beside each other or below.
 
-        `left`, `right` and `bottom` are edges of what is plotted above, px; `zoom` is in px/m; nothing is
-        left of `begin`.
+        `left`, `right`, `bottom`: edges of what is plotted above, px; nothing is left of `begin`.
         """
         begin = self.margin if begin is None else begin
         columns, width, _ = self._legend_extent(handles, begin)

@@ -348,7 +348,6 @@ def _draw_points(
 
 
 def _draw_median(axes: Axes, value: float, place: float, theme: Theme) -> None:
-    """Draw the mark of a median."""
     ends = [place - _HALF, place + _HALF]
     axes.plot([value, value], ends, color=tone(theme.ink), linewidth=2.2, solid_capstyle="butt", zorder=5)
 

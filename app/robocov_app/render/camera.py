@@ -1,7 +1,5 @@
 """The camera: world metres, y up, to pixels, y down, and back."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +24,7 @@ class Camera:
         bounds: tuple[float, float, float, float],
         view: tuple[float, float, float, float],
         margin: float = 0.0,
-    ) -> Camera:
+    ) -> "Camera":
         """Return the camera that shows `bounds`, m, as large as possible, `margin` px from the sides."""
         low_x, low_y, high_x, high_y = bounds
         width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
@@ -52,7 +50,7 @@ class Camera:
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
         return np.asarray((pixels - np.array([x, y])) * scale + np.array(self.center))
 
-    def zoomed(self, factor: float, at: tuple[float, float]) -> Camera:
+    def zoomed(self, factor: float, at: tuple[float, float]) -> "Camera":
         """Return the camera that magnifies by `factor` and keeps what is under pixel `at` there."""
         zoom = min(max(self.zoom * factor, SMALLEST), LARGEST)
         (x, y), (middle_x, middle_y) = at, self.middle
@@ -60,11 +58,11 @@ class Camera:
         center = (self.center[0] + (x - middle_x) * shrink, self.center[1] - (y - middle_y) * shrink)
         return replace(self, center=center, zoom=zoom)
 
-    def panned(self, dx: float, dy: float) -> Camera:
+    def panned(self, dx: float, dy: float) -> "Camera":
         """Return the camera after the world was dragged by (`dx`, `dy`) pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
-    def within(self, view: tuple[float, float, float, float]) -> Camera:
+    def within(self, view: tuple[float, float, float, float]) -> "Camera":
         """Return the camera that shows the same middle at the same zoom in another rectangle."""
         return replace(self, view=view)
 

@@ -18,10 +18,7 @@ Bounds: TypeAlias = tuple[float, float, float, float]
 
 
 def shading(environment: Environment, most: int, theme: Theme) -> NDArray[np.uint8]:
-    """Return the shading over the region's box as RGBA, (h, w, 4), the lowest row first.
-
-    No colour is the least that there is, the full one the most. `most` dots are along the longer side.
-    """
+    """Return RGBA of the region's box, (h, w, 4), lowest row first; `most` dots are along its longer side."""
     assert environment.density is not None
     x, y = dots(environment, most)
     return colours(parts(environment.density, environment.region.bounds, x, y), theme)

@@ -1,7 +1,5 @@
 """Distances to the nearest robot at every pixel of a picture, and their colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
@@ -64,7 +62,7 @@ class Borders:
     owner: IntArray
     gap: Array
 
-    def within(self, gap: float) -> Borders:
+    def within(self, gap: float) -> "Borders":
         """Return those that are no farther from a border."""
         near = (self.gap <= gap).nonzero()[0]
         return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
@@ -230,10 +228,9 @@ class Fields:
         self._lattices = cost, FieldLattice(cost.sites)
 
     def at(self, positions: Array, time: float = 0.0) -> Field | None:
-        """Return the field of robots at (n, 2) m, with the obstacles where they are at a time, s.
+        """Return the field of robots at (n, 2) m at a time, s, without those below moving obstacles.
 
-        Robots below an obstacle that moves are left out; None where all are. Raises InputError when a robot
-        is in an obstacle that stands, or outside the map.
+        None where all are. Raises InputError when a robot is in an obstacle that stands, or outside the map.
         """
         result = self._momentary.of_all(time, positions)
         if result is None:
@@ -260,10 +257,9 @@ def _spread(row: IntArray, column: IntArray, height: int, width: int) -> tuple[I
 
 
 def _with_neighbours(lattice: FieldLattice, divided: BoolArray) -> tuple[BoolArray, IntArray]:
-    """Return divided squares and those beside them, and the (k, 20) sites of each: its own first.
+    """Return divided squares, those across their open sides, and the (k, 20) sites of each, its own first.
 
-    A border may cut a corner off a square whose own four sites are of one robot. Those beside are asked
-    across an open side only.
+    A border may cut a corner off a square whose own four sites are of one robot.
     """
     found = divided.copy()
     rows, columns = divided.shape

@@ -1,7 +1,5 @@
 """Heat maps: the density, distances to the nearest robot, geodesic cells and their colour bar."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -97,7 +95,7 @@ class _Dots(NamedTuple):
     part: Array
 
     @classmethod
-    def over(cls, begin: int, count: int, step: int) -> _Dots:
+    def over(cls, begin: int, count: int, step: int) -> "_Dots":
         """Return the dots, `step` pixels apart, for `count` pixels."""
         place = (begin + np.arange(count) + 0.5) / step - 0.5
         first = np.floor(place).astype(np.intp)

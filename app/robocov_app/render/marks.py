@@ -23,11 +23,7 @@ SMALLEST = 2.4  # radius below which no robot is drawn in pixels at scale 1
 
 
 def drawn_radii(canvas: Canvas, scene: Scene) -> Array:
-    """Return the radius in pixels at which each robot is drawn, in steps of half a pixel.
-
-    Large enough for a number where there is room; in a crowd smaller, so that discs keep apart, but
-    never below the true size.
-    """
+    """Return radii in steps of half a pixel: readable where there is room, in a crowd down to true size."""
     return _drawn_radii(scene, canvas.camera, canvas.scale)
 
 
@@ -104,11 +100,9 @@ robots_legend = says("robot", _robot_glyph)
 
 
 def draw_centroids(canvas: Canvas, scene: Scene) -> None:
-    """Draw a plus at the centroid of each cell, where RAPF and Lloyd's algorithm usually head for.
+    """Draw a plus at each centroid, or a times sign where controllers, as Atlas, head for something else.
 
-    Controllers without goals, as RPF, do not know of centroids: nothing is drawn for them. Those that head
-    for something else, as Atlas, do not either: their goals are drawn, as a times sign. Nor is anything drawn
-    where a robot has arrived: only the ends of the sign would stick out from under its disc.
+    RPF has no goals: nothing is drawn, nor where a robot has arrived: it would stick out from under its disc.
     """
     known, goals = _aims(scene)
     if not known:
@@ -216,11 +210,7 @@ failed_legend = says("failed robot", lambda canvas, x, y: _draw_wreck(canvas, x,
 
 
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
-    """Draw a ring around the robot that is asked about, and where it believes itself and the others to be.
-
-    Only where that is not where they are: messages are late, get lost, or tell what is not so. Its own cell
-    is then drawn as it takes it to be; those of others overlap it, or leave gaps.
-    """
+    """Draw a ring around the robot that is asked about; where messages fail, also what it believes."""
     assert scene.selected is not None
     if scene.now.seen.reported_positions is not None:
         _draw_belief(canvas, scene.now, scene.selected)

@@ -1,7 +1,5 @@
 """The scene: everything that a picture shows of one moment of a run, from a simulation or a record."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -68,7 +66,7 @@ class Sensed:
         count = int(np.searchsorted(self._times, time + 1e-6, side="right"))
         return self._points[:count], self._robots[:count]
 
-    def copy(self) -> Sensed:
+    def copy(self) -> "Sensed":
         """Return a set of its own with the same points."""
         twin = copy(self)  # arrays are replaced, never changed
         twin._known = set(self._known)
@@ -157,7 +155,7 @@ class Scene:
         return self.snapshot
 
     @classmethod
-    def of(cls, environment: Environment, team: Team, snapshot: Snapshot, **more: Any) -> Scene:
+    def of(cls, environment: Environment, team: Team, snapshot: Snapshot, **more: Any) -> "Scene":
         """Return the scene of `snapshot` with all robots' Voronoi cells, and obstacles where they are then.
 
         The cells that the law used are taken where they are these: not where communication is limited, or
@@ -183,10 +181,9 @@ class Scene:
 
 
 def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
-    """Return the scene of the moment number `row` of a record, with the trail up to there.
+    """Return the scene of a row of a record, with its trail, and with distances where `fields` are given.
 
-    Robots that have failed are marked as such, those that have not joined yet are left out; `fields` give
-    the distances to the nearest robot, where they are shown.
+    Robots that have failed are marked as such, those that have not joined yet are left out.
     """
     environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team

@@ -4,8 +4,6 @@ Discs with numbers, rings and crosses are kept, for each quarter of a pixel's sh
 robots glide in films instead of hopping. All is premultiplied: blit with ``BLEND_PREMULTIPLIED``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -24,17 +22,14 @@ Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface
 
 
 class Sketch:
-    """A part of a surface, drawn `STROKE_FINE` times larger and shrunk onto it.
-
-    Pieces that overlap within a sketch do not show their seams, as smooth lines drawn one by one do.
-    """
+    """A part of a surface, drawn `STROKE_FINE` times larger and shrunk: pieces that overlap show no seams."""
 
     def __init__(self, box: pygame.Rect) -> None:
         self._box = box
         self._large = pygame.Surface((box.width * STROKE_FINE, box.height * STROKE_FINE), pygame.SRCALPHA, 32)
 
     @classmethod
-    def around(cls, points: Sequence[Pixel], margin: float) -> Sketch | None:
+    def around(cls, points: Sequence[Pixel], margin: float) -> "Sketch | None":
         """Return a sketch that holds `points` and `margin` pixels around; None where it would be huge."""
         xs, ys = [point[0] for point in points], [point[1] for point in points]
         left, top = int(min(xs) - margin) - 1, int(min(ys) - margin) - 1
@@ -87,10 +82,7 @@ def number_size(inside: Any, digits: Any) -> Any:
 def disc(
     radius: float, fill: Colour, ring: Colour, ring_width: float, edge: Colour, text: str, shift: Shift
 ) -> pygame.Surface:
-    """Return a disc with a ring around it, a hair line around that, and a number in it.
-
-    `radius`, px: of the disc with its ring. What is `LARGE` keeps to whole pixels.
-    """
+    """Return a disc of `radius` px with a ring in it, a hair line around, and a number."""
     return _disc(radius, fill, ring, ring_width, edge, text, shift if radius <= LARGE else (0, 0))
 
 
