@@ -132,10 +132,7 @@ class Commands:
         return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}
 
     def typed(self, text: str) -> object:
-        """Do what was typed: the name of a command and what it takes.
-
-        Raises RobocovError when that means nothing, or cannot be done.
-        """
+        """Do what was typed: a command's name and what it takes; RobocovError where that cannot be done."""
         word, rest = parted(text)
         known = self._typable()
         if word not in known:

@@ -8,10 +8,7 @@ from robocov_app.toolkit.dialogs import Choice, Option
 
 
 def palette(commands: Commands, ghost: str, told: Callable[[str], object]) -> Choice:
-    """Return the dialog that finds and does commands; an error keeps what was typed.
-
-    `told` is called with the words of what was done, which may be none.
-    """
+    """Return the dialog that finds and does commands; `told` gets the words of what was done, if any."""
 
     def options(text: str) -> list[Option]:
         return [Option(each.text, each.aside, each.fills, each.why, each) for each in commands.offered(text)]

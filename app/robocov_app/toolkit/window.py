@@ -182,15 +182,11 @@ def show_compiling(size: tuple[int, int]) -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Keep the garbage collector away from all that is there now, modules most of all.
-
-    It would look at it again every half minute, which holds a frame up by 25 ms. What is new is looked at
-    once a frame or so, not after every 700 coordinates.
-    """
+    """Keep the garbage collector away from all that is there now, modules most of all."""
     before = gc.get_threshold()
     gc.collect()
-    gc.freeze()
-    gc.set_threshold(50_000, *before[1:])
+    gc.freeze()  # to look at it again every half minute would hold a frame up by 25 ms
+    gc.set_threshold(50_000, *before[1:])  # once a frame or so, not after every 700 coordinates
     try:
         yield
     finally:

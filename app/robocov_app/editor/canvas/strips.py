@@ -45,14 +45,12 @@ class Strips:
         return float(left), float(top + above), float(width), float(below)
 
     def update(self, canvas: Canvas, team: Team | None) -> None:
-        """Look what there is to tell, on a canvas as wide as the sheet.
-
-        The legend does not become lower again while things come and go: the map is not to jump.
-        """
+        """Look what there is to tell, on a canvas as wide as the sheet."""
         editor = self._editor
         self._entries = self._found(team)
         rows = max(len(legend_rows(canvas, self._entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
+        # while things come and go the legend does not become lower again: the map is not to jump
         self._rows = max(rows, self._rows) if key == self._rows_for else rows
         self._rows_for = key
 

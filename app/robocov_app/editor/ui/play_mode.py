@@ -101,16 +101,14 @@ def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool
 
 
 def brought_back(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Return what was drawn, moved and deleted while the map was tried, as one change; None if nothing was.
-
-    Obstacles that are as they were keep who they are and their notes.
-    """
+    """Return what was drawn, moved and deleted while it was tried as one change; None if nothing was."""
     if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
         return None
     left = list(sketch.obstacles)
     items: list[Item] = []
     key = sketch.fresh_key
     for shape in after.obstacles:
+        # who is as it was keeps its key and its notes
         same = next((item for item in left if item.shape == shape), None)
         if same is not None:
             left.remove(same)

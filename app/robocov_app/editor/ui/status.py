@@ -7,21 +7,15 @@ from robocov_app.editor.ui.team import Team
 HINT = "F5 try it · F1 keys"
 
 
-def hovered_words(editor: Editor) -> str:
-    """Return what is noted about what the cursor is on."""
-    owner = editor.selector.hovered
-    if editor.tool is not editor.selector or not isinstance(owner, int) or owner not in editor.sketch.places:
-        return ""
-    item = editor.sketch.item(owner)
-    return f"{item.shape.name or 'note'}: {item.note}" if item.note else ""
-
-
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
     """Return what the line says, the most important first."""
     said = [f"{editor.tool.title}: {editor.tool.hint}" if editor.tool is not editor.selector else ""]
     if editor.cursor is not None:
         said.insert(0, place_words(editor.cursor))
-    said.append(hovered_words(editor))
+    owner = editor.selector.hovered
+    if editor.tool is editor.selector and isinstance(owner, int) and owner in editor.sketch.places:
+        item = editor.sketch.item(owner)
+        said.append(f"{item.shape.name or 'note'}: {item.note}" if item.note else "")
     if editor.selection and editor.tool is editor.selector:
         said.append(editor.selection.words(editor.sketch))
     if "robots" in editor.shown and team is not None:
