@@ -44,7 +44,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes = Shapes(where, options)
     scale = 1.0 if options.scale is None else options.scale
     with located_errors(content, where):
-        polygons = _polygons(document, where, shapes)
+        polygons = _polygons(document, shapes)
     require_shapes(len(polygons), where)
     for number, rings in enumerate(polygons, start=1):
         if not shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}"):
@@ -54,55 +54,55 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
 
 
-def _polygons(document: Any, where: str, shapes: Shapes) -> list[list[Array]]:
+def _polygons(document: Any, shapes: Shapes) -> list[list[Array]]:
     if isinstance(document, dict):
-        return [_flat(document, where, shapes)]
+        return [_flat(document, shapes)]
     depth, inner = 0, document
     while isinstance(inner, list) and inner:
         depth, inner = depth + 1, inner[0]
     if depth == 1:
-        return [[_pairs(document, (), where, 2, shapes)]]
+        return [[_pairs(document, (), 2, shapes)]]
     if depth == 2:
-        return [[_ring(document, (), where, shapes)]]
+        return [[_ring(document, (), shapes)]]
     if depth == 3:
-        return [_rings(document, (), where, shapes)]
+        return [_rings(document, (), shapes)]
     if depth == 4:
-        return [_rings(rings, (k,), where, shapes) for k, rings in enumerate(document)]
-    raise refused(where, (), document, "a list of rings [[x, y], ...] was wanted")
+        return [_rings(rings, (k,), shapes) for k, rings in enumerate(document)]
+    raise refused(shapes.where, (), document, "a list of rings [[x, y], ...] was wanted")
 
 
-def _rings(value: Any, at: Steps, where: str, shapes: Shapes) -> list[Array]:
+def _rings(value: Any, at: Steps, shapes: Shapes) -> list[Array]:
     if not isinstance(value, list) or not value:
-        raise refused(where, at, value, "a list of rings was wanted")
-    return [_ring(ring, (*at, k), where, shapes) for k, ring in enumerate(value)]
+        raise refused(shapes.where, at, value, "a list of rings was wanted")
+    return [_ring(ring, (*at, k), shapes) for k, ring in enumerate(value)]
 
 
-def _ring(value: Any, at: Steps, where: str, shapes: Shapes) -> Array:
-    points = positions(value, at, where, least=1, dimensions=(2, 3))
+def _ring(value: Any, at: Steps, shapes: Shapes) -> Array:
+    points = positions(value, at, shapes.where, least=1, dimensions=(2, 3))
     shapes.leave_heights(points[:, 2:3])
     return points[:, :2]
 
 
-def _flat(document: dict[str, Any], where: str, shapes: Shapes) -> list[Array]:
+def _flat(document: dict[str, Any], shapes: Shapes) -> list[Array]:
     dimensions = document.get("dimensions", 2)
     if type(dimensions) is not int or dimensions not in (2, 3):
-        raise refused(where, ("dimensions",), dimensions, "2 or 3 was wanted")
-    points = _pairs(document.get("vertices"), ("vertices",), where, dimensions, shapes)
+        raise refused(shapes.where, ("dimensions",), dimensions, "2 or 3 was wanted")
+    points = _pairs(document.get("vertices"), ("vertices",), dimensions, shapes)
     holes = document.get("holes") or []
     good = isinstance(holes, list) and all(type(hole) is int for hole in holes)
     cuts = [0, *holes, len(points)] if good else []
     if not good or any(a >= b for a, b in pairwise(cuts)):
         wanted = f"growing indices of vertices, from 1 to {len(points) - 1}, were wanted"
-        raise refused(where, ("holes",), holes, wanted)
+        raise refused(shapes.where, ("holes",), holes, wanted)
     return [points[a:b] for a, b in pairwise(cuts)]
 
 
-def _pairs(value: Any, at: Steps, where: str, dimensions: int, shapes: Shapes) -> Array:
+def _pairs(value: Any, at: Steps, dimensions: int, shapes: Shapes) -> Array:
     """Return the points of a flat list of numbers, (k, 2)."""
     if not isinstance(value, list) or len(value) % dimensions or len(value) < 3 * dimensions:
-        raise refused(where, at, value, f"at least 3 times {dimensions} numbers were wanted")
+        raise refused(shapes.where, at, value, f"at least 3 times {dimensions} numbers were wanted")
     pairs = [value[k : k + dimensions] for k in range(0, len(value), dimensions)]
-    points = positions(pairs, at, where, least=3, dimensions=(dimensions, dimensions))
+    points = positions(pairs, at, shapes.where, least=3, dimensions=(dimensions, dimensions))
     shapes.leave_heights(points[:, 2:3])
     return np.ascontiguousarray(points[:, :2])
 
