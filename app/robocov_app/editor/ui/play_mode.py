@@ -101,7 +101,7 @@ def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool
 
 
 def brought_back(sketch: Sketch, before: Environment, after: Environment) -> Change | None:
-    """Return what was drawn, moved and deleted while it was tried as one change; None if nothing was."""
+    """Return what was drawn, moved and deleted while it was tried, as one change; None if nothing was."""
     if after is before or after.obstacles == before.obstacles or after.boundary != before.boundary:
         return None
     left = list(sketch.obstacles)
