@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -40,6 +41,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
 
+_Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
 
@@ -182,10 +184,7 @@ def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
     return _cut(sketch, selection, cut, "rounded")
 
 
-def _cut(
-    sketch: Sketch, selection: Selection, wanted: Callable[[float], tuple[float, int]], words: str
-) -> Change:
-    """Cut corners; `wanted` says for the angle that a corner turns by the length and the segments."""
+def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Change:
     after, count = sketch, 0
     for owner, by_ring in _by_ring(sketch, selection.vertices).items():
         rings = list(ring_points(sketch, owner))
@@ -202,9 +201,7 @@ def _cut(
     return Change(after, selection.without_vertices(), words)
 
 
-def _cuts(
-    ring: Ring, indices: set[int], closed: bool, wanted: Callable[[float], tuple[float, int]]
-) -> dict[int, tuple[float, int]]:
+def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int, tuple[float, int]]:
     """Return length and segments for those of the indices that are corners."""
     points = np.array(ring)
     cuts = {}

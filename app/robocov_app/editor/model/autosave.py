@@ -30,7 +30,7 @@ class Autosave:
 
     def sketch(self) -> Sketch:
         """Return the map; MapError when it cannot be read any more."""
-        return _sketch_in(autosave.read_record(self.folder, KIND))
+        return sketch_of(autosave.read_record(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def words(self, now: datetime | None = None) -> str:
         """Return what to offer: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
@@ -60,9 +60,10 @@ def opened_elsewhere(folder: Path | None, path: Path) -> bool:
 
 def _autosave(record: autosave.Record) -> Autosave | None:
     """Return the map of a record; None if there is none, or its file holds it already."""
-    if record.content.get("sketch") is None:
+    kept, path, disk = record.content.get("sketch"), record.path, record.content.get("disk")
+    if kept is None:
         return None
-    sketch, path, disk = _sketch_in(record), record.path, record.content.get("disk")
+    sketch = sketch_of(kept, str(record.folder))
     if path is not None and _holds(path, sketch):
         return None
     try:
@@ -71,10 +72,6 @@ def _autosave(record: autosave.Record) -> Autosave | None:
     except (TypeError, ValueError, KeyError) as error:
         raise MapError(f"{record.folder}: is no whole {KIND}: {error}") from None
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
-
-
-def _sketch_in(record: autosave.Record) -> Sketch:
-    return sketch_of(record.content.get("sketch"), str(record.folder))
 
 
 def _holds(path: Path, sketch: Sketch) -> bool:

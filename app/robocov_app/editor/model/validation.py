@@ -335,9 +335,7 @@ def _spot(name: str, spec: PointsStart, k: int) -> str:
     return f"start “{one_line(name)}”: place {k + 1} at {place_words(*spec.positions[k])}"
 
 
-def _no_room(
-    name: str, spec: StartSpec, free: MultiPolygon, radius: float, *, grave: bool
-) -> Iterator[Problem]:
+def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grave: bool) -> Iterator[Problem]:
     try:
         Start(name, spec, free).sample(1, radius=radius)
     except StartError:

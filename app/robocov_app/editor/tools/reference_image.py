@@ -54,9 +54,7 @@ class ReferenceImageTool(Tool):
             corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
             context.change(underlaid(context.sketch, replace(moved, corner=corner)))
             return
-        self._points = (
-            [*self._points[-1:], event.raw] if len(self._points) == 2 else [*self._points, event.raw]
-        )
+        self._points = [*self._points[-1:], event.raw]
         if len(self._points) == 2:
             context.say("type how many metres apart the points are; Enter alone makes their line level")
 

@@ -141,7 +141,7 @@ def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> flo
 
 def _ranked(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> tuple[int, Snap]:
     """Return how well a point snapped, the lower the better, and where to."""
-    ways = (_at_vertices, _at_other_points, _on_lines, _on_grid)
+    ways = (_at_vertices, _at_points, _on_lines, _on_grid)
     for rank, way in enumerate(ways):
         found = [(math.dist(point, snap.point), snap) for snap in way(point, targets, snapping, origin)]
         near = [each for each in found if each[0] <= snapping.reach]
@@ -166,9 +166,7 @@ def _at_vertices(point: Point, targets: Targets, snapping: Snapping, origin: Poi
         yield _mark("vertex", place)
 
 
-def _at_other_points(
-    point: Point, targets: Targets, snapping: Snapping, origin: Point | None
-) -> Iterator[Snap]:
+def _at_points(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
     place = targets.nearest(point, "centre", snapping.reach) if "centre" in snapping.to else None
     if place is not None:
         yield _mark("centre", place)
