@@ -71,11 +71,6 @@ class Grid:
             cells[line[ends], middle] = True
         return found
 
-    def cell_of(self, points: Array) -> tuple[IntArray, IntArray]:
-        """Return row and column of the cells that (n, 2) m points are in."""
-        column, row = np.floor((points - self.origin) / self.cell).astype(np.intp).T
-        return row, column
-
     def _crossings(self, area: BaseGeometry, finer: int = 1, across: bool = False) -> tuple[IntArray, Array]:
         """Return where sides cross lines of centres, rows or columns: which one, and where on it."""
         sides = (sides_of(area) - self.origin) / (self.cell / finer) - 0.5
@@ -119,7 +114,9 @@ def free_cells(environment: Environment, grid: Grid) -> BoolArray:
     holes = np.array([shapely.polygons(ring) for part in environment.free.geoms for ring in part.interiors])
     sides = shapely.bounds(holes).reshape(-1, 4)
     small = (sides[:, 2:] - sides[:, :2]).max(axis=1, initial=0.0) < grid.cell
-    free[grid.cell_of(shapely.get_coordinates(shapely.point_on_surface(holes[small])))] = False
+    inside = shapely.get_coordinates(shapely.point_on_surface(holes[small]))
+    column, row = np.floor((inside - grid.origin) / grid.cell).astype(np.intp).T
+    free[row, column] = False
     if not free.any():
         raise ParameterError(f"cell: with {grid.cell:g} m no cell is free, but a smaller one was wanted")
     return free

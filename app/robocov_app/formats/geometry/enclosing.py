@@ -14,7 +14,7 @@ from robocov.environment import GRID
 from robocov.errors import MapError, counted, shown
 from robocov.mapfile.models import LARGEST
 from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.polygons import polygons_of, united
+from robocov_app.formats.geometry.polygons import Crossings, polygons_of, united
 from robocov_app.formats.geometry.shapes import Line, Outline, Shapes, polygonised
 
 BOUNDARY = "boundary"
@@ -75,7 +75,8 @@ def foreign_map(
     everything = [*shapes.areas, *shapes.paths, *([] if world is None else [world])]
     # one of many parts may be a map, if they are not all too far from each other
     _require_size(shapely.total_bounds(everything), shapes.where, _FARTHEST_PARTS)
-    shapes.require_untangled()
+    # nor may they cross each other so often that what is free among them cannot be computed
+    Crossings(shapes.where).add([*shapely.get_rings(shapely.get_parts(shapes.areas)), *shapes.paths])
     asked = shapes.options.outlines
     boundary = _named(shapes) if world is None else _Enclosure(world, "")
     if boundary is None and asked != "free":

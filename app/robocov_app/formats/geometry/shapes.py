@@ -263,10 +263,6 @@ class Shapes:
                     what = unknown_name("name", label, known) if known else "no shape has a name"
                     raise ParameterError(f"{self.where}: {name}: {what}")
 
-    def require_untangled(self) -> None:
-        """Raise MapError when the shapes cross each other too often to compute what is free among them."""
-        Crossings(self.where).add([*shapely.get_rings(shapely.get_parts(self.areas)), *self.paths])
-
     def count(self, vertices: int) -> None:
         """Count vertices that were read. Raises MapError when there are too many."""
         self.vertices += vertices

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, ranges
+from robocov.arrays import Array, ranges
 from robocov.environment import Point
 from robocov_app.formats.geometry.curves import arcs, beziers
 
@@ -259,15 +259,19 @@ class _Pen:
         vertices = np.array(self.vertices).reshape(-1, 2)
         count = np.ones(len(vertices), dtype=np.intp)
         curves = []
-        for kept, flatten in ((self._beziers, _as_beziers), (self._arcs, _as_arcs)):
-            if kept:
-                rows = np.array(kept)
-                index = rows[:, 0].astype(np.intp)
-                points, count[index] = flatten(rows[:, 1:], tolerance, most)
-                curves.append((index, points))
+        if self._beziers:
+            rows = np.array(self._beziers)
+            flat = beziers(rows[:, 1:].reshape(-1, 4, 2), tolerance, most)
+            curves.append((rows[:, 0].astype(np.intp), *flat))
+        if self._arcs:
+            rows = np.array(self._arcs)
+            flat = arcs(rows[:, 1:3], rows[:, 3:5], rows[:, 5:7], rows[:, 7], rows[:, 8], tolerance, most)
+            curves.append((rows[:, 0].astype(np.intp), *flat))
+        for index, _, steps in curves:
+            count[index] = steps
         end = np.cumsum(count)
         all_points = vertices.repeat(count, axis=0)
-        for index, points in curves:
+        for index, points, _ in curves:
             all_points[ranges(end[index] - count[index], count[index])] = points
         all_points[end - 1] = vertices
         parts = np.split(all_points, (end - count)[self._begins[1:]]) if self._begins else []
@@ -318,11 +322,3 @@ class _Pen:
         begin = math.atan2(b - q, a - p)
         self._arcs.append((len(self.vertices), *centre, ux, uy, vx, vy, begin, sweep))
         self._line(*end)
-
-
-def _as_beziers(rows: Array, tolerance: float, most: int) -> tuple[Array, IntArray]:
-    return beziers(rows.reshape(-1, 4, 2), tolerance, most)
-
-
-def _as_arcs(rows: Array, tolerance: float, most: int) -> tuple[Array, IntArray]:
-    return arcs(rows[:, 0:2], rows[:, 2:4], rows[:, 4:6], rows[:, 6], rows[:, 7], tolerance, most)
