@@ -61,12 +61,10 @@ def foreign_map(
 
     `solid`: what closed outlines are unless the option ``outlines`` says it: True is solid; False is free,
     but solid where 1 or 2 (of outlines alone) finds a boundary of others, or where there are only lines.
-    `accessible`: whether outlines are all free in files of that format, as JuPedSim's accessible area, so
-    that one may overlap another: then 2 holds only where all others lie wholly in the largest, which would
-    add nothing to it as free space. `world`, m: what is free before the shapes stand in it, where the format
-    says so: then no boundary is looked for. Raises MapError when there
-    are no shapes, the boundary has no area, or the shapes cross each other too often; ParameterError when a
-    name in the options is none of the file's.
+    `accessible`: outlines may overlap and are all free, as JuPedSim's accessible area: then 2 holds only
+    where all others lie wholly in the largest. `world`, m: what is free before the shapes stand in it, where
+    the format says so. Raises MapError when there are no shapes, the boundary has no area, or they cross too
+    often; ParameterError when a name in the options is none of the file's.
     """
     shapes.require_known_names()
     if world is None and not shapes.outlines and not shapes.lines:
