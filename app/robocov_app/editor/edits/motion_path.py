@@ -35,7 +35,7 @@ def goes(path: ObstaclePath) -> bool:
 def way_point_added(
     sketch: Sketch, key: int, point: Point, at: int | None = None, speed: float = FIRST_SPEED
 ) -> Change:
-    """Add a way point, last or before `at`; the first makes a path from the obstacle's middle, at m/s."""
+    """Add a way point, last or before `at`; the first makes a path from the middle, `speed` in m/s."""
     path = path_of(sketch, key)
     if path is None:
         ends = _middle_of(sketch.item(key)), point_near(point)

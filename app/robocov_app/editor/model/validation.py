@@ -74,7 +74,7 @@ class _Fault(NamedTuple):
 
 
 def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
-    """Return all that is wrong, the grave first, and the free space; grave is what no map may have."""
+    """Return all that is wrong for robots of a radius, m, the grave first, and the free space."""
     found = [*_map_faults(sketch), *_part_faults(sketch)]
     if found:
         free = _rough_free(sketch)
@@ -290,11 +290,10 @@ def _meetings(points: Array, polygon: Polygon) -> list[Point]:
 
 def _rough_free(sketch: Sketch) -> MultiPolygon:
     """Return the free space of a draft, as far as its boundary and its obstacles can be made valid."""
-    if sketch.boundary is None or len(sketch.boundary) < 3 or np.abs(sketch.boundary).max() > FARTHEST:
+    ring = sketch.boundary or ()
+    if len(ring) < 3 or np.abs(ring).max() > FARTHEST or np.ptp(ring, axis=0).max() > LARGEST:
         return MultiPolygon()
-    if np.ptp(sketch.boundary, axis=0).max() > LARGEST:
-        return MultiPolygon()
-    inside = shapely.make_valid(Polygon(sketch.boundary))
+    inside = shapely.make_valid(Polygon(ring))
     solid = shapely.union_all(sketch.geometries) if len(sketch.geometries) else MultiPolygon()
     # what is left of a broken outline may be collections of collections
     parts = [p for p in shapely.get_parts(inside - solid) if isinstance(p, Polygon) and p.area > 0.0]
