@@ -137,11 +137,6 @@ def spread(heights: Array, gap: float, low: float, high: float) -> Array:
         first = total / count - 0.5 * gap * (count - 1)
         placed += [first + gap * k for k in range(int(count))]
     result = np.empty(len(heights))
-    result[order] = placed
-    for k, rank in enumerate(order.tolist()):
-        floor = low + gap * k
-        result[rank] = max(result[rank], floor)
-    for k, rank in enumerate(order[::-1].tolist()):
-        ceiling = high - gap * k
-        result[rank] = min(result[rank], ceiling)
+    steps = gap * np.arange(len(heights))
+    result[order] = np.minimum(np.maximum(placed, low + steps), (high - steps)[::-1])
     return result

@@ -163,25 +163,23 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
     levels = np.unique(finite)
     logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
     low, high = (float(levels[0]), float(levels[-1])) if len(levels) else (0.0, 0.0)
-    null = None
+    unlimited = bool(np.isnan(gains).any())
     if logarithmic:
         axes.set_xscale("log")
         room = (high / low) ** 0.07
-        if np.isnan(gains).any():
-            null, high = high * room**3, high * room**3
-        axes.set_xlim(low / room, high * room)
+        end = high * room**3 if unlimited else high
+        axes.set_xlim(low / room, end * room)
     else:
         room = 0.07 * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
-        if np.isnan(gains).any():
-            null, high = high + 3 * room, high + 3 * room
-        axes.set_xlim(low - room, high + room)
+        end = high + 3 * room if unlimited else high
+        axes.set_xlim(low - room, end + room)
+    null = [end] if unlimited else []
     ticks = levels.tolist() if len(levels) <= 8 else _even_ticks(axes, low, float(levels[-1]))
-    marks = [*ticks, *([null] if null is not None else [])]
-    axes.xaxis.set_major_locator(FixedLocator(marks))
+    axes.xaxis.set_major_locator(FixedLocator([*ticks, *null]))
     axes.xaxis.set_minor_locator(NullLocator())
     texts = [value_text(value, digits=4) for value in ticks]
-    axes.set_xticklabels([*texts, *(["none"] if null is not None else [])])
-    return null
+    axes.set_xticklabels([*texts, *("none" for _ in null)])
+    return end if unlimited else None
 
 
 def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
