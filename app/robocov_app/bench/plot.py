@@ -1,7 +1,5 @@
 """The ratios of a benchmark as a figure: a dot each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path

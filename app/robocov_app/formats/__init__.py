@@ -5,8 +5,6 @@ free, as the file has it; `robocov_app.formats.geometry.shaping` makes the `Envi
 for all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path

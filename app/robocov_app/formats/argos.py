@@ -4,8 +4,6 @@ C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for mult
 Intelligence 6 (2012), 271-295.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """DXF drawings."""
 
-from __future__ import annotations
-
 import logging
 import math
 import re

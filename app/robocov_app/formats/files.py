@@ -4,8 +4,6 @@ Tags, anchors and aliases are refused, so that no text can stand for more than w
 anything but text: what a value is, who asks for it decides.
 """
 
-from __future__ import annotations
-
 import codecs
 import stat
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A foreign map as its reader understood it, and the report of what became of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """GeoJSON (RFC 7946), in degrees or metres."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Coordinates on the globe, as metres about a place: what a robot's map is in."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

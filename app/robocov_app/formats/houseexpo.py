@@ -1,7 +1,5 @@
 """HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in metres."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

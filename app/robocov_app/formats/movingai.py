@@ -7,8 +7,6 @@ N. R. Sturtevant, Benchmarks for grid-based pathfinding, IEEE Transactions on Co
 and AI in Games 4 (2012), 144-148.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

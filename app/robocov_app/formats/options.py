@@ -1,7 +1,5 @@
 """Options of reading and writing, and what a format is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """OpenStreetMap extracts: buildings and water are solid, barriers are walls, the bounds are the boundary."""
 
-from __future__ import annotations
-
 import re
 from array import array
 from collections.abc import Iterable

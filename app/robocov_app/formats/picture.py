@@ -5,8 +5,6 @@ of ROS notice, and takes half a second for a million of pixels. A picture that `
 a text chunk what a pixel is in metres and where its lower left corner is, and so comes back to its place.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import re

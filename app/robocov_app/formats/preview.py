@@ -1,7 +1,5 @@
 """A picture of an import: the map as it was read and as it became, with what was lost between."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Lists of rings, as triangulation libraries take them: the first is the outline, the others are holes."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 from pathlib import Path

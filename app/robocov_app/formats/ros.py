@@ -16,8 +16,6 @@ What is outside of the boundary is unknown, but for the cells along the free spa
 that planners which take the unknown for passable stay inside.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

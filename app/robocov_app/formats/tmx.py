@@ -4,8 +4,6 @@ Read here, with limits, and not by pytmx or pytiled-parser: these unpack whateve
 whatever other file it names.
 """
 
-from __future__ import annotations
-
 import binascii
 import math
 import re

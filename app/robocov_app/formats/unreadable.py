@@ -1,7 +1,5 @@
 """Files that no importer reads, named for what they are, with the way to something that one does."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

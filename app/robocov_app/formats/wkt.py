@@ -3,8 +3,6 @@
 The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

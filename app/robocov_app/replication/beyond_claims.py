@@ -7,8 +7,6 @@ the runs that there are: it is met or missed by the measured value. Its interval
 the claim, says whether other maps might have given something else.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace

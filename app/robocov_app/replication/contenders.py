@@ -1,7 +1,5 @@
 """Who is compared: controllers with their gains, those of the paper, those of other authors, and our own."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

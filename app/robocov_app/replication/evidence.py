@@ -1,7 +1,5 @@
 """Tables of what every contender reached, side by side, and what is said of each controller."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Starts are green, final positions blue, trajectories red; RAPF's cost is blue, RPF's red, as in the paper.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

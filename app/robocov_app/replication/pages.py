@@ -4,8 +4,6 @@ In the pages are small pictures of numbers as SVG: intervals of claims, and medi
 are CSS variables; what they show is said in words as well.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """How much is run: the full study and the quick one, with all their parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Plots beside the claims, and figures beyond the paper: functions of nothing, that draw what is wanted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The centralised reference of every map, J_ref, each computed once and kept in a file."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

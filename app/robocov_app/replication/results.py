@@ -1,7 +1,5 @@
 """Doing the runs of the study, resumably, in an order in which each has what it needs; what came of them."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """How long a step of every controller takes, beside RAPF's, measured in turn; kept in a file."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import time

@@ -16,8 +16,6 @@ Beyond the paper:
 11. ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache

@@ -1,7 +1,5 @@
 """The report: results as one page of HTML that needs nothing else, neither network nor other files."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """What a report says of a result in words: what was run, what came of it, what went wrong."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Small pictures of maps and runs as SVG without a script, in CSS variables: for light, dark and paper."""
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Iterable

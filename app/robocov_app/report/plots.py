@@ -1,7 +1,5 @@
 """The plots of a report: costs, comparisons, metrics, and what they depend on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple, TypeAlias

@@ -3,8 +3,6 @@
 Runs and maps are in it as small JSON: quantised positions and costs at even times, maps rounded.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -1,7 +1,5 @@
 """matplotlib's figures as small SVG in a page, text as text: colours of the light theme become variables."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Sequence

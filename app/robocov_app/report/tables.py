@@ -1,7 +1,5 @@
 """The tables of a report: captions, heads and cells as text."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias

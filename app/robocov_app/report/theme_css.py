@@ -3,8 +3,6 @@
 Every colour has one name in both themes: what is drawn with names is right in light and dark.
 """
 
-from __future__ import annotations
-
 from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_on, theme_named
 
 

@@ -1,7 +1,5 @@
 """The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

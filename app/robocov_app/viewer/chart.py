@@ -1,7 +1,5 @@
 """The plot of the cost against time, and the time line below it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The list of the viewer's commands: keys, buttons, tool tips, help and palette all read it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import partial

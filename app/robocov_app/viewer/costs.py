@@ -1,7 +1,5 @@
 """The exact cost of all panes beside the window: asked for in turn, each answer with its own time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import suppress

@@ -4,8 +4,6 @@ Distances to goals, obstacle points and other robots are from the robot's centre
 it is *clear of* is told from its rim. Plane vectors are complex here, x + i y.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The panel at the right: what is chosen often stays in sight, the rest is on pages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from itertools import chain, zip_longest
 from pathlib import Path

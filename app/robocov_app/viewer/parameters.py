@@ -1,7 +1,5 @@
 """What the panel's sliders and words set: gains of a controller, limits of the team. Knows no pygame."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The mouse: what is pressed, dragged and let go where, and what that means."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The viewer: what every key, button and typed command does, and what is to be shown. Knows no pygame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path

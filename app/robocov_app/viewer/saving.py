@@ -1,7 +1,5 @@
 """Saving what the session holds as a run's folder, by ``robocov run`` in a process beside the window."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

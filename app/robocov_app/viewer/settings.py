@@ -1,7 +1,5 @@
 """What the window remembers from one time to the next, in the user's folder for settings."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field

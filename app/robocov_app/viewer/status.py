@@ -1,7 +1,5 @@
 """The status line: time, cost, speed, the place under the cursor; and what can be tried next."""
 
-from __future__ import annotations
-
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import speed_words
 

@@ -1,7 +1,5 @@
 """Tools: what the mouse does on the canvas. Coordinates are metres."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field

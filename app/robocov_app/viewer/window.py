@@ -1,7 +1,5 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 The result, perhaps several obstacles, takes the place, the name and the note of the lowest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

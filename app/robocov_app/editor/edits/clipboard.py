@@ -3,8 +3,6 @@
 A whole map, an obstacle, a list of them, or a list of points (a polygon) can be pasted, too.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

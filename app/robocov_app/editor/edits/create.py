@@ -1,7 +1,5 @@
 """Edits that draw: obstacles, the boundary, starts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

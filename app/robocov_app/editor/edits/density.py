@@ -1,7 +1,5 @@
 """Edits of the density: features of one kind, hot spots on a floor or weighted areas on a background."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias

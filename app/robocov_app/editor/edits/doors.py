@@ -1,7 +1,5 @@
 """Doors: openings in walls, which stay walls."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import shapely

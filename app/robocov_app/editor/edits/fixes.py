@@ -1,7 +1,5 @@
 """Fixes: for problems of most kinds the change that mends them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

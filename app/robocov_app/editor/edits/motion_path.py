@@ -1,7 +1,5 @@
 """Edits of the paths along which obstacles move: way points, speed, and what happens at the end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Edits of what things are: deleted, named, noted, sized, ordered, grouped, locked, hidden."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import count
 

@@ -1,7 +1,5 @@
 """Outlines with fewer vertices, and the same shape within a tolerance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Edits of single vertices: of polygons and their holes, walls, the boundary, rims of circles, starts."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping

@@ -3,8 +3,6 @@
 An entry names its obstacle by place and name, which survives edits by hand; what others keep there stays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from typing import Any

@@ -1,7 +1,5 @@
 """Maps in the making that are kept aside, see `robocov_app.toolkit.autosave`, and offered after a crash."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path

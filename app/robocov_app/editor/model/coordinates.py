@@ -3,8 +3,6 @@
 A comma between digits is a decimal comma, except beside a blank and among decimal points (``3.2,1.5``).
 """
 
-from __future__ import annotations
-
 import math
 import re
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """Sketches in files: opened, saved whole or not at all, and noticed when something else changes them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Points, angles and outlines of the plane: to the tenth of a millimetre, within reach."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Undo and redo of a sketch, without a limit: what it was is kept, not what was done."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What lies under the cursor or in a box; what is locked or hidden is not there for the mouse."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Sizes may be 0 or less, rings short or empty, names empty: such a draft can be edited, and tells its faults.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields

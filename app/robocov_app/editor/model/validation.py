@@ -3,8 +3,6 @@
 The rules are those of `robocov.mapfile`; here every fault has its place on the map, and all are found.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The tool for the density: hot spots and areas by dragging, their weights by typing."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

@@ -1,7 +1,5 @@
 """Tools that draw: obstacles, the boundary, starts, doors in walls; and the tape measure."""
 
-from __future__ import annotations
-
 from abc import ABC
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Handles: vertices, the corners and sides of the box around a selection, and the knob that turns it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 

@@ -1,7 +1,5 @@
 """The tool for the paths of obstacles that move: way points by clicking and dragging, speeds by typing."""
 
-from __future__ import annotations
-
 from robocov.environment import ObstaclePath, Point
 from robocov_app.editor.edits.motion_path import (
     FIRST_SPEED,

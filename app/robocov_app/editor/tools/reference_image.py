@@ -1,7 +1,5 @@
 """The tool for the picture under the map: two points give its scale or make it level, dragging moves it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from robocov.environment import Point

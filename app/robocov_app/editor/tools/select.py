@@ -1,7 +1,5 @@
 """The tool that selects and drags, and the one that moves the view."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from robocov.environment import CircleObstacle, Point

@@ -1,7 +1,5 @@
 """What there is to snap to: the vertices and edges of a sketch, found quickly near a point."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Literal, TypeAlias

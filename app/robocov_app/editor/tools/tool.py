@@ -1,7 +1,5 @@
 """The base of the editor's tools: what the mouse does on the map. Coordinates are metres."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

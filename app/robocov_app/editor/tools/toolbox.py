@@ -1,7 +1,5 @@
 """All tools of the editor, in the order in which they are shown."""
 
-from __future__ import annotations
-
 from robocov_app.editor.tools import density, draw, motion_path, reference_image, select
 from robocov_app.editor.tools.tool import Tool
 

@@ -1,7 +1,5 @@
 """A map as cells of a grid: free where their centre is, and walls that are thinner than a cell stay whole."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Curves as points, no farther from the curve than a tolerance."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The outer boundary of a foreign map."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 

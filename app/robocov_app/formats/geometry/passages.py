@@ -1,7 +1,5 @@
 """Gaps that a robot passed before walls moved, and does not pass now."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What rings enclose, by the rules of polygons with holes and of filled paths; and polygons' decimals."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Circles and walls of a drawing that stay what they are, instead of the polygons that they cover."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias, TypeVar

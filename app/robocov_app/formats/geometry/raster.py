@@ -5,8 +5,6 @@ obstacles that touch at a corner hang together (free cells are 4-connected, obst
 the outline joins them by a neck: touching in a point is neither open nor closed to what computes with it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal, TypeAlias
 

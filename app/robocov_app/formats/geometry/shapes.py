@@ -1,7 +1,5 @@
 """The shapes of a drawing in metres: closed outlines, lines, points; and what was left out of it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace

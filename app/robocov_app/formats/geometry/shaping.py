@@ -1,7 +1,5 @@
 """From what a reader found to an environment, and how the two compare."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any, Literal

@@ -13,8 +13,6 @@ D. H. Douglas, T. K. Peucker, Algorithms for the reduction of the number of poin
 a digitized line or its caricature, Cartographica 10 (1973), 112-122.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Numbers, lengths, transforms and paths of SVG."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """How an element of SVG is painted: presentation attributes, style sheets, and what is inherited."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Those of panes say how one is to go on; `Lockstep` carries them out in all panes
 not fit where they are wanted go as near as they fit.
 """
 
-from __future__ import annotations
-
 from bisect import bisect
 from dataclasses import dataclass, field, replace
 from itertools import takewhile

@@ -1,7 +1,5 @@
 """The clock: how many steps of the simulation are due, at any speed, without ever holding a frame up."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Edits of a map: obstacles drawn, moved and deleted, each a new environment; what cannot be is refused."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

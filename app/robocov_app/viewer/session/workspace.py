@@ -1,7 +1,5 @@
 """What is saved of the session that is open, and what is kept aside of it: no work is lost."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from datetime import datetime
 from pathlib import Path
