@@ -3,8 +3,8 @@
 import numpy as np
 
 from robocov.record import ARRAYS, Record
+from robocov_app.viewer.headless import parts_of, records_of_part
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.story import parts_of, records_of_part
 
 COUNTING = """
 from dataclasses import dataclass

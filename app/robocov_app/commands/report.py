@@ -63,7 +63,7 @@ def command(options: Arguments) -> None:
 
 def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
     """Return folders of results with words on each: of a story its parts, of a session all of them."""
-    from robocov_app.viewer.story import story_folders
+    from robocov_app.viewer.headless import story_folders
 
     if path.suffix != SESSION:
         return story_folders(path)

@@ -82,8 +82,8 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
     """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
     from robocov.compiled import compile_kernels
     from robocov.files.result_folder import results
+    from robocov_app.viewer.headless import save_story
     from robocov_app.viewer.session.file import load_session, save_session
-    from robocov_app.viewer.story import save_story
 
     path = Path(options.map)
     saved = load_session(path, [name for name in options.controller.split(",") if ":" in name])

@@ -1,8 +1,8 @@
 """Foreign map formats, read and written.
 
 A format is one module with an `Importer`, an `Exporter` or both. What is read is a `ForeignMap`: what is
-free, as the file has it; `robocov_app.formats.geometry.shaping` makes the `Environment` of it, the same way
-for all.
+free, as the file has it; `robocov_app.formats.geometry.conversion` makes the `Environment` of it, in the same
+way for all.
 """
 
 from collections.abc import Collection
@@ -29,7 +29,7 @@ from robocov_app.formats import (
     wkt,
 )
 from robocov_app.formats.foreign import ForeignMap, ImportReport
-from robocov_app.formats.geometry.shaping import Shaping, shaped
+from robocov_app.formats.geometry.conversion import Shaping, shaped
 from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unreadable import described, named_kind

@@ -12,7 +12,7 @@ from robocov_app.formats.geometry.primitives import Primitive
 
 @dataclass(frozen=True, eq=False)
 class ForeignMap:
-    """What a reader found in a file. Readers only read: `robocov_app.formats.geometry.shaping` cleans.
+    """What a reader found in a file. Readers only read: `robocov_app.formats.geometry.conversion` cleans.
 
     `free`, m, y up: may be invalid, empty, of many parts, and stick out of `boundary`. `boundary`, m: what is
     inside of it and not free becomes obstacles; without it the outline of the free space is the boundary.

@@ -30,11 +30,11 @@ from robocov_app.replication.plan import PARTITION_SEED, ROBOTS, Plan
 from robocov_app.replication.references import Reference, find_references
 from robocov_app.replication.step_times import UNKNOWN, StepTimes, step_times
 from robocov_app.replication.studies import BASELINE_GAINS
-from robocov_app.sweep import performing
+from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
+from robocov_app.sweep.scheduler import Count, sweep, sweep_progress, worked_off
 from robocov_app.sweep.study import Study, StudyMap, Task, parameter_column, tasks_of
-from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
 from robocov_app.terminal.interruption import Interruption
 
 MARK = "paper.json"  # says that a folder is that of a study of the paper, and which
@@ -183,7 +183,7 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
     tasks: dict[str, Task] = {}
     notes = []
 
-    def keep(task: Task, outcome: performing.Outcome) -> None:
+    def keep(task: Task, outcome: worker.Outcome) -> None:
         for ledger in homes[task.digest]:
             ledger.keep(task, outcome)
 
@@ -243,9 +243,9 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
     for probe in studies.probes(plan, beyond=beyond):
         for task in tasks_of(probe):
             if not each:
-                performing.perform(task)  # what is loaded and built at first does not count
+                worker.perform(task)  # what is loaded and built at first does not count
             begin = time.perf_counter()
-            performing.perform(task)
+            worker.perform(task)
             each[task.controller] = (time.perf_counter() - begin) / probe.duration
     work = 0.0
     for name, study in sweeps.items():
@@ -399,7 +399,7 @@ def worst_runs(
         scenario = Scenario(task.map, task.start, task.seed)
         own = task.controller == contender.controller and dict(task.gains) == contender.all_gains
         if own and scenario in wanted.values():
-            records[scenario] = performing.simulated(task, environments[task.map]).thinned(10.0)
+            records[scenario] = worker.simulated(task, environments[task.map]).thinned(10.0)
     return [(scenario, records[scenario]) for scenario in wanted.values()]
 
 

@@ -20,8 +20,8 @@ from itertools import count
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
-from robocov_app.sweep.performing import Outcome, failed, perform
 from robocov_app.sweep.study import Task
+from robocov_app.sweep.worker import Outcome, failed, perform
 from robocov_app.toolkit.worker import READY, asked, ended, receive, started
 
 _ENDS = 2  # workers that may end through a task before it counts as failed
@@ -232,7 +232,7 @@ class _Hand:
             with self._starting:
                 if self._stopped:
                     break
-                process = started("robocov_app.sweep.performing:Performing", stderr=self._complaints)
+                process = started("robocov_app.sweep.worker:Performing", stderr=self._complaints)
                 self._process = process
             assert process.stdout
             if receive(process.stdout) == READY:

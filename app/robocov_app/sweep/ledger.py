@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
 from robocov.files.atomic import locked, on_disk
-from robocov_app.sweep.performing import FIGURES, Outcome, made_with
 from robocov_app.sweep.study import Task
+from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders

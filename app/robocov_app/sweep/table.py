@@ -16,8 +16,8 @@ from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.files.atomic import on_disk, writable
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.performing import FIGURES, TIMED
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
+from robocov_app.sweep.worker import FIGURES, TIMED
 
 if TYPE_CHECKING:
     import pyarrow as pa

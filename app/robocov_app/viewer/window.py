@@ -11,12 +11,12 @@ from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Command, Commands
+from robocov_app.toolkit.command_palette import palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
 from robocov_app.viewer.chart import Chart

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
-from robocov.conditions.draws import Draws
+from robocov.conditions.random_streams import Draws
 from robocov.errors import ParameterError, checked, is_number, shown
 
 LOSS, POSITION, SENSING, SCANNING, FAILING = range(5)

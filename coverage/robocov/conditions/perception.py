@@ -16,7 +16,7 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.conditions import LOSS, POSITION, SCANNING, SENSING, SOON, Conditions
-from robocov.conditions.draws import Draws
+from robocov.conditions.random_streams import Draws
 from robocov.observation import Decision, Observations, Scans
 from robocov.observation.neighbours import Neighbours
 from robocov.robots import Team

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.conditions import LOSS, Conditions
-from robocov.conditions.draws import Draws
 from robocov.conditions.perception import Inbox, Perception
+from robocov.conditions.random_streams import Draws
 from robocov.controllers import CONTROLLERS, Controller, informed
 from robocov.environment import Environment
 from robocov.errors import InputError

@@ -9,8 +9,8 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
+from robocov_app.editor.canvas.captions import map_words
 from robocov_app.editor.canvas.overlay import STEM
-from robocov_app.editor.canvas.strips import map_words
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.theme import DARK, LIGHT
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov_app.editor.canvas.drawn_rings import Outlines, name_place, outline_of
-from robocov_app.editor.canvas.sheet import Sheet, View, beyond, grid_steps, outside_colour
+from robocov_app.editor.canvas.map_layers import Sheet, View, beyond, grid_steps, outside_colour
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection

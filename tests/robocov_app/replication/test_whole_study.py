@@ -111,7 +111,7 @@ class TestRuns:
         assert forecast(folder, TINY, 2, claims=False, beyond=False).runs == 8
 
     def test_who_has_done_the_papers_grid_has_its_best_gains_to_run_too(self, tmp_path, monkeypatch):
-        monkeypatch.setattr("robocov_app.sweep.performing.perform", lambda task: None)
+        monkeypatch.setattr("robocov_app.sweep.worker.perform", lambda task: None)
         without = forecast(tmp_path, TINY, 2, claims=False, beyond=True)
         for task in tasks_of(studies.gains_study(TINY)):
             (tmp_path / "studies" / "gains" / "runs" / task.name).mkdir(parents=True)

@@ -8,10 +8,10 @@ from swept import small_study
 from robocov.conditions import Conditions
 from robocov.errors import InputError, ParameterError
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.performing import perform
 from robocov_app.sweep.study import CONDITIONS, condition_axes, conditions_of, tasks_of
 from robocov_app.sweep.study_file import study_of
 from robocov_app.sweep.table import columns_of, row_of
+from robocov_app.sweep.worker import perform
 
 
 def test_every_combination_is_tried() -> None:

@@ -15,8 +15,8 @@ from robocov import __version__
 from robocov.errors import InputError, OutputError
 from robocov_app.sweep import ledger as ledger_module
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, is_sweep, opened
-from robocov_app.sweep.performing import Outcome, perform
 from robocov_app.sweep.study import Task, tasks_of
+from robocov_app.sweep.worker import Outcome, perform
 
 STUDY = small_study().to_json()
 DONE = Outcome(

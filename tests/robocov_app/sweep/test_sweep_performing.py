@@ -17,9 +17,9 @@ from robocov.cost import CoverageCost
 from robocov.metrics import cost_history, summarise
 from robocov.metrics.results import read_history
 from robocov.record import ARRAYS, Record
-from robocov_app.sweep.performing import FIGURES, Outcome, perform, prepared, simulated
 from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
 from robocov_app.sweep.table import columns_of
+from robocov_app.sweep.worker import FIGURES, Outcome, perform, prepared, simulated
 
 
 def first(study: Study) -> Task:

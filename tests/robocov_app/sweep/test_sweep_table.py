@@ -15,9 +15,9 @@ from robocov.controllers import Rapf, gains_of
 from robocov.errors import OutputError
 from robocov_app.sweep import table as table_module
 from robocov_app.sweep.ledger import Entry
-from robocov_app.sweep.performing import FIGURES
 from robocov_app.sweep.study import Study, tasks_of
 from robocov_app.sweep.table import Table, columns_of, gain_column, row_of
+from robocov_app.sweep.worker import FIGURES
 
 FIGURED = Entry(
     {

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from swept import HALL, ROOM, controller, small_study
 
 from robocov.mapfile import load_map
-from robocov_app.sweep.performing import simulated
 from robocov_app.sweep.study import StudyMap, tasks_of
+from robocov_app.sweep.worker import simulated
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 

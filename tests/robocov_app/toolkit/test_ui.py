@@ -14,9 +14,9 @@ from robocov.errors import InputError
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Commands, Takes
+from robocov_app.toolkit.command_palette import palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, file_choice
 from robocov_app.toolkit.menu import Menu
-from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.ui import Ui
 
 KEYS = {"return": pygame.K_RETURN, "tab": pygame.K_TAB, "escape": pygame.K_ESCAPE, "left": pygame.K_LEFT}

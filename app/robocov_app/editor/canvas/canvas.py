@@ -10,9 +10,9 @@ import shapely
 
 from robocov.environment import Point
 from robocov_app.editor.canvas import overlay
+from robocov_app.editor.canvas.captions import Strips
+from robocov_app.editor.canvas.map_layers import Sheet, View
 from robocov_app.editor.canvas.overlay import accent
-from robocov_app.editor.canvas.sheet import Sheet, View
-from robocov_app.editor.canvas.strips import Strips
 from robocov_app.editor.edits.motion_path import goes, moving
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
@@ -30,7 +30,7 @@ from robocov_app.render.canvas import Canvas
 from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
 from robocov_app.render.theme import Colour, Theme, mix
-from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.cache import Latest
 from robocov_app.toolkit.layout import Layout
 
 MANY = 200  # selected things from which on their outlines are drawn once, and then the picture of them

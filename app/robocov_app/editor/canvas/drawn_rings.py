@@ -10,7 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov_app.editor.model.sketch import Item, Sketch
-from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.cache import Latest
 
 _FORGOTTEN = 4  # how many times more outlines than obstacles are kept, those of what was undone among them
 

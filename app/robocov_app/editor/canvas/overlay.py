@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
 from robocov_app.editor.canvas.drawn_rings import outline_of
-from robocov_app.editor.canvas.sheet import View, outside_colour
+from robocov_app.editor.canvas.map_layers import View, outside_colour
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.validation import Problem

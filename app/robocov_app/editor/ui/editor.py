@@ -20,8 +20,8 @@ from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
 from robocov_app.editor.tools.tool import Tool
 from robocov_app.editor.tools.toolbox import toolbox
 from robocov_app.editor.ui.settings import SHOWN, SNAPS
+from robocov_app.toolkit.cache import Latest
 from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
-from robocov_app.toolkit.latest import Latest
 from robocov_app.toolkit.worker import Worker
 
 SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong

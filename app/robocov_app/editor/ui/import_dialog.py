@@ -18,8 +18,8 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import Colour, Theme
+from robocov_app.toolkit.cache import Latest
 from robocov_app.toolkit.dialogs import Dialog
-from robocov_app.toolkit.latest import Latest
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 from robocov_app.toolkit.ui import SMALL, Ui

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
 from robocov_app.formats import ForeignMap, Importer, ImportReport, ReadOptions, Shaping, read_map, shaped
-from robocov_app.formats.geometry.shaping import Comparison, compare
+from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
 Kind = Literal["number", "place", "words", "text", "choice"]

@@ -19,12 +19,12 @@ from robocov_app.editor.ui.status import HINT, facts
 from robocov_app.editor.ui.team import TeamThread
 from robocov_app.render.theme import theme_named
 from robocov_app.toolkit.command import Commands
+from robocov_app.toolkit.command_palette import palette
 from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE, key_of
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.overlay import draw_message, draw_status
-from robocov_app.toolkit.palette import palette
 from robocov_app.toolkit.window import BaseWindow
 
 _PAN = 60  # pixels that a key pans

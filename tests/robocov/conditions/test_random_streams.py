@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov.conditions.draws import Draws, philox
+from robocov.conditions.random_streams import Draws, philox
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import draw_shading
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
-from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.cache import Latest
 
 # pixels at scale 1
 FINE, COARSE = 11.0, 55.0  # between the fine and the strong lines of the grid, at least

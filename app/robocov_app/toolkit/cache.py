@@ -1,4 +1,4 @@
-"""What is costly to make, kept until it is of something else."""
+"""A cache of one value: what is costly to make, kept until it is of something else."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pygame
 
 from robocov.errors import counted
+from robocov_app.editor.canvas.map_layers import beyond
 from robocov_app.editor.canvas.overlay import legend_entries
-from robocov_app.editor.canvas.sheet import beyond
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.team import Team
 from robocov_app.render.annotations import (
@@ -22,7 +22,7 @@ from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.density import range_label, value_range
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import density_entry
-from robocov_app.toolkit.latest import Latest
+from robocov_app.toolkit.cache import Latest
 from robocov_app.toolkit.layout import Box
 
 

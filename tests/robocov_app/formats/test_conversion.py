@@ -13,9 +13,9 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.geometry.conversion import Shaping, shaped
 from robocov_app.formats.geometry.passages import roomiest
 from robocov_app.formats.geometry.polygons import bounded, rounded
-from robocov_app.formats.geometry.shaping import Shaping, shaped
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)
 CLOSET = box(20, 0, 23, 3)
@@ -318,7 +318,7 @@ def test_a_map_of_many_vertices_says_what_that_means() -> None:
 def test_a_map_that_takes_too_long_is_refused(
     monkeypatch: pytest.MonkeyPatch, most: str, wanted: str
 ) -> None:
-    monkeypatch.setattr(f"robocov_app.formats.geometry.shaping.{most}", 0)
+    monkeypatch.setattr(f"robocov_app.formats.geometry.conversion.{most}", 0)
     with pytest.raises(MapError, match=rf"plan: \d+ {wanted}, but at most 0 were wanted: --specks AREA"):
         shaped(foreign(ROOM), Shaping(), "plan")
 

@@ -16,9 +16,9 @@ from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
 from robocov_app.sweep.executors import Executor, LocalPool, processors
 from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened
-from robocov_app.sweep.performing import Outcome, perform, prepared
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
+from robocov_app.sweep.worker import Outcome, perform, prepared
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import json_text
 
