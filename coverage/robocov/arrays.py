@@ -1,7 +1,5 @@
 """The array types that signatures use, and groups of entries in flat arrays."""
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

@@ -4,8 +4,6 @@ A backend is an object, most simply a module, with the functions of `DrawingBack
 entry-point group ``robocov.drawing``, as pandas has it. The application offers ``matplotlib``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol

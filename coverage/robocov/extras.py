@@ -1,7 +1,5 @@
 """Packages that only some parts need, and that are not installed with the rest."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Any
 

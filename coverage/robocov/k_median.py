@@ -5,8 +5,6 @@ Teitz and Bart's interchange, with the bookkeeping of Whitaker (1983) and of Sch
 (2019): one pass over the table gives the cost after every possible swap.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import combinations
 from typing import TypeAlias

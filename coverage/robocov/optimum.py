@@ -6,8 +6,6 @@ interchange, which leaves most of these minima, and at last descends the exact c
 all restarts is no proof of the global minimum; how many restarts agree with it tells how far to trust it.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Callable

@@ -10,8 +10,6 @@ What the paper leaves open is decided here:
   through the repulsion of walls. A limit caps its magnitude; the potential goes on linearly there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from robocov.arrays import Array, IntArray

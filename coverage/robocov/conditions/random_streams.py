@@ -6,8 +6,6 @@ Moraes, Dror and Shaw, *Parallel random numbers: as easy as 1, 2, 3* (SC 2011), 
 as are asked for; numpy's makes one stream at a time.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

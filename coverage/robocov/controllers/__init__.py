@@ -8,8 +8,6 @@ somebody has typed: on a command line, in a study file, in a program. A name tha
 results is only looked up in `CONTROLLERS`, and shown by `short_name`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib.metadata import entry_points
 from typing import Any

@@ -1,7 +1,5 @@
 """Lloyd's algorithm behind safety barrier certificates: nobody comes closer than the safe distance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The controller interface: a law for the whole team, or one called for each robot in turn."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Protocol, TypeAlias, get_args, runtime_checkable

@@ -1,7 +1,5 @@
 """From what a robot wants and its scans show to a safe velocity, and to the force that brings it about."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

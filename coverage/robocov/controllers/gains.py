@@ -1,7 +1,5 @@
 """Gains of a controller: numbers with a unit and a range, or words to choose from, as dataclass fields."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace

@@ -1,7 +1,5 @@
 """LA, Lloyd's algorithm under kinematic limits: on whole cells, or on their parts within a range."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Laws by which robots push each other apart: potential fields, and local dispersion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

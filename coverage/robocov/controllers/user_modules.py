@@ -3,8 +3,6 @@
 A file and the modules of its author that it imports are texts as well, which run on any machine.
 """
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import importlib.abc

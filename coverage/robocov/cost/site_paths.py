@@ -5,8 +5,6 @@ from another robot in view that is nearer than that. Of robots that are equally 
 number counts.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

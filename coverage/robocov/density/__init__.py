@@ -4,8 +4,6 @@ Every density integrates over all Voronoi cells at once, in closed form or exact
 divergence theorem an integral over a cell is a sum over its edges, so that no cell is ever clipped.
 """
 
-from __future__ import annotations
-
 from robocov.density.base import HEAVIEST, Density, Uniform
 from robocov.density.gaussians import Gaussian, Gaussians
 from robocov.density.polygons import WeightedArea, WeightedPolygons

@@ -1,7 +1,5 @@
 """Densities φ: values at places, moments of cells, by their edges, integrals over other polygons."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

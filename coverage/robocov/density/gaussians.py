@@ -10,8 +10,6 @@ and with ∂(qᵢ g)/∂qⱼ = (δᵢⱼ - qᵢ qⱼ) g, -(d n + s t) nᵀ g int
 the mass. Any other Gaussian is this one after an affine map.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias

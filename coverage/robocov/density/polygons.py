@@ -12,8 +12,6 @@ a polynomial in y over one interval. Nothing is decided by rounding: each pair a
 continuously on all ends, however edges meet, touch or coincide.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, TypeAlias

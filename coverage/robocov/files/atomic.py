@@ -1,7 +1,5 @@
 """Files that appear whole or not at all, and folders that one process works in at a time."""
 
-from __future__ import annotations
-
 import os
 import secrets
 import stat

@@ -7,8 +7,6 @@ journal becomes the manifest, the list of the files that the result consists of.
 name is somebody else's, and neither replaced nor removed. Links inside the folder are not followed.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Seeded random maps of several kinds, each with what was asked for: obstacles, blocked area, gaps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Integral

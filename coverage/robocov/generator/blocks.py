@@ -1,7 +1,5 @@
 """Maps of the kind `blocks`: a town, cut by streets into blocks."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple, TypeAlias
 

@@ -5,8 +5,6 @@ tunnels, and it is dilated (J. Serra, *Image Analysis and Mathematical Morpholog
 gap. Where two parts of it then meet in a window that is narrower, a tunnel is led through that.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -9,8 +9,6 @@ Walls are a boolean array (columns + 1, rows + 1, 2): whether one leads from a p
 cross, upwards (0) and to the right (1).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import defaultdict

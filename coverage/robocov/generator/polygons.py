@@ -1,7 +1,5 @@
 """Maps of the kind `polygons`: scattered obstacles, convex polygons, L and U shapes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters of a generated map, and the rounding of its coordinates."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Maps of the kind `rooms`: a building, that is a rectangle divided into rooms, with doors and furniture."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import defaultdict

@@ -6,8 +6,6 @@ is a chain of segments that bends only at corners, so that a graph of the corner
 other holds all that is needed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

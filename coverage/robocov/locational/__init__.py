@@ -14,8 +14,6 @@ What is summed over a cell's edges is summed in their order: a cell's row does n
 the last bit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 

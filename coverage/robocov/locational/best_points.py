@@ -13,8 +13,6 @@ distance and direction from p are smooth, so that Gauss's rule converges quickly
 jumps within a cell, the error is of the order of the distance of the nodes.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from robocov.arrays import Array, BoolArray

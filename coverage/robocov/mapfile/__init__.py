@@ -1,7 +1,5 @@
 """Map files: the map JSON, version 1, to and from `Environment`, pictures of densities; the bundled maps."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

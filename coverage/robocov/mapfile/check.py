@@ -1,7 +1,5 @@
 """The geometric rules that a map must keep, what it is like, and what may be a mistake in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

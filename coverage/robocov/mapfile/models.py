@@ -3,8 +3,6 @@
 The models of obstacles, starts and densities follow from the classes that these are read into.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import MISSING, fields

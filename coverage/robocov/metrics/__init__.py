@@ -1,7 +1,5 @@
 """Metrics of a whole run: cost, rest, contacts, clearance, paths."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

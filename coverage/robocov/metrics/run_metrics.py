@@ -1,7 +1,5 @@
 """Metrics of a run over time: coverage, visible area, energy, path lengths, connectivity, clearance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -6,8 +6,6 @@ the triangle of the robot and the two places where the wall's line meets the dir
 shifted by a little.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

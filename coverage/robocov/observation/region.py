@@ -1,7 +1,5 @@
 """The convex region: the outer boundary as the robots know it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 

@@ -7,8 +7,6 @@ The cost is (22) on the nodes of `GridPlanner`, each weighted with its area (tim
 with geodesic distances d. An unknown cell counts by how likely it is free (see `openness`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

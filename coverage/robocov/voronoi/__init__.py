@@ -6,8 +6,6 @@ large: when all masses add up to the region's area, no robot is missing. Where t
 coincide, each is clipped by all others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

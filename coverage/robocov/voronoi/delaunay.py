@@ -8,8 +8,6 @@ An edge is Delaunay when the angles that see it make up at most half a turn, so 
 to 0 or more; the cotangents also say how far out on the edge's bisector the Voronoi vertices are.
 """
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

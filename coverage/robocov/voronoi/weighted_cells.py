@@ -31,8 +31,6 @@ segment, and an arc that is almost one loses no digit, however large its radius.
 triangle that the chord spans with the origin, and for the circular segment between chord and arc.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb

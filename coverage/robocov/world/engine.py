@@ -1,7 +1,5 @@
 """The bodies of pymunk spaces as arrays, and kernels that move them by the engine's C functions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, TypeAlias
 

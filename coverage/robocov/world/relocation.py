@@ -1,7 +1,5 @@
 """Room for robots: whether they fit, where they go when an obstacle appears on them, where one more fits."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry

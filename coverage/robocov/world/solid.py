@@ -5,8 +5,6 @@ triangulated and the triangles are merged to larger convex pieces as long as the
 (Hertel and Mehlhorn 1983: at most four times as many pieces as an optimal decomposition).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 import shapely
