@@ -81,7 +81,7 @@ def test_whatever_is_added_it_ascends_and_is_bounded(steps, most):
             curve.add(time, time)
             assert len(curve) <= most
         assert (np.diff(curve.time) > 0).all()
-        assert curve.value == pytest.approx(curve.time, abs=1e-9)
+        assert curve.value == pytest.approx(curve.time, abs=2e-9)  # as close as samples that are one
 
 
 def test_events_and_ghosts_say_what_they_are():
