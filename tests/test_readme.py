@@ -13,8 +13,8 @@ from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, load_map, parse_map
 from robocov.simulation import Simulation
 from robocov_app.cli import COMMANDS, main
-from robocov_app.sweep.scheduler import sweep
 from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.sweeping import sweep
 
 README = (Path(__file__).parents[1] / "README.md").read_text()
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, flags=re.DOTALL)

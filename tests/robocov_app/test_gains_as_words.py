@@ -21,8 +21,8 @@ from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
 from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gains import Gains, Range, Sampling
-from robocov_app.sweep.scheduler import sweep
 from robocov_app.sweep.study_file import read_study
+from robocov_app.sweep.sweeping import sweep
 from robocov_app.viewer.session.scenario import ControllerChoice, branch_words, gain_words
 
 STUDY = """
@@ -108,7 +108,7 @@ def swept_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("words") / "out"
     gains = {"rapf": {"target": ["centroid", "median"]}}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robocov_app.sweep.scheduler.LocalPool", InProcess)
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
         sweep(small_study(gains=gains), folder, quiet=True)
     return folder
 

@@ -10,8 +10,8 @@ from itertools import count
 
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Case, Parameters, Row, in_turn
-from robocov_app.sweep.scheduler import sweep
 from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.sweeping import sweep
 
 BEFORE = 6.0  # see `Row.before`
 

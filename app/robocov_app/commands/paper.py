@@ -144,7 +144,7 @@ def print_claims(claims: Sequence[Claim]) -> None:
 
 
 def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
-    from robocov_app.sweep.scheduler import duration
+    from robocov_app.sweep.sweeping import duration
 
     if forecast.left == 0:
         words = f"all {forecast.runs:,} runs are there"

@@ -14,7 +14,7 @@ from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
 
 if TYPE_CHECKING:
-    from robocov_app.sweep.scheduler import Rehearsal, Totals
+    from robocov_app.sweep.sweeping import Rehearsal, Totals
 
 FAILED = 1
 
@@ -59,8 +59,8 @@ class Arguments(JsonOption):
 def command(options: Arguments) -> int:
     """Do the runs, or say what they would take."""
     from robocov_app.sweep.executors import Cluster, processors
-    from robocov_app.sweep.scheduler import rehearsed, sweep
     from robocov_app.sweep.study_file import read_study
+    from robocov_app.sweep.sweeping import rehearsed, sweep
 
     study, out = read_study(options.study), options.out or Path(options.study.stem)
     again: dict[str, Any] = {"retry_failed": options.retry_failed, "keep_versions": options.keep_versions}
@@ -108,7 +108,7 @@ def print_totals(totals: Totals, runs: int, out: Path) -> None:
 
 def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
     """Print what a sweep would take."""
-    from robocov_app.sweep.scheduler import duration
+    from robocov_app.sweep.sweeping import duration
 
     for name, count in rehearsal.axes.items():
         print(f"{name:<20} {count:>7}")

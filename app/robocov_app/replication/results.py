@@ -33,8 +33,8 @@ from robocov_app.replication.studies import BASELINE_GAINS
 from robocov_app.sweep import worker
 from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import Ledger, opened
-from robocov_app.sweep.scheduler import Count, sweep, sweep_progress, worked_off
 from robocov_app.sweep.study import Study, StudyMap, Task, parameter_column, tasks_of
+from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
 from robocov_app.terminal.interruption import Interruption
 
 MARK = "paper.json"  # says that a folder is that of a study of the paper, and which

@@ -3,7 +3,7 @@ from swept import InProcess
 
 from robocov_app.runs import artifacts
 from robocov_app.runs import cost as run_cost
-from robocov_app.sweep import scheduler
+from robocov_app.sweep import sweeping
 
 
 @pytest.fixture(autouse=True)
@@ -11,7 +11,7 @@ def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     """Pictures of distances from few sites, and sweeps in this process; but for the thorough run."""
     if request.node.get_closest_marker("slow") is None:
         monkeypatch.setattr(run_cost, "PICTURE_LATTICE", 32)
-        monkeypatch.setattr(scheduler, "LocalPool", InProcess)
+        monkeypatch.setattr(sweeping, "LocalPool", InProcess)
 
 
 @pytest.fixture

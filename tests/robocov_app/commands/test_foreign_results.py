@@ -51,7 +51,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "planted.py").write_text((folder / "mine.py").read_text())
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
-        patch.setattr("robocov_app.sweep.scheduler.LocalPool", InProcess)
+        patch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
         for command in (
             ["run", room, "--controller", name, "--out", str(folder / "run")],
             ["run", room, "--controller", "planted", "--out", str(folder / "offered")],

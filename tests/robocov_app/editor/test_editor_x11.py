@@ -165,7 +165,7 @@ def kept(folder: Path) -> int:
     found = [0]
     for path in (folder / "drafts").rglob("[!.]*.json"):
         held = json.loads(path.read_text())
-        found.append(len((held["sketch"] or {}).get("obstacles", ())))
+        found.append(len((held.get("sketch") or {}).get("obstacles", ())))
     return max(found)
 
 

@@ -29,7 +29,7 @@ from robocov_app.replication.outcomes import (
 from robocov_app.replication.references import Reference
 from robocov_app.replication.results import read_degradations
 from robocov_app.sweep.ledger import _check_sum
-from robocov_app.sweep.scheduler import sweep
+from robocov_app.sweep.sweeping import sweep
 
 REFERENCES = {"blocks-a": Reference(1.5, ((1.0, 1.0),), 1.0)}
 SAME = of_paper("rapf-best", RAPF_SHARED.gains)

@@ -125,9 +125,9 @@ def test_play_moves_robots_and_cursor_and_pause_stops_them(opened) -> None:
 
 def test_it_ends_and_begins_again(opened) -> None:
     assert opened.time == SECONDS  # it shows the end first
-    opened.js("const list = document.querySelector('.speed select'); list.value = '16'")
     opened.find(".main").click()
     opened.until(lambda: 0.0 < opened.time < SECONDS)
+    opened.js("const list = document.querySelector('.speed select'); list.value = '16'")
     opened.until(lambda: not opened.playing)
     assert opened.time == SECONDS
     assert opened.find(".clock").text == "6.0 / 6.0 s"

@@ -13,8 +13,8 @@ from reported_results import HOSTILE, saved_comparison, saved_run, walk
 from robocov.controllers import CONTROLLERS, gains_of
 from robocov.errors import InputError
 from robocov_app.report.results import FIGURES, gathered, printable
-from robocov_app.sweep.scheduler import sweep
 from robocov_app.sweep.study import Study, StudyMap
+from robocov_app.sweep.sweeping import sweep
 
 FAILING = """
 from dataclasses import dataclass

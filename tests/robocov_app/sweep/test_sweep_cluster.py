@@ -19,8 +19,8 @@ from robocov.errors import InputError, OutputError
 from robocov_app.cli import main
 from robocov_app.sweep import executors as cluster_module
 from robocov_app.sweep.executors import Cluster
-from robocov_app.sweep.scheduler import Totals, sweep
 from robocov_app.sweep.study import tasks_of
+from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.worker import perform
 
 distributed = pytest.importorskip("distributed")

@@ -187,7 +187,7 @@ def test_a_worker_ends_with_its_parent_also_in_the_midst_of_what_is_not_python(t
         f"        __import__('ctypes').PyDLL(None).sleep(600)\n"  # keeps all other threads from running
     )
     script = (
-        "import sys\nfrom swept import small_study\nfrom robocov_app.sweep.scheduler import sweep\n"
+        "import sys\nfrom swept import small_study\nfrom robocov_app.sweep.sweeping import sweep\n"
         "sweep(small_study(controllers=(sys.argv[1],), seeds=(0,)), sys.argv[2], workers=1)\n"
     )
     command = [sys.executable, "-c", script, controller(tmp_path, law), str(tmp_path / "out")]

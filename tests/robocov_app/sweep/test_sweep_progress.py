@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from robocov_app.sweep import scheduler as telling
-from robocov_app.sweep.scheduler import Count, sweep_progress
+from robocov_app.sweep import sweeping as telling
+from robocov_app.sweep.sweeping import Count, sweep_progress
 
 
 class Clock:

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from swept import HALL, ROOM, small_study
 
-from robocov_app.sweep import scheduler as rehearsal_module
+from robocov_app.sweep import sweeping as rehearsal_module
 from robocov_app.sweep.ledger import opened
-from robocov_app.sweep.scheduler import axes_of, rehearsed
 from robocov_app.sweep.study import StudyMap, tasks_of
+from robocov_app.sweep.sweeping import axes_of, rehearsed
 from robocov_app.sweep.worker import perform
 
 

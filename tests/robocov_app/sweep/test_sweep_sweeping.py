@@ -21,11 +21,11 @@ from robocov.errors import InputError, OutputError, ParameterError
 from robocov.mapfile import save_map
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.sweep import scheduler
+from robocov_app.sweep import sweeping
 from robocov_app.sweep.executors import Executor, Returned
 from robocov_app.sweep.ledger import opened
-from robocov_app.sweep.scheduler import Totals, sweep
 from robocov_app.sweep.study import Study, Task, tasks_of
+from robocov_app.sweep.sweeping import Totals, sweep
 from robocov_app.sweep.worker import made_with, perform
 from robocov_app.terminal.interruption import Interruption
 
@@ -78,7 +78,7 @@ class Here(Executor):
 def here(monkeypatch: pytest.MonkeyPatch) -> Here:
     """Sweeps are done in this process."""
     executor = Here()
-    monkeypatch.setattr(scheduler, "LocalPool", lambda workers: executor)
+    monkeypatch.setattr(sweeping, "LocalPool", lambda workers: executor)
     return executor
 
 
@@ -128,7 +128,7 @@ def test_what_is_done_is_not_done_again(
     study: Study, undisturbed: list[bytes], tmp_path: Path, here: Here, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sweep(study, tmp_path, quiet=True)
-    monkeypatch.setattr(scheduler, "LocalPool", None)  # nobody is hired
+    monkeypatch.setattr(sweeping, "LocalPool", None)  # nobody is hired
     assert sweep(study, tmp_path, quiet=True) == Totals(0, 0, 18, False)
     assert tables(tmp_path) == undisturbed
 
@@ -197,7 +197,7 @@ def test_after_an_upgrade_all_is_done_again_and_a_mixed_table_is_told(
     assert (totals, sorted(totals.versions.values())) == (Totals(2, 0, 4, False), [2, 4])
     totals = sweep(more, tmp_path, quiet=True)
     assert (totals, list(totals.versions.values())) == (Totals(4, 0, 2, False), [6])
-    monkeypatch.setattr(scheduler, "difference_of", lambda versions: "numpy 1.9 instead of 2.3")
+    monkeypatch.setattr(sweeping, "difference_of", lambda versions: "numpy 1.9 instead of 2.3")
     told = pytest.raises(OutputError, match=r"a worker has numpy 1.9 instead of 2.3; the same versions")
     with told:
         sweep(small_study(seeds=(9,)), tmp_path, quiet=True)
@@ -283,7 +283,7 @@ def test_a_full_disk_stops_the_sweep_and_the_same_call_goes_on(
     assert sorted(row["run"] for row in rows(tmp_path)) == done
     assert pq.read_table(tmp_path / "results.parquet").num_rows == len(done)
     assert not list(tmp_path.rglob("*.part*"))
-    monkeypatch.setattr(scheduler, "LocalPool", lambda workers: Here())
+    monkeypatch.setattr(sweeping, "LocalPool", lambda workers: Here())
     assert sweep(study, tmp_path, quiet=True) == Totals(18 - len(done), 0, len(done), False)
     assert tables(tmp_path) == undisturbed
 
