@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # isort: off
     from robocov.controllers.gains import choice, gain
     from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
     from robocov.density import Density, Gaussian, Gaussians, Raster, Uniform, WeightedArea, WeightedPolygons
+    from robocov.drawing import show
     from robocov.environment import (
         CircleObstacle, DiscStart, Environment, ObstaclePath, PointsStart, PolygonObstacle, UniformStart,
         WallObstacle,
@@ -59,6 +60,7 @@ _NAMES = {
     "controllers.gains": "choice gain",
     "cost": "CoverageCost CoverageResult MomentaryCost",
     "density": "Density Gaussian Gaussians Raster Uniform WeightedArea WeightedPolygons",
+    "drawing": "show",
     "environment": "CircleObstacle DiscStart Environment ObstaclePath PointsStart PolygonObstacle "
     "UniformStart WallObstacle",
     "errors": "InputError MapError OutputError ParameterError RobocovError StartError",
@@ -95,7 +97,7 @@ __all__ = [
     "Uniform", "UniformStart", "VoronoiPartition", "WallObstacle", "WeightedArea", "WeightedCells",
     "WeightedPolygons", "World", "bundled_maps", "check_map", "choice", "cost_history", "gain",
     "generated_map", "load_map", "make_controller", "map_schema", "partition", "read_results", "read_team",
-    "run_metrics", "save_map", "settled_at", "simulate_many", "summarise", "weighted_partition",
+    "run_metrics", "save_map", "settled_at", "show", "simulate_many", "summarise", "weighted_partition",
 ]
 # fmt: on
 
@@ -104,6 +106,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'robocov' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"robocov.{_HOME[name]}"), name)
+    if name == "CONTROLLERS":  # with those of installed packages
+        value = importlib.import_module("robocov.controllers").controller_kinds()
     globals()[name] = value
     return value
 

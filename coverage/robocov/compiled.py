@@ -215,7 +215,7 @@ class _KernelCache:
 
     def __init__(self, name: str, identity: str) -> None:
         self._name, self._identity = name, identity
-        folder, self.held = _cache_folder(), ExitStack()
+        folder, self.held = cache_folder(), ExitStack()
         self._cache = None if folder is None else ArrayCache(folder, _LIMIT)
 
     def _key(self, sig: Any, codegen: Any) -> str:
@@ -250,7 +250,9 @@ class _KernelCache:
         while time.monotonic() < until:
             try:
                 self.held.enter_context(locked(self._cache.folder, f".{key}.lock", remove=True))
-            except OutputError:
+            except OutputError as error:
+                if error.__cause__ is not None:  # nobody can lock there
+                    return None
                 time.sleep(0.02)
                 continue
             # it may have been saved just before
@@ -274,7 +276,8 @@ class _KernelCache:
             self._cache.save(self._key(sig, result.codegen), {"code": code})
 
 
-def _cache_folder() -> Path | None:
+def cache_folder() -> Path | None:
+    """Return where kernels are kept between processes, None where they are not."""
     # the variable of numba's own caches
     named, ours = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("ROBOCOV_CACHE")
     if named:

@@ -20,7 +20,7 @@ class DrawingBackend(Protocol):
 
     ``plot_...(thing, axes=None, **options)`` draws on the axes and returns them; where they are None, on a
     page of its own, and returns that page's. Notebooks show what ``..._html(thing)`` returns, a str, and
-    where there is no HTML ``..._png(thing)``, bytes.
+    where there is no HTML ``..._png(thing)``, bytes; and what ``show(map, **options)`` returns, see `show`.
     """
 
     plot_environment: Callable[..., Any]
@@ -31,6 +31,7 @@ class DrawingBackend(Protocol):
     environment_png: Callable[[Any], bytes]
     record_html: Callable[[Any], str]
     record_png: Callable[[Any], bytes]
+    show: Callable[..., Any]
 
 
 class Drawable:
@@ -74,6 +75,26 @@ class Drawable:
         except RobocovError:
             return None  # notebooks show the text instead
         return None if draw is None else draw(self)
+
+
+def show(map: Any, **options: Any) -> Any:  # noqa: A002 - as everywhere else
+    """Show the interactive window of a map live in a notebook's cell: what is returned, as its last line.
+
+    Parameters
+    ----------
+    map : str, Path or Environment
+        A bundled map's name, a file, or the map itself.
+    robots, seed : int
+        How many robots start, and the seed of where: 6 and 0 by default.
+    controllers : sequence of str
+        Up to four, side by side: names, or mine.py:MyController.
+    height : int
+        Of the cell, px.
+
+    Needs ``robocov[web]``; without it, a replay of one minute is returned. Raises RobocovError for whatever
+    the window cannot begin with.
+    """
+    return drawing_backend().show(map, **options)
 
 
 def drawing_backend(name: str | None = None) -> DrawingBackend:

@@ -21,14 +21,14 @@ from robocov.arrays import Array, IntArray, frozen
 from robocov.density import Density
 from robocov.density.base import masses_of_polygons
 from robocov.drawing import Drawable
-from robocov.errors import StartError, counted, is_number, unknown_name
+from robocov.errors import StartError, counted, is_number, required, unknown_name
 from robocov.observation.region import Region
 from robocov.robots import DEFAULT_RADIUS
 
 Point: TypeAlias = tuple[float, float]
 Ring: TypeAlias = tuple[Point, ...]
 Repeat: TypeAlias = Literal["loop", "back-and-forth"]
-"""What happens at the end of a path: straight to its beginning, or back the way it came."""
+"""Behaviour at the end of a path: straight to its beginning, or back the way it came."""
 REPEATS: tuple[str, ...] = get_args(Repeat)
 GRID = 1e-6
 """Derived geometry is computed on a grid of one micrometre, so that unions and differences are
@@ -611,3 +611,8 @@ def _area(ring: Array) -> float:
     """Return the area of a ring, m², negative when clockwise."""
     points = ring - ring[0]
     return float(_cross(points[:-1], points[1:]).sum()) / 2
+
+
+def require_environment(value: object) -> None:
+    """Raise a ParameterError unless a value is a map."""
+    required("environment", value, Environment, 'a map, as in load_map("rooms"),')

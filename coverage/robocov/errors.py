@@ -19,6 +19,9 @@ from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeAlias, TypeGuard
 
+import numpy as np
+from numpy.typing import NDArray
+
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
 _LONGEST = 60
@@ -142,6 +145,27 @@ def checked(
         wanted = f"a {'whole ' if whole else ''}number from {least:g} to {most:g} {unit}".rstrip()
         raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
     return float(value)
+
+
+def numeric(
+    name: str, values: Any, wanted: str, kind: type[InputError] = ParameterError
+) -> NDArray[np.float64]:
+    """Return numbers as a new array of floats; raise an error of some kind where they are none.
+
+    >>> numeric("starts", "abc", "[x, y] of each robot")
+    Traceback (most recent call last):
+    robocov.errors.ParameterError: starts: 'abc', but [x, y] of each robot was wanted
+    """
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise kind(f"{name}: {shown(values)}, but {wanted} was wanted") from None
+
+
+def required(name: str, value: object, kind: type, wanted: str) -> None:
+    """Raise a ParameterError unless a value is of a kind."""
+    if not isinstance(value, kind):
+        raise ParameterError(f"{name}: {shown(value)}, but {wanted} was wanted")
 
 
 def listed(names: Sequence[str]) -> str:

@@ -40,11 +40,13 @@ _COLUMNS = {
     "forces": ("fx_N", "fy_N"),
     "goals": ("goal_x_m", "goal_y_m"),
     "obstacle_points": ("obstacle_x_m", "obstacle_y_m"),
+    "steering": ("heading_rad", "turning_rate_rad_s"),
 }
 """Names of the columns of data frames."""
 ARRAYS = ("time", "positions", "velocities", "forces", "goals", "obstacle_points")
-_LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300}
-"""Largest numbers in the arrays that are finite throughout, s, m, m/s and N."""
+TURNING = "steering"  # the array of teams that turn, which others do not have
+_LARGEST = {"time": 1e9, "positions": 1e7, "velocities": 1e300, "forces": 1e300, TURNING: 1e9}
+"""Largest numbers in the arrays that are finite throughout, s, m, m/s, N, rad and rad/s."""
 
 Seconds: TypeAlias = Annotated[float, Field(gt=0, le=1e6), wanted("a number above 0 (s)")]
 Time: TypeAlias = Annotated[float, Field(ge=0, le=1e9), wanted("a number from 0 (s)")]
@@ -137,6 +139,8 @@ class Record(Drawable):
         The controller's force at that state, before any limit, viscosity apart.
     goals, obstacle_points : (T, n, 2) m
         nan where none; the nearest obstacle point that each robot sensed.
+    steering : (T, n, 2) rad, rad/s
+        Heading, from +x, and turning rate of unicycles; None in a team of points.
     session : dict
         Where a run comes from that is a part of a session in the window.
     """
@@ -159,6 +163,7 @@ class Record(Drawable):
     obstacle_points: Array
     session: Mapping[str, Any] = field(default_factory=dict)
     conditions: Conditions | None = None  # ideal ones
+    steering: Array | None = None
 
     @cached_property
     def working(self) -> BoolArray:
@@ -169,6 +174,11 @@ class Record(Drawable):
     def present(self) -> BoolArray:
         """Mask of robots present, failed ones included, (T, n) bool; read-only."""
         return self._of_robots(Conditions.present)
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """The names of the arrays that it has."""
+        return ARRAYS if self.steering is None else (*ARRAYS, TURNING)
 
     def _of_robots(self, which: Callable[[Conditions, Array, int], BoolArray]) -> BoolArray:
         there = np.ones(self.positions.shape[:2], dtype=bool)
@@ -211,6 +221,7 @@ class Record(Drawable):
             time=float(self.time[k]),
             max_speeds=self.team.max_speed,
             density=self.environment.density,
+            steering=None if self.steering is None else self.steering[k],
         )
         goals = None if np.isnan(self.goals[k]).all() else self.goals[k]
         cells = self.cells(k) if self.by_time else None
@@ -239,13 +250,14 @@ class Record(Drawable):
 
     def _only(self, moments: slice | IntArray) -> Record:
         """Return the record of some of the moments; its arrays are copies."""
-        return replace(self, **{name: getattr(self, name)[moments].copy() for name in ARRAYS})
+        return replace(self, **{name: getattr(self, name)[moments].copy() for name in self.arrays})
 
     def to_pandas(self) -> Any:
         """Return the run as a tidy data frame, one row for each moment and robot, by time, then robot.
 
         The columns are time_s, robot (from 0; pictures number robots from 1), x_m, y_m, vx_m_s, vy_m_s, fx_N,
-        fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m. It needs ``robocov[pandas]``.
+        fy_N, goal_x_m, goal_y_m, obstacle_x_m and obstacle_y_m; of teams that turn also heading_rad and
+        turning_rate_rad_s. It needs ``robocov[pandas]``.
         """
         pandas = extra("pandas", "pandas")
         moments, robots = self.positions.shape[:2]
@@ -253,7 +265,8 @@ class Record(Drawable):
             "time_s": np.repeat(self.time, robots),
             "robot": np.tile(np.arange(robots), moments),
         }
-        for array, names in _COLUMNS.items():
+        for array in self.arrays[1:]:
+            names = _COLUMNS[array]
             columns |= {name: getattr(self, array)[:, :, k].ravel() for k, name in enumerate(names)}
         return pandas.DataFrame(columns)
 
@@ -291,7 +304,7 @@ class Record(Drawable):
             raise OutputError(f"{folder}: cannot be made: {reason(error)}") from error
         with written(folder / "record.npz") as part, part.open("wb") as file:
             # compressing gains 10 % and takes 20 times as long
-            np.savez(file, **{name: getattr(self, name) for name in ARRAYS})
+            np.savez(file, **{name: getattr(self, name) for name in self.arrays})
         with written(folder / "run.json") as part:
             text = json.dumps(self.to_json(summary, lattice=lattice), indent=1, allow_nan=False)
             part.write_text(text + "\n", encoding="utf-8")
@@ -318,7 +331,7 @@ class Record(Drawable):
         law = run.controller.name, short_name(run.controller.name), run.controller.gains
         origin = run.start, run.seed, run.dt_s
         session = run.session.model_dump(exclude_unset=True)
-        arrays = _arrays_of(folder / "record.npz", len(team))
+        arrays = _arrays_of(folder / "record.npz", team)
         return cls(environment, team, *law, *origin, **arrays, session=session, conditions=conditions)
 
 
@@ -353,13 +366,15 @@ class Recorder:
         """Append one moment; its arrays are copied."""
         seen, decision = snapshot.seen, snapshot.decision
         goals = np.full_like(seen.positions, np.nan) if decision.goals is None else decision.goals
-        arrays = snapshot.positions, seen.velocities, decision.forces, goals, seen.obstacle_points
+        arrays = [snapshot.positions, seen.velocities, decision.forces, goals, seen.obstacle_points]
+        arrays += [] if snapshot.steering is None else [snapshot.steering]
         self._moments.append((seen.time, *(array.copy() for array in arrays)))
 
     def record(self) -> Record:
         """Return what was collected so far."""
-        columns = zip(*self._moments, strict=True) if self._moments else [()] * len(ARRAYS)
-        arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(ARRAYS, columns, strict=True)}
+        names = (*ARRAYS, TURNING) if self.team.turns.any() else ARRAYS
+        columns = zip(*self._moments, strict=True) if self._moments else [()] * len(names)
+        arrays: dict[str, Any] = {name: np.array(rows) for name, rows in zip(names, columns, strict=True)}
         law = str(self.name), self.controller.label, self._gains
         origin = self.start, self.seed, self.dt
         return Record(self.environment, self.team, *law, *origin, conditions=self.conditions, **arrays)
@@ -378,11 +393,12 @@ def nearest_moments(time: Array, rate: float) -> IntArray:
     return np.union1d(order[first_of_each], [0, last])
 
 
-def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
-    """Return the arrays of a record of so many robots, which are checked."""
+def _arrays_of(path: Path, team: Team) -> dict[str, Any]:
+    """Return the arrays of a record of a team, which are checked."""
+    robots, names = len(team), (*ARRAYS, TURNING) if team.turns.any() else ARRAYS
     with path.open("rb") as file:
         saved = read_arrays(file, str(path))
-    for name in ARRAYS:
+    for name in names:
         if name not in saved:
             raise InputError(f"{path}: there is no array {name}")
         array, moments = saved[name], saved["time"].shape
@@ -392,6 +408,8 @@ def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
             found = f"{name} has shape {array.shape} of {array.dtype}"
             raise InputError(f"{path}: {found}, but {needed} was wanted")
     for name, largest in _LARGEST.items():
+        if name not in names:
+            continue
         values = saved[name]
         good = np.abs(values) <= largest
         if not good.all():
@@ -399,7 +417,7 @@ def _arrays_of(path: Path, robots: int) -> dict[str, Any]:
             raise InputError(f"{path}: {name}: {found} were wanted")
     if (np.diff(saved["time"]) <= 0.0).any():
         raise InputError(f"{path}: time: ascending numbers were wanted")
-    return {name: saved[name] for name in ARRAYS}
+    return {name: saved[name] for name in names}
 
 
 @cache

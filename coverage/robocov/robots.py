@@ -15,18 +15,20 @@ Team files, TOML or JSON, list groups of robots that are alike:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray, frozen
+from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.errors import (
     InputError,
     ParameterError,
     counted,
     is_number,
+    numeric,
     one_line,
     place,
     shown,
@@ -46,17 +48,32 @@ LIMITS: dict[str, tuple[float, float, bool]] = {
     "viscosity": (0.0, 1e6, False),
     "sensing_range": (0.0, 1e5, True),
     "communication_range": (0.0, 1e5, True),
+    "track_width": (0.0, 1e3, False),
+    "turning_rate": (1e-3, 1e3, False),
 }
+KINEMATICS = ("point", "unicycle")
+"""A point moves in any direction, a unicycle has two driven wheels and has to turn."""
+TURNING_RATE = 4.0
+"""Largest turning rate of a unicycle in rad/s where nothing else is said."""
+TRACK_PER_RADIUS = 1.6
+"""Track width of a unicycle by its radius where nothing else is said: the wheels are within the disc."""
+_OF_UNICYCLES = {"track_width": 0.0, "turning_rate": TURNING_RATE}
 MOST_ROBOTS = 10_000
 NO_LIMIT = "null"
 """Stands for a range without limit where there is no null."""
-UNITS = dict(zip(LIMITS, ("m", "kg", "m/s", "m/s²", "N s/m", "m", "m"), strict=True))
+UNITS = dict(zip(LIMITS, ("m", "kg", "m/s", "m/s²", "N s/m", "m", "m", "m", "rad/s"), strict=True))
+_KEYS = ["count", "kinematics", *LIMITS]  # of a group
 _KEY_UNITS = {"m": "m", "kg": "kg", "m/s": "m_per_s", "m/s²": "m_per_s2", "N s/m": "n_s_per_m"}
+_KEY_UNITS["rad/s"] = "rad_per_s"
 
 
 def json_key(name: str) -> str:
     """Return what a parameter is called in ``run.json``, with its unit."""
     return f"{name}_{_KEY_UNITS[UNITS[name]]}"
+
+
+def _as_usual() -> Array:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +92,12 @@ class Team:
         How far the range sensor sees obstacles, from the robot's centre.
     communication_range : m
         Two robots are neighbours when both are in range of each other. Infinite: everybody hears everybody.
+    track_width : m
+        Distance between the two driven wheels of a unicycle, a differential drive; 0, the default, is a point
+        robot, which moves in any direction. No wheel is faster than `max_speed`, or changes its speed by more
+        than `max_acceleration`; see `robocov.world.steering`.
+    turning_rate : rad/s
+        The most at which a unicycle turns, 4 by default; wheels may allow less, 2 max_speed / track_width.
     """
 
     radius: Array
@@ -84,11 +107,17 @@ class Team:
     viscosity: Array
     sensing_range: Array
     communication_range: Array
+    track_width: Array = field(default_factory=_as_usual)
+    turning_rate: Array = field(default_factory=_as_usual)
 
     def __post_init__(self) -> None:
-        size = np.atleast_1d(np.asarray(self.radius, dtype=float)).shape[0]
+        size = np.atleast_1d(np.asarray(self.radius)).shape[0]
         for name, (low, high, infinite) in LIMITS.items():
-            values = frozen(np.atleast_1d(np.asarray(getattr(self, name), dtype=float)))
+            values = frozen(
+                np.atleast_1d(numeric(f"team.{name}", getattr(self, name), "a number for each robot"))
+            )
+            if name in _OF_UNICYCLES and not len(values):
+                values = frozen(np.full(size, _OF_UNICYCLES[name]))
             if values.shape != (size,):
                 what = f"{values.shape} values, but one for each of {size} robots was wanted"
                 raise ParameterError(f"team.{name}: {what}")
@@ -111,12 +140,26 @@ class Team:
         viscosity: float = 2.0,
         sensing_range: float = 3.0,
         communication_range: float = np.inf,
+        track_width: float = 0.0,
+        turning_rate: float = TURNING_RATE,
+        kinematics: str | None = None,
     ) -> Team:
-        """Return a team of `n` equal robots (the paper's: 1 kg, at most 1 m/s)."""
-        if n < 1:
+        """Return a team of `n` equal robots (the paper's: 1 kg, at most 1 m/s).
+
+        `kinematics`: "unicycle" is a track width of 1.6 radii unless one is given, "point" is none.
+        """
+        if kinematics not in (None, *KINEMATICS):
+            raise ParameterError(f"team.{unknown_name('kinematics', str(kinematics), KINEMATICS)}")
+        if kinematics == "unicycle":
+            track_width = track_width or TRACK_PER_RADIUS * radius
+        elif kinematics == "point":
+            track_width = 0.0
+        if not is_number(n, Integral) or n < 1:
             raise ParameterError(f"robots: {shown(n)}, but a whole number of at least 1 was wanted")
-        values = (radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range)
-        return cls(*(np.full(n, value, dtype=float) for value in values))
+        limits = radius, mass, max_speed, max_acceleration, viscosity, sensing_range, communication_range
+        values = *limits, track_width, turning_rate
+        each = zip(LIMITS, values, strict=True)
+        return cls(*(np.full(n, numeric(f"team.{name}", value, "a number")) for name, value in each))
 
     @classmethod
     def joined(cls, teams: Sequence[Team]) -> Team:
@@ -130,6 +173,15 @@ class Team:
         """Whether some robots are faster than others, so that the nearest may not be there first."""
         return bool((self.max_speed != self.max_speed[0]).any())
 
+    @property
+    def turns(self) -> BoolArray:
+        """Mask of the unicycles, which have to turn, (n,) bool."""
+        return np.asarray(self.track_width > 0.0)
+
+    def _columns(self) -> list[str]:
+        """Return the parameters that say something: a team of points has neither wheels nor turning rate."""
+        return [name for name in LIMITS if name not in _OF_UNICYCLES or self.turns.any()]
+
     def __getitem__(self, robots: slice | IntArray) -> Team:
         """Return some of the robots as a team."""
         return Team(*(getattr(self, name)[robots] for name in LIMITS))
@@ -139,7 +191,8 @@ class Team:
 
     def __repr__(self) -> str:
         parts = []
-        for name, unit in UNITS.items():
+        for name in self._columns():
+            unit = UNITS[name]
             values = getattr(self, name)
             low, high = float(values.min()), float(values.max())
             span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
@@ -149,7 +202,7 @@ class Team:
     def to_dict(self) -> dict[str, Any]:
         """Return the team as plain JSON: None is no limit, and a value that all share is written once."""
         plain: dict[str, Any] = {"robots": len(self)}
-        for name in LIMITS:
+        for name in self._columns():
             values = [None if np.isinf(x) else float(x) for x in getattr(self, name)]
             plain[json_key(name)] = values[0] if len(set(values)) == 1 else values
         return plain
@@ -162,7 +215,7 @@ class Team:
             raise _unusable(plain, "robots", f"a whole number from 1 to {MOST_ROBOTS}")
         columns = []
         for name, (low, high, null) in LIMITS.items():
-            value = plain.get(json_key(name), "missing")
+            value = plain.get(json_key(name), _OF_UNICYCLES.get(name, "missing"))
             column = value if isinstance(value, list) else [value] * n
             good = [(null and x is None) or (is_number(x) and low <= x <= high) for x in column]
             if len(good) != n or not all(good):
@@ -177,7 +230,7 @@ def _unusable(plain: Mapping[str, Any], key: str, wanted: str) -> ParameterError
     return ParameterError(f"team.{key}: {found}, but {wanted} was wanted")
 
 
-def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = None) -> Team:
+def read_team(path: Path | str, defaults: Mapping[str, float | str | None] | None = None) -> Team:
     """Return the team in a TOML file, or in a JSON file of the same structure if its name ends in .json.
 
     What a group leaves open is as in `defaults`, then `Team.homogeneous`; None is a range without limit.
@@ -198,7 +251,7 @@ def read_team(path: Path | str, defaults: Mapping[str, float | None] | None = No
 
 
 def team_of_groups(
-    groups: object, path: tuple[str | int, ...], defaults: Mapping[str, float | None] | None = None
+    groups: object, path: tuple[str | int, ...], defaults: Mapping[str, float | str | None] | None = None
 ) -> Team:
     """Return the team of groups as they stand in a file at a path of keys, with which errors begin."""
     if not isinstance(groups, list) or not groups:
@@ -211,18 +264,25 @@ def team_of_groups(
     return Team.joined(parts)
 
 
-def _group(group: object, path: tuple[str | int, ...], values: dict[str, float | None]) -> Team:
+def _group(group: object, path: tuple[str | int, ...], values: dict[str, Any]) -> Team:
     if not isinstance(group, dict):
         raise InputError(f"{place(path)}: {shown(group)}, but a table was wanted")
     for key in group:
-        if key not in ("count", *LIMITS):
-            raise InputError(f"{place(path)}: {unknown_name('key', str(key), ['count', *LIMITS])}")
+        if key not in _KEYS:
+            raise InputError(f"{place(path)}: {unknown_name('key', str(key), _KEYS)}")
     count = group.get("count")
     if not is_number(count, int) or not 1 <= count <= MOST_ROBOTS:
         found = f"{place((*path, 'count'))}: {'missing' if count is None else shown(count)}"
         raise InputError(f"{found}, but a whole number from 1 to {MOST_ROBOTS} was wanted")
     values |= {key: _value(key, group[key], place((*path, key))) for key in LIMITS if key in group}
-    known = {name: np.inf if value is None else value for name, value in values.items()}
+    if "track_width" in group:  # that of the rest is not this one's kind
+        values.pop("kinematics", None)
+    if (kind := group.get("kinematics")) is not None:
+        if kind not in KINEMATICS:
+            wanted = " or ".join(KINEMATICS)
+            raise InputError(f"{place((*path, 'kinematics'))}: {shown(kind)}, but {wanted} was wanted")
+        values["kinematics"] = kind
+    known: dict[str, Any] = {name: np.inf if value is None else value for name, value in values.items()}
     return Team.homogeneous(count, **known)
 
 
@@ -232,7 +292,8 @@ def _value(name: str, value: object, where: str) -> float | None:
     if not is_number(value):
         raise InputError(f"{where}: {shown(value)}, but a number was wanted")
     try:
-        Team.homogeneous(1, **{name: float(value)})
+        one: dict[str, Any] = {name: float(value)}
+        Team.homogeneous(1, **one)
     except ParameterError as error:
         raise InputError(f"{where}: {str(error).partition(': ')[2]}") from None
     return float(value)

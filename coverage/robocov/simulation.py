@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from copy import copy, deepcopy
 from dataclasses import replace
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,19 @@ from robocov.arrays import Array, BoolArray
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Inbox, Perception, of_working
 from robocov.controllers import CONTROLLERS, informed, remembers
-from robocov.controllers.base import Controller
+from robocov.controllers.base import Controller, IndividualController, for_team
 from robocov.controllers.user_modules import fault_of
-from robocov.environment import Environment, PolygonObstacle
-from robocov.errors import ParameterError, RobocovError, StartError, counted, shown
+from robocov.environment import Environment, PolygonObstacle, require_environment
+from robocov.errors import (
+    ParameterError,
+    RobocovError,
+    StartError,
+    counted,
+    is_number,
+    numeric,
+    required,
+    shown,
+)
 from robocov.observation import (
     Decision,
     Observations,
@@ -47,8 +57,12 @@ class Simulation:
 
     Parameters
     ----------
+    controller : Controller or IndividualController
+        A law for one robot is asked for every robot in turn.
     starts, velocities, time : (n, 2) m, (n, 2) m/s, s
         At the beginning; by default robots are at rest.
+    steering : (n, 2) rad, rad/s
+        Heading, from +x, and turning rate of unicycles at the beginning; by default as they move.
     steps : int
         Made before, since `time`.
     resumed : bool
@@ -83,23 +97,26 @@ class Simulation:
     def __init__(
         self,
         environment: Environment,
-        controller: Controller,
+        controller: Controller | IndividualController,
         starts: Array | list[list[float]],
         team: Team | None = None,
         dt: float = DEFAULT_DT,
         *,
         velocities: Array | None = None,
+        steering: Array | None = None,
         time: float = 0.0,
         steps: int = 0,
         resumed: bool = False,
         conditions: Conditions | None = None,
         runs: int = 1,
     ) -> None:
-        positions = np.array(starts, dtype=float)
+        require_environment(environment)
+        positions = numeric("starts", starts, "[x, y] of each robot in metres", StartError)
         if positions.ndim != 2 or positions.shape[1] != 2 or len(positions) < 1:
             wanted = "(n, 2) with n of at least 1 was wanted"
             raise StartError(f"starts: an array of shape {positions.shape}, but {wanted}")
         self.team = Team.homogeneous(len(positions)) if team is None else team
+        required("team", self.team, Team, "a Team")
         if len(self.team) != len(positions):
             raise ParameterError(f"team: {len(self.team)} robots, but {len(positions)} starts")
         each, rest = divmod(len(positions), runs)
@@ -108,18 +125,26 @@ class Simulation:
             raise ParameterError(f"runs: {runs} of {len(positions)} robots, but {wanted}")
         self._each_run = [slice(k * each, (k + 1) * each) for k in range(runs)]
         check_dt(dt)
+        controller = for_team(controller)
         if isinstance(controller, type) or not isinstance(controller, Controller):
             wanted = "a controller, as in Rapf(), was wanted"
             raise ParameterError(f"controller: {shown(controller)}, but {wanted}")
         if velocities is not None:
-            velocities = np.array(velocities, dtype=float)
+            velocities = numeric("velocities", velocities, "[x, y] of each robot in m/s", StartError)
             if velocities.shape != positions.shape or not np.isfinite(velocities).all():
                 wanted = "finite [x, y] for each robot were wanted"
                 raise StartError(f"velocities: {shown(velocities.tolist())}, but {wanted}")
+        if steering is not None:
+            steering = numeric("steering", steering, "[heading, turning rate] of each robot", StartError)
+            if steering.shape != positions.shape or not np.isfinite(steering).all():
+                wanted = "finite [heading, turning rate] for each robot were wanted"
+                raise StartError(f"steering: {shown(steering.tolist())}, but {wanted}")
         if conditions is not None:
+            required("conditions", conditions, Conditions, "Conditions")
             conditions.check_team(len(positions))
             conditions = None if conditions.ideal else conditions
         self.environment, self.controller, self.dt = environment, controller, dt
+        self.deciding = 0.0  # seconds of processor time that the controller has taken to decide so far
         self._began, self._steps = time, steps
         # who moves may lean on something, and sink in a little
         slack = 1e-6 if velocities is None else 2.0 * MAX_PENETRATION
@@ -135,9 +160,10 @@ class Simulation:
         self._world: World | ChangingWorld
         if conditions is not None and changes:
             given = conditions, environment, self.team, positions, velocities
-            self._world = ChangingWorld(*given, time=self.time)
+            self._world = ChangingWorld(*given, steering=steering, time=self.time)
         else:
-            self._world = World(walls, self.team, positions, velocities, movers=moving, runs=runs)
+            given_state = walls, self.team, positions, velocities
+            self._world = World(*given_state, steering=steering, movers=moving, runs=runs)
         self._perception = None if conditions is None else Perception(conditions, self.team, dt)
         self.inbox = None if self._perception is None else self._perception.begin()
         self._everybody = None
@@ -178,6 +204,11 @@ class Simulation:
         return self._world.velocities
 
     @property
+    def steering(self) -> Array | None:
+        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        return self._world.steering
+
+    @property
     def working(self) -> BoolArray:
         """Mask of robots present and not failed, (n,) bool."""
         return self._world.working
@@ -191,7 +222,9 @@ class Simulation:
         """The present state, what is seen in it, and what is decided on it."""
         if self._snapshot is None:
             seen, inbox = self._observed()
+            began = process_time()
             self._snapshot = Snapshot(seen, self._decided(seen))
+            self.deciding += process_time() - began
             if self._perception is not None:
                 decision = of_working(self._snapshot.decision, self.working)
                 self._snapshot = Snapshot(seen, decision, self.positions, self.working, inbox)
@@ -217,6 +250,7 @@ class Simulation:
                 max_speeds=team.max_speed,
                 density=self.environment.density,
                 scans=scans,
+                steering=self.steering,
             )
             if self._perception is None:
                 self._observation = seen, None
@@ -280,7 +314,7 @@ class Simulation:
 
     def snapshots(self, duration: float) -> Iterator[Snapshot]:
         """Yield the present snapshot and one after every step, until `duration` seconds have passed."""
-        if not 0.0 <= duration < np.inf:
+        if not is_number(duration) or not 0.0 <= duration < np.inf:
             raise ParameterError(f"duration: {shown(duration)} s, but a finite number from 0 was wanted")
         yield self.snapshot
         for _ in range(round(duration / self.dt)):
@@ -327,10 +361,11 @@ class Simulation:
         self,
         *,
         environment: Environment | None = None,
-        controller: Controller | None = None,
+        controller: Controller | IndividualController | None = None,
         team: Team | None = None,
         positions: Array | None = None,
         velocities: Array | None = None,
+        steering: Array | None = None,
         conditions: Conditions | None = None,
     ) -> Simulation:
         """Return a simulation that goes on from here with something else; this one stays as it is.
@@ -338,6 +373,8 @@ class Simulation:
         What the controller remembers is kept as long as neither it nor the number of robots changes, messages
         as long as neither that nor the conditions do. Raises as `Simulation` does; robots may touch.
         """
+        if steering is None and (team is None or len(team) == len(self.team)):
+            steering = self.steering
         twin = Simulation(
             self.environment if environment is None else environment,
             self.controller if controller is None else controller,
@@ -345,6 +382,7 @@ class Simulation:
             self.team if team is None else team,
             self.dt,
             velocities=self.velocities if velocities is None else velocities,
+            steering=steering,
             time=self._began,
             steps=self._steps,
             conditions=self.conditions if conditions is None else conditions,
@@ -357,7 +395,7 @@ class Simulation:
 
 def simulate_many(
     environment: Environment,
-    controller: Controller,
+    controller: Controller | IndividualController,
     starts: Sequence[Array],
     duration: float,
     team: Team | None = None,
@@ -370,7 +408,7 @@ def simulate_many(
     """Simulate runs of one controller in one environment, and return their records.
 
     Each is the same, bit for bit, as ``Simulation(environment, controller, starts[k], ...).run(duration)``.
-    Teams of up to 15 robots under a law that remembers nothing (RAPF, RPF, Lloyd, range-limited), without
+    Teams of up to 15 points under a law that remembers nothing (RAPF, RPF, Lloyd, range-limited), without
     conditions and moving obstacles, are moved on together, several times as quickly; others one by one.
 
     `starts`, (n, 2) m each, may differ in size without `team`; they, `conditions` and `seeds` are of each
@@ -381,6 +419,7 @@ def simulate_many(
     together: dict[int, list[int]] = {}
     records: dict[int, Record] = {}
     by_itself = environment.moves or remembers(controller) or type(controller) not in CONTROLLERS.values()
+    by_itself = by_itself or (team is not None and bool(team.turns.any()))
     for run, (positions, under) in enumerate(zip(starts, each, strict=True)):
         if by_itself or len(positions) > _LARGEST_TEAM or not (under is None or under.ideal):
             simulation = Simulation(environment, controller, positions, team, dt, conditions=under)
@@ -403,7 +442,7 @@ def simulate_many(
 
 def check_dt(dt: float) -> None:
     """Check a control period; raises ParameterError when it is out of range."""
-    if not 1e-4 <= dt <= 1.0:
+    if not is_number(dt) or not 1e-4 <= dt <= 1.0:
         raise ParameterError(f"dt: {shown(dt)} s, but a number from 0.0001 to 1 s was wanted")
 
 

@@ -65,7 +65,7 @@ def test_the_application_is_installed_as_the_backend() -> None:
     assert drawing_backend().__name__ == "robocov_app.notebook"  # type: ignore[attr-defined]
     assert drawing_backend("matplotlib") is drawing_backend()
     wanted = list(drawing.DrawingBackend.__annotations__)
-    assert len(wanted) == 8
+    assert len(wanted) == 9
     assert all(callable(getattr(drawing_backend(), name)) for name in wanted)
 
 

@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
+
 import pytest
 
+import robocov as rc
 from robocov import errors
-from robocov.errors import MapError, Mistake, place
+from robocov.controllers import controller_kinds
+from robocov.errors import InputError, MapError, Mistake, place
 
 
 def test_the_tree_of_errors() -> None:
@@ -70,3 +75,47 @@ def test_keys_that_are_no_names_are_quoted() -> None:
 def test_keys_of_any_length_leave_messages_readable() -> None:
     assert place(("a", "x" * 60, 1)) == f"a.{'x' * 60}[1]"
     assert place(("a", "x" * 61, 1)) == f'a["{"x" * 57}..."][1]'
+
+
+ROOMS = rc.load_map("rooms")
+ONE = [[1.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: rc.CoverageCost("rooms"), "environment: 'rooms', but a map, as in"),
+        (lambda: rc.Simulation("rooms", rc.Rapf(), ONE), "environment: 'rooms', but a map"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), "here"), "starts: 'here', but [x, y] of each robot"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE, 3), "team: 3, but a Team was wanted"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE, conditions=3), "conditions: 3, but Conditions"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE, dt="a"), "dt: 'a' s, but a number from 0.0001 to 1 s"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE, velocities="a"), "velocities: 'a', but [x, y]"),
+        (lambda: rc.Simulation(ROOMS, rc.Rapf(), ONE).run("a"), "duration: 'a' s, but a finite number"),
+        (lambda: rc.CoverageCost(ROOMS, 4)([["a", 1]]), "positions: [['a', 1]], but [x, y] of each robot"),
+        (lambda: rc.Rapf(krep=1), "rapf: unknown gain 'krep': did you mean 'k_rep'?"),
+        (lambda: rc.Team.homogeneous("a"), "robots: 'a', but a whole number of at least 1 was wanted"),
+        (lambda: rc.Team.homogeneous(2, mass="a"), "team.mass: 'a', but a number was wanted"),
+        (lambda: rc.load_map(3), "map: 3, but a path, or the name of a bundled map, was wanted"),
+    ],
+    ids=range(13),
+)  # fmt: skip
+def test_mistakes_in_python_are_told_as_those_in_files(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    assert str(caught.value).startswith(told)
+
+
+def test_a_package_whose_controller_cannot_be_loaded_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = EntryPoint("theirs", "no_such_module:Theirs", "robocov.controllers")
+    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [broken])
+    with pytest.warns(UserWarning, match="controller 'theirs' of entry point"):
+        assert "theirs" not in controller_kinds()
+
+
+def test_controllers_of_packages_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = EntryPoint("theirs", "robocov.controllers.lloyd:Lloyd", "robocov.controllers")
+    monkeypatch.setattr("robocov.controllers.entry_points", lambda group: [theirs])
+    monkeypatch.delitem(vars(rc), "CONTROLLERS", raising=False)
+    assert rc.CONTROLLERS["theirs"] is rc.Lloyd
+    monkeypatch.delitem(vars(rc), "CONTROLLERS")

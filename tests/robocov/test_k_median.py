@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov import k_median
-from robocov.k_median import best_swap, best_swaps, improved, lloyd_iterations, moved, rebuilt, seeded
+from robocov.k_median import best_swap, best_swaps, greedy, improved, lloyd_iterations, moved, rebuilt, seeded
 
 
 def table(seed: int, sources: int = 12, targets: int = 30) -> np.ndarray:
@@ -211,3 +211,17 @@ def test_giving_up():
     for iteration in (lloyd_iterations, best_swaps):
         with pytest.raises(KeyboardInterrupt):
             iteration(table, np.arange(3), beat=stop)
+
+
+@given(seed=st.integers(0, 10_000), k=st.integers(1, 4))
+def test_greedy_places_gain_most_of_what_the_best_ones_do(seed: int, k: int) -> None:
+    """Nemhauser, Wolsey and Fisher (1978): 1 - 1/e of it; and each is the best beside the earlier ones."""
+    distance = table(seed, sources=9)
+    chosen = greedy(distance, k)
+    assert len(set(chosen.tolist())) == k
+    for number in range(k):
+        sums = [total(distance, np.append(chosen[:number], source)) for source in range(9)]
+        assert sums[chosen[number]] <= min(sums) + 1e-9
+    nothing = len(distance) * distance.max()
+    best = min(total(distance, np.array(some)) for some in combinations(range(9), k))
+    assert nothing - total(distance, chosen) >= (1.0 - 1.0 / np.e) * (nothing - best) - 1e-9

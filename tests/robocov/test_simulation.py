@@ -48,6 +48,7 @@ def digests() -> list[str]:
     )
     runs = [Simulation(room, make_controller(name), starts, dt=1 / 20) for name in ALL]
     runs += [Simulation(room, each, starts, dt=1 / 20, conditions=noisy) for each in CONTROLLERS]
+    runs.append(Simulation(room, Rapf(), starts, Team.homogeneous(6, kinematics="unicycle"), 1 / 20))
     return [digest(each.run(2.0)) for each in runs]
 
 

@@ -78,7 +78,7 @@ class Conditions:
     delay: float = 0.0
     """Latency of messages, s."""
     message_rate: float | None = None
-    """How often all robots broadcast their positions to who is in range, Hz; None: at every control step."""
+    """Rate at which robots broadcast their positions to who is in range, Hz; None: at every control step."""
     forget_after: float = 3.0
     """Timeout, s, after which a robot that has not been heard of is taken to be gone, no more to be where its
     last message said."""

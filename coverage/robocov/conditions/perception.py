@@ -172,7 +172,7 @@ class Inbox:
     arrived: IntArray
     """The step at which it arrived, (n, n)."""
     places: Array
-    """What it said, (n, n, 2) m."""
+    """Positions that the messages told, (n, n, 2) m."""
     on_the_way: tuple[Broadcast, ...] = ()
     """In the order in which they arrive."""
 

@@ -8,10 +8,12 @@ somebody has typed: on a command line, in a study file, in a program. A name tha
 results is only looked up in `CONTROLLERS`, and shown by `short_name`.
 """
 
+import warnings
 from collections.abc import Mapping
 from importlib.metadata import entry_points
 from typing import Any
 
+from robocov.controllers.adaptive import Adaptive
 from robocov.controllers.atlas import Atlas, AtlasShared
 from robocov.controllers.barrier import Barrier
 from robocov.controllers.base import (
@@ -19,29 +21,40 @@ from robocov.controllers.base import (
     IndividualController,
     Individually,
     OwnView,
+    for_team,
     information_of,
     informed,
 )
+from robocov.controllers.boosting import Boosting
+from robocov.controllers.diffeomorphism import Diffeomorphism
+from robocov.controllers.frontier_median import FrontierMedian
 from robocov.controllers.gains import gain_values, gains_of, with_gains
 from robocov.controllers.geodesic_lloyd import GeodesicLloyd
+from robocov.controllers.greedy_submodular import GreedySubmodular
 from robocov.controllers.lloyd import Lloyd, RangeLimited
 from robocov.controllers.repulsion import Dispersion, Howard, Poduri, Rapf, Rpf
 from robocov.controllers.tangentbug import TangentBug
 from robocov.controllers.user_modules import Source, class_in_file, fault_of
+from robocov.controllers.visibility import Visibility
+from robocov.controllers.voronoi_graph import VoronoiGraphCoverage
 from robocov.errors import ParameterError, unknown_name
 
 __all__ = [
-    "CONTROLLERS", "FLAGSHIP", "Atlas", "AtlasShared", "Barrier", "Controller", "Dispersion", "GeodesicLloyd",
-    "Howard", "IndividualController", "Individually", "Lloyd", "OwnView", "Poduri",
-    "RangeLimited", "Rapf", "Rpf", "TangentBug", "controller_kind", "controller_kinds", "gain_values",
-    "gains_of", "information_of", "informed", "make_controller", "remembers", "short_name",
+    "CONTROLLERS", "FLAGSHIP", "Adaptive", "Atlas", "AtlasShared", "Barrier", "Boosting", "Controller",
+    "Diffeomorphism", "Dispersion", "FrontierMedian", "GeodesicLloyd", "GreedySubmodular", "Howard",
+    "IndividualController", "Individually", "Lloyd", "OwnView", "Poduri", "RangeLimited", "Rapf", "Rpf",
+    "TangentBug", "Visibility", "VoronoiGraphCoverage",
+    "controller_kind", "controller_kinds", "gain_values", "gains_of", "information_of", "informed",
+    "make_controller", "remembers", "short_name",
 ]  # fmt: skip
 
 CONTROLLERS: dict[str, type[Any]] = {
     kind.name: kind
     for kind in (
         *(Rapf, Rpf, Lloyd, Atlas),  # the default comparison, in its order
-        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd, AtlasShared),
+        *(Howard, Poduri, Dispersion, RangeLimited, TangentBug, Barrier, GeodesicLloyd),
+        *(Visibility, Boosting, Adaptive, Diffeomorphism),
+        *(FrontierMedian, GreedySubmodular, VoronoiGraphCoverage, AtlasShared),
     )
 }
 """The built-in controllers by name."""
@@ -49,12 +62,14 @@ CONTROLLERS: dict[str, type[Any]] = {
 FLAGSHIP = "rapf"
 """The controller that the project recommends."""
 
-_FORGETFUL: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited, Individually)
+_FORGETFUL: tuple[type[Any], ...] = (Rapf, Rpf, Lloyd, RangeLimited)
 """Controllers that remember nothing but what makes the next decision quicker."""
 
 
 def remembers(controller: object) -> bool:
     """Return whether what a controller remembers may change what it decides."""
+    if isinstance(controller, Individually):
+        return hasattr(controller.law, "begin")
     return type(controller) not in _FORGETFUL
 
 
@@ -81,9 +96,10 @@ def _offered(only: str | None = None) -> dict[str, type[Any]]:
         try:
             kinds[entry.name] = _named(entry.load(), entry.name)
         except (Exception, SystemExit) as error:
+            where = f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded"
             if only is not None:
-                where = f"controller {entry.name!r} of entry point {entry.value!r} cannot be loaded"
                 raise fault_of(where, error) from error
+            warnings.warn(str(fault_of(where, error)), stacklevel=2)
     return kinds
 
 
@@ -122,7 +138,5 @@ def make_controller(
     >>> make_controller("rapf", {"k_rep": 0.3}).k_rep
     0.3
     """
-    controller = with_gains(controller_kind(name, source=source), gains or {})
-    if isinstance(controller, IndividualController) and not hasattr(controller, "decide"):
-        return Individually(controller)
-    return controller  # type: ignore[no-any-return]
+    controller: Controller = for_team(with_gains(controller_kind(name, source=source), gains or {}))
+    return controller

@@ -10,8 +10,10 @@ import numpy as np
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.controllers.base import Law
-from robocov.controllers.driving import approach, avoid, drive, last_returns, neighbour_offsets, with_nearest
+from robocov.controllers.driving import last_returns
 from robocov.controllers.gains import gain, response_time_gain
+from robocov.controllers.localization import Estimates, localized, wary
+from robocov.controllers.route_following import follow_routes
 from robocov.observation import Decision, Observations, Scanning
 from robocov.observation.region import Region
 from robocov.planning.discovered import DiscoveredMap, Raster
@@ -30,20 +32,15 @@ _MISSED, _IN_RANGE = (
     0.8,
 )  # who is not heard for so many seconds where it would be, to so much of the range
 _HARDLY = 0.1  # part of the spacing of the nodes that others may move before a plan is made anew
-_ARRIVED, _TURN = 0.35, 0.2  # metres from a place, or a way-point, at which it counts as reached
-_BRAKING = 0.4  # part of the acceleration that is counted on: less than half, for the lag of the drive
-_FOR_TURNING = 0.7  # part of it that is spent on where to go; the rest is for not running into anything
-_MARGIN, _APART = 0.02, 0.04  # gaps that are left to walls and to other robots, m
-_EAGERNESS = 10.0  # speed in 1/s with which the distance to what is close may fall to its gap
-_CREEP = 0.15  # speed at which a robot moves along what it is closest to, m/s; the more room, the faster
-_ASIDE, _HEEDED = 0.3, 1.5  # largest speed, m/s, to pass on the left who is in the way, so many metres away
+_WALLS = 4.0  # radii of the robot: longer than the side of another one that shows, which has failed
+_ARRIVED = 0.35  # metres from a place at which it counts as reached
 _TOGETHER = 1.5  # a robot plans for its whole team as long as it takes to cross the region so many times
 _STAGGERED = 0.5  # part of the period in which all robots make their first plans
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 class Teammates(NamedTuple):
-    """What a robot knows of (k,) others."""
+    """Knowledge of a robot about (k,) others."""
 
     robots: IntArray  # their numbers, ascending
     at: Array  # where they are, or are presumed to be, (k, 2) m
@@ -74,7 +71,9 @@ class PlannerState:
     due: float  # when it plans next, s
     others: Teammates
     met: frozenset[int] = frozenset()  # the robots that it has ever heard, but for those that failed
-    since: float = 0.0  # when it began, or the robots that it hears became others, s
+    since: float = 0.0  # when it began, or the team, or the walls, became others, s,
+    walked: float = 0.0  # how far it has walked since then, m,
+    looked: float = 0.0  # and how much of that to look around
     planned: DiscoveredMap | None = None  # the map when the last plan was made,
     ways: GridPlanner | None = None  # and what was computed of it
     team_ways: GridPlanner | None = None
@@ -86,7 +85,6 @@ class PlannerState:
     node: int = -1  # and the node there
     look: Array | None = None  # (2,) m, where it goes first, to look around,
     former: tuple[Array, ...] = ()  # from where it has,
-    looked: float = 0.0  # and for how long, s
     idle: bool = False  # whether the next plan may be left out where nothing has changed
 
     def __deepcopy__(self, memo: object) -> PlannerState:
@@ -102,6 +100,7 @@ class AtlasMemory:
     routes: tuple[Array, ...]  # the way-points of each, (w, 2) m, the last one the goal
     legs: IntArray  # (n,), the way-point that is headed for
     returns: Array | None = None  # (n, rays, 2) m, what the last scan of each met
+    estimates: Estimates | None = None  # where robots know each other by messages
 
     @property
     def maps(self) -> tuple[DiscoveredMap, ...]:
@@ -114,9 +113,9 @@ class Atlas(Law):
     """Each robot plans for its whole team on its own discovered map, and goes to its own place in that plan.
 
     Twice a second every robot scans, and enters what it sees into its own grid (`DiscoveredMap`). It also
-    watches where the robots that it hears are; nothing but positions is ever told. Who gets out of range is
-    presumed to come to its place in the plan, and forgotten when it is missed there. Once in `period` seconds
-    a robot looks for places P with a low coverage cost (22) on its own map,
+    watches where the robots that it hears are: there it is free. Nothing but positions is ever told. Who gets
+    out of range is presumed to come to its place in the plan, and forgotten when it is missed there. Once in
+    `period` seconds a robot looks for places P with a low coverage cost (22) on its own map,
 
         J(P) = sum over q of w_q min_j d(q, p_j),
 
@@ -132,13 +131,15 @@ class Atlas(Law):
     2. *Its own place.* The local minimum of J by its own place, on a fine lattice, between its nodes by a
        parabola; a goal that saves less than the part `rest` of what its own cell costs is not worth moving.
     3. *A look.* When it is there, it looks at what is still unknown of its own cell, as long as what is at
-       stake is more than the part `stake` of J; that doubles for each `patience` seconds of looking.
-    4. *The way* is the shortest on its map, braking before walls and other robots (`driving`).
+       stake is more than the part `stake` of J, which doubles as it walks to look (`patience`). A robot alone
+       does not look: its place hardly depends on what it has not seen.
+    4. *The way* is the shortest on its map, braking before walls and other robots (`route_following`).
 
-    What a relocation or a goal must save doubles every `settling` seconds until robots join or fail. Private
-    maps agree ever more where it matters, and so do the plans; by 1 and by what doubles the team comes to
-    rest also where they do not. Of more than `MAX_PLANNING_GROUP` robots each plans for itself and its
-    nearest ones, in the part of the map where these are; the others are where they are.
+    Private maps agree ever more where it matters, and so do the plans. Where they do not, the team comes to
+    rest by 1, and as what a relocation or a goal must save doubles with the way that a robot walks, not with
+    time (`settling`): who rests stays as ready to move as it was. It begins anew when robots join or fail,
+    and when a robot sees a wall come or go. Of more than `MAX_PLANNING_GROUP` robots each plans for itself
+    and its nearest ones, in the part of the map where these are; the others are where they are.
     """
 
     name = "atlas"
@@ -149,11 +150,13 @@ class Atlas(Law):
     period: float = gain(1.0, "s", "between two plans of a robot", low=0.05, high=60.0)
     threshold: float = gain(0.01, "1", "part of the cost that a relocation must save", high=1.0)
     nearby: float = gain(0.003, "1", "part of the cost that a relocation in its own cell must save", high=1.0)
-    rest: float = gain(0.004, "1", "part of its own cell's cost that a new goal must save", high=1.0)
+    rest: float = gain(0.002, "1", "part of its own cell's cost that a new goal must save", high=1.0)
     stake: float = gain(0.004, "1", "part of the cost that is worth a look", high=1.0)
-    patience: float = gain(4.0, "s", "looking around in which that doubles", low=0.01, high=1e4)
+    patience: float = gain(
+        0.12, "1", "way of looks, in diameters of the region, that doubles it", low=1e-3, high=1e4
+    )
     settling: float = gain(
-        40.0, "s", "time in which what a relocation, or a new goal, must save doubles", low=0.01, high=1e6
+        0.8, "1", "way, in diameters, that doubles what relocations and goals must save", low=1e-3, high=1e6
     )
     clearance: float = gain(0.03, "m", "that routes keep between rim and walls", high=10.0)
     k_prop: float = gain(2.0, "1/s", "wanted speed per metre of distance to the goal", high=100.0)
@@ -173,10 +176,18 @@ class Atlas(Law):
         return AtlasMemory(team, states, routes, np.zeros(len(team), dtype=np.intp))
 
     def decide(self, seen: Observations, memory: AtlasMemory) -> Decision:
+        estimates = memory.estimates
+        if seen.reported_positions is not None:
+            seen, estimates = localized(
+                seen, estimates or Estimates.nothing(len(seen.positions)), memory.team
+            )
         states, scans = list(memory.states), seen.scans
         if scans is not None:
             each = zip(states, seen.positions, scans.distances, scans.hit, strict=True)
-            maps = self._exchanged([state.known.scanned(*scan) for state, *scan in each], seen)
+            maps = [state.known.scanned(*scan) for state, *scan in each]
+            radii, others = memory.team.radius.tolist(), seen.neighbour_positions
+            maps = [known.visited(others(i), radii[i]) for i, known in enumerate(maps)]
+            maps = self._exchanged(maps, seen)
             states = [replace(state, known=known) for state, known in zip(states, maps, strict=True)]
         routes, legs = list(memory.routes), memory.legs.copy()
         for i, state in enumerate(states):
@@ -187,8 +198,12 @@ class Atlas(Law):
                     routes[i], legs[i] = ways.route(seen.positions[i], goal), 0
             elif state.planned is None:
                 routes[i] = seen.positions[i : i + 1]
-        returns = last_returns(seen, memory.returns)
-        return self._driven(seen, AtlasMemory(memory.team, tuple(states), tuple(routes), legs, returns))
+        team, returns = memory.team, last_returns(seen, memory.returns)
+        drive = self.k_prop, self.response_time
+        near = seen if estimates is None or seen.reported_positions is None else wary(seen, estimates)
+        forces, goals, legs = follow_routes(near, team, routes, legs, returns, *drive)
+        after = AtlasMemory(team, tuple(states), tuple(routes), legs, returns, estimates)
+        return Decision(forces, goals, {"attraction": forces}, memory=after)
 
     def _exchanged(self, maps: list[DiscoveredMap], seen: Observations) -> list[DiscoveredMap]:
         """Return the maps after the robots have told each other of theirs, which they do not here."""
@@ -214,26 +229,27 @@ class Atlas(Law):
         period = max(self.period, spacing / fastest)
         first = state.planned is None
         due = seen.time + period * (1.0 + ((i + 1) * _GOLDEN) % 1.0 if first else 1.0)
-        # a team that has changed may have much to do again
-        changed = first or met != state.met
-        since = seen.time if changed else state.since
-        before = state
-        state = replace(state, due=due, others=known, met=met, since=since, quiet=quiet)
+        before, walked = state, state.walked
+        if state.situation is not None:
+            walked += math.dist(place, state.situation[0])
+        state = replace(state, due=due, others=known, met=met, walked=walked, quiet=quiet)
+        # a team, or walls, that have changed: there may be much to do again
+        walls = 0 if state.planned is None else state.known.walls_changed(state.planned)
+        if first or met != before.met or walls * raster.cell > _WALLS * float(team.radius[i]):
+            state = replace(state, since=seen.time, walked=0.0, looked=0.0, former=())
         situation, group = np.vstack([place, at]), np.concatenate([[i], others])
         same = before.idle and before.planned is before.known and before.quiet == quiet
         if same and before.group is not None and np.array_equal(before.group, group):
             assert before.situation is not None
             if np.abs(situation - before.situation).max() < _HARDLY * spacing:
-                return state, None
+                return replace(state, walked=before.walked), None
         state = replace(state, planned=state.known, situation=situation, group=group)
-        blocked = window.cut(state.known.blocked, True)
-        ways = state.ways
-        if ways is None or not np.array_equal(ways.blocked, blocked):
-            ways = GridPlanner(raster, window, blocked, float(team.radius[i]) + self.clearance)
-            state = replace(state, ways=ways, team_ways=None)
+        ways = state.ways or GridPlanner(state.known, window, float(team.radius[i]) + self.clearance)
+        ways = ways.updated(state.known, window)
+        state = replace(state, ways=ways)
         demand = CoverageDemand(state.known, window, seen.density)
-        settling = 2.0 ** min((seen.time - since) / self.settling, 60.0)
-        together = seen.time - since <= _TOGETHER * seen.region.diameter / fastest
+        settling = 2.0 ** min(state.walked / (self.settling * seen.region.diameter), 60.0)
+        together = seen.time - state.since <= _TOGETHER * seen.region.diameter / fastest
         # afterwards each decides for itself alone
         still = still if together else np.ones_like(still)
         state, places = self._plan_for_all(state, seen, still, settling, together)
@@ -243,7 +259,8 @@ class Atlas(Law):
             return replace(state, own=place, idle=False), place
         former = np.full(2, np.nan) if state.own is None else state.own
         own = own_place(ways, demand.weights, at, begin, former, min(1.0, self.rest * settling))
-        return self._looking(replace(state, own=own.goal, node=own.node), demand, own, place, period)
+        state = replace(state, own=own.goal, node=own.node)
+        return self._looking(state, demand, own, place, state.walked - before.walked)
 
     def _teammates(
         self, seen: Observations, team: Team, state: PlannerState, i: int
@@ -270,7 +287,7 @@ class Atlas(Law):
         self, state: PlannerState, seen: Observations, still: BoolArray, settling: float, together: bool
     ) -> tuple[PlannerState, Array]:
         """Return the state with a plan for the team, and the places in it, (k, 2) m, the own one first."""
-        known, ways = state.known, state.team_ways
+        known = state.known
         assert state.ways is not None and state.situation is not None and state.group is not None
         group, (now, others) = (
             state.group[:MAX_PLANNING_GROUP],
@@ -281,9 +298,7 @@ class Atlas(Law):
             away = float(np.sqrt(((now - now[0]) ** 2).sum(axis=1).max()))
             reach, most = max(_AROUND * away, _LEAST), GROUP_NODES
         window = Window.around(known.raster, now[0], reach, most)
-        if ways is None or ways.window != window:
-            blocked = window.cut(known.blocked, True)
-            ways = GridPlanner(known.raster, window, blocked, state.ways.clearance)
+        ways = (state.team_ways or state.ways).updated(known, window)
         # who is there already does not leave for what may not be there
         weights = CoverageDemand(known, ways.window, seen.density, sure=not together).weights
         fixed = np.concatenate([[False], still])[: len(now)]
@@ -300,60 +315,24 @@ class Atlas(Law):
         return replace(state, team_ways=ways, places=np.column_stack([group, places])), places
 
     def _looking(
-        self, state: PlannerState, demand: CoverageDemand, own: OwnPlace, place: Array, period: float
+        self, state: PlannerState, demand: CoverageDemand, own: OwnPlace, place: Array, step: float
     ) -> tuple[PlannerState, Array]:
         """Return the state, and where to go: to the own place, or first to what there is to see."""
         ways, former, look = state.ways, state.former, None
-        assert ways is not None
+        assert ways is not None and state.group is not None
         node = ways.standing(place)
         if state.look is not None and math.dist(state.look, place) < _ARRIVED:
             former = (*former, state.look)
         if state.look is None and math.dist(own.goal, place) > _ARRIVED:
             return replace(state, idle=False), own.goal
-        if node >= 0 and self.stake < 1.0:
-            least = self.stake * own.cost * 2.0 ** min(state.looked / self.patience, 60.0)
+        looked = state.looked + max(step, 0.0) * (state.look is not None)
+        # the place of who is alone hardly depends on what it has not seen
+        if node >= 0 and self.stake < 1.0 and len(state.group) > 1:
+            far = self.patience * demand.known.raster.region.diameter
+            least = self.stake * own.cost * 2.0 ** min(looked / far, 60.0)
             look = demand.viewpoint(own.mine, ways.distances(node), ways.tight, least, former)
-        looked = state.looked + period * (look is not None)
         state = replace(state, look=look, former=former, looked=looked, idle=look is None)
         return state, own.goal if look is None else look
-
-    def _driven(self, seen: Observations, memory: AtlasMemory) -> Decision:
-        """Return the forces towards the way-points, kept off walls and other robots."""
-        team, positions, routes = memory.team, seen.positions, memory.routes
-        aim = np.array([route[leg] for route, leg in zip(routes, memory.legs, strict=True)])
-        last = np.array([len(route) - 1 for route in routes])
-        legs = memory.legs + ((memory.legs < last) & (np.hypot(*(aim - positions).T) < _TURN))
-        aim = np.array([route[leg] for route, leg in zip(routes, legs, strict=True)])
-        # what is behind a corner comes into sight late: in a narrow place nothing is far
-        braking = _BRAKING * team.max_acceleration
-        gap = np.maximum(np.hypot(*(positions - seen.obstacle_points).T) - team.radius, 0.0)
-        speed = np.fmin(team.max_speed, np.sqrt(2.0 * braking * gap) + _CREEP)
-        wanted = approach(aim - positions, math.inf, speed)
-        wanted = np.where((legs == last)[:, None], approach(aim - positions, self.k_prop, speed), wanted)
-        # who turns would else spend on that the acceleration that is needed for braking
-        change = _FOR_TURNING * team.max_acceleration * self.response_time
-        wanted = seen.velocities + approach(wanted - seen.velocities, 1.0, change)
-        # of the size of others a robot knows its own
-        apart = 2.0 * team.radius + _APART
-        wanted = wanted + _aside(wanted, neighbour_offsets(seen, _HEEDED), apart, braking)
-        keep, points = team.radius + _MARGIN, with_nearest(seen, memory.returns)
-        wanted = avoid(wanted, seen, team, points, keep, apart, _EAGERNESS, _BRAKING)
-        forces = drive(wanted, seen, team, self.response_time)
-        goals = np.array([route[-1] for route in routes])
-        return Decision(forces, goals, {"attraction": forces}, memory=replace(memory, legs=legs))
-
-
-def _aside(wanted: Array, others: Array, apart: Array, braking: Array) -> Array:
-    """Return velocities (n, 2) m/s to the left of whom each robot approaches the most too fast."""
-    if not others.shape[1]:
-        return np.zeros_like(wanted)
-    distance = np.hypot(*np.moveaxis(others, -1, 0))
-    away = others / np.maximum(distance, 1e-9)[..., None]
-    allowed = np.sqrt(0.5 * braking[:, None] * np.maximum(distance - apart[:, None], 0.0))
-    excess = np.nan_to_num(-(away * wanted[:, None]).sum(axis=2) - allowed, nan=-np.inf)
-    worst = np.arange(len(wanted)), excess.argmax(axis=1)
-    left = np.nan_to_num(away[worst])[:, ::-1] * [1.0, -1.0]
-    return np.asarray(left * np.clip(excess[worst], 0.0, _ASIDE)[:, None])
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,15 @@
 """The controller interface: a law for the whole team, or one called for each robot in turn."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias, get_args, runtime_checkable
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, ClassVar, Literal, Protocol, Self, TypeAlias, get_args, runtime_checkable
 
 import numpy as np
 
 from robocov.arrays import Array
 from robocov.controllers.gains import choice, validate_gains
 from robocov.environment import Environment
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, shown, unknown_name
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -18,7 +18,7 @@ from robocov.voronoi.delaunay import Mesh
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 
 Information: TypeAlias = Literal["own", "shared map", "whole map"]
-"""What a law goes by: what the robot itself senses and hears, maps that neighbours tell each other as
+"""Information class of a law: what the robot itself senses and hears, maps that neighbours tell each other as
 well, or the whole map from the beginning."""
 
 
@@ -97,6 +97,14 @@ class Law:
     information: ClassVar[Information] = "own"
     memory: ClassVar[type[Memory]] = Memory
 
+    def __new__(cls, *_: Any, **gains: Any) -> Self:
+        """Return it; a ParameterError on a gain that it has not, with the nearest name."""
+        known = [each.name for each in fields(cls) if each.init] if is_dataclass(cls) else gains
+        for name in gains:
+            if name not in known:
+                raise ParameterError(f"{cls.name}: {unknown_name('gain', name, known)}")
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         validate_gains(self)
 
@@ -123,7 +131,7 @@ def cells_seen(seen: Observations, measure: str, warm: Mesh | None) -> VoronoiPa
     return partition(seen.positions, *known)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class OwnView:
     """All that one robot knows: what it senses and hears, and the convex outer boundary."""
 
@@ -135,6 +143,9 @@ class OwnView:
     region: Region
     time: float  # s
     _cells: VoronoiPartition
+    heading: float | None = None  # rad from +x, of a unicycle; None in a team of points
+    memory: Any = None
+    """Memory of the robot: what the law's ``begin`` returned, or what it assigned here in the last step."""
 
     @property
     def centroid(self) -> Array:
@@ -149,10 +160,28 @@ class OwnView:
 
 @runtime_checkable
 class IndividualController(Protocol):
-    """A law for one robot: one method from what it knows to the force that it wants."""
+    """A law for one robot: one method from what it knows to the force that it wants.
+
+    Optional is ``begin(number, team)``: it returns what the robot of that number, from 0, remembers at the
+    start. The law finds it in ``own.memory``, and may assign there what is to be remembered next.
+    """
 
     def force(self, own: OwnView) -> Sequence[float] | Array:
         """Return the force in newtons, two numbers."""
+
+
+def for_team(law: Any) -> Any:
+    """Return a law for one robot as a controller for the team, and any other as it is."""
+    one = isinstance(law, IndividualController) and not isinstance(law, type) and not hasattr(law, "decide")
+    return Individually(law) if one else law
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memories:
+    """Memories of the robots of an individual law."""
+
+    own: Sequence[Any]
+    triangulation: Mesh | None = None  # from which the next cells start
 
 
 class Individually:
@@ -174,22 +203,29 @@ class Individually:
         self.label = str(getattr(law, "label", self.name))
         self.summary = str(getattr(law, "summary", (kind.__doc__ or "").strip().split("\n")[0]))
 
-    def begin(self, region: Region, team: Team) -> None:
-        """Nothing is remembered yet; later, the triangulation from which the next cells start."""
+    def begin(self, region: Region, team: Team) -> "Memories":
+        """Return what each robot remembers at the start, by the law's own ``begin`` if it has one."""
+        begin = getattr(self.law, "begin", None)
+        return Memories([None if begin is None else begin(i, team) for i in range(len(team))])
 
-    def decide(self, seen: Observations, memory: Mesh | None) -> Decision:
-        """Ask the law for each robot's force."""
-        known = seen.region, seen.neighbours, memory, seen.reported_positions, seen.density
+    def decide(self, seen: Observations, memory: "Memories | None") -> Decision:
+        """Ask the law for each robot's force; without memory for the first time."""
+        memory = memory or Memories([None] * len(seen.positions))
+        known = seen.region, seen.neighbours, memory.triangulation, seen.reported_positions, seen.density
         cells = partition(seen.positions, *known)
-        forces = np.empty_like(seen.positions)
+        forces, memories = np.empty_like(seen.positions), []
         for i in range(len(forces)):
             place, velocity = seen.positions[i].copy(), seen.velocities[i].copy()
             point = None if np.isnan(seen.obstacle_points[i, 0]) else seen.obstacle_points[i].copy()
             heard = seen.neighbour_positions(i)
-            own = OwnView(i, place, velocity, heard, point, seen.region, seen.time, cells)
+            heading = None if seen.steering is None else float(seen.steering[i, 0])
+            known_now = i, place, velocity, heard, point, seen.region, seen.time, cells
+            own = OwnView(*known_now, heading=heading, memory=memory.own[i])
             force = np.asarray(self.law.force(own), dtype=float)
             if force.shape != (2,):
                 told = f"gave {shown(force.tolist())}, but two numbers in newtons were wanted"
                 raise ParameterError(f"controller {self.name!r}: force(own) {told}")
             forces[i] = force
-        return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=cells.triangulation)
+            memories.append(own.memory)
+        memory = Memories(memories, cells.triangulation)
+        return Decision(forces=forces, goals=cells.centroid, cells=cells, memory=memory)

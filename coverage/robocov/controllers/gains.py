@@ -9,7 +9,7 @@ from robocov.controllers.user_modules import fault_of
 from robocov.errors import ParameterError, RobocovError, is_number, shown, unknown_name
 
 Value: TypeAlias = float | str | None
-"""What a gain may be: a number, None for no limit, or one of the words of an `Option`."""
+"""Value of a gain: a number, None for no limit, or one of the words of an `Option`."""
 
 
 def value_text(value: Value, *, digits: int = 6, none: str = "none") -> str:

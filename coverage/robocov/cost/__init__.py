@@ -16,8 +16,8 @@ from robocov.arrays import Array, BoolArray, IntArray, beginnings, frozen, weigh
 from robocov.cost.site_paths import GROUP, TILE, CornerViews, CostMap, Tiles, Work, corner_views, site_paths
 from robocov.density.base import means_over_squares
 from robocov.drawing import Drawable
-from robocov.environment import Environment, PolygonObstacle
-from robocov.errors import InputError, ParameterError, checked, counted, shown
+from robocov.environment import Environment, PolygonObstacle, require_environment
+from robocov.errors import InputError, ParameterError, checked, counted, numeric, shown
 from robocov.geodesic import BINS, Geodesics
 from robocov.geodesic.visibility import AngularWallIndex
 from robocov.geodesic.walls import along_z_curve, box_tree
@@ -149,7 +149,7 @@ class CoverageCost:
     """The coverage cost (22) of one environment on a lattice of sites.
 
     The region's bounding box is widened to a square, anchored at its lower left corner, and cut into
-    ``lattice``² square cells; the cell centres in the open free space are the sites. Distances are
+    ``lattice²`` square cells; the cell centres in the open free space are the sites. Distances are
     exact; only the mean over the sites is an approximation of the integral. Where the environment has a
     density φ, each site is weighed by the exact mean of φ over its cell.
 
@@ -189,6 +189,7 @@ class CoverageCost:
         progress: Callable[[float], None] | None = None,
         geodesics: Geodesics | None = None,
     ) -> None:
+        require_environment(environment)
         self.lattice = int(checked("lattice", lattice, 1, MAX_LATTICE, whole=True))
         self.environment = environment
         beat = None if progress is None else partial(progress, 0.0)
@@ -226,8 +227,8 @@ class CoverageCost:
         in seconds. Raises InputError when there is no robot, or one is outside the free space, or speeds are
         not positive numbers, one for each robot; the message names it.
         """
-        positions = np.array(positions, dtype=float)
-        if not len(positions):
+        positions = numeric("positions", positions, "[x, y] of each robot in metres", InputError)
+        if not positions.size:
             raise InputError("positions: none, but at least one robot was wanted")
         places, holds = self.geodesics.place(positions)
         if speeds is None:

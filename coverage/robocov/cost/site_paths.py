@@ -66,7 +66,7 @@ class Work(NamedTuple):
     """The search from n robots: room for it, and in the end the shortest ways."""
 
     sight: AngularWallIndex
-    """What each robot sees."""
+    """Visible walls of each robot."""
     lists: IntArray
     """(3, n) Robots: all of them, those near a group of tiles, those near a tile."""
     queue: IntArray

@@ -14,13 +14,13 @@ from robocov.compiled import kernel
 from robocov.errors import ParameterError, shown
 
 REGION = -1
-"""What lies beyond an edge of a cell that is a piece of the region's boundary."""
+"""Neighbour of an edge of a cell that is a piece of the region's boundary."""
 
 HEAVIEST = 1e6
 """Largest value that a weight may have."""
 
 _NOTHING = 1e-9
-"""What counts as no density at all, as a part of the highest."""
+"""Density that counts as zero, as a part of the highest."""
 
 _AT_ONCE = 1 << 16
 """Squares that are looked at at once, which bounds the memory."""
@@ -108,7 +108,7 @@ class Density(ABC):
 
     @abstractmethod
     def moments(self, edges: CellEdges, origins: Array) -> Array:
-        """Return the integrals of φ, φ (q - o) and φ |q - o|² over n cells with origins o, (n, 4).
+        """Return the integrals of φ, φ (q - o) and ``φ |q - o|²`` over n cells with origins o, (n, 4).
 
         The cells are any closed polygons, holes clockwise, their edges relative to the origins, (n, 2) m;
         for Voronoi cells these are the generators.

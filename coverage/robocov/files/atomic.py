@@ -11,7 +11,7 @@ from pathlib import Path
 from robocov.errors import OutputError, reason, shown
 
 _KINDS = {"d": "a folder", "p": "a named pipe", "s": "a socket", "c": "a device", "b": "a device"}
-"""What is no regular file, by the first character of its mode."""
+"""Kinds of files that are no regular ones, by the first character of the mode."""
 _LONGEST_SUFFIX = 16
 """Characters; what is longer is no suffix that a writer goes by."""
 

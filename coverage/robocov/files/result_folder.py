@@ -22,7 +22,7 @@ from robocov.files.atomic import locked, on_disk, written
 Kind: TypeAlias = Literal["run", "comparison", "replay", "story"]
 REPORT = "report.html"
 """A page about the result, which goes with it."""
-_MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
+MANIFEST, _JOURNAL = ".robocov.json", ".robocov-commit.json"
 _STAGING, _LOCK = ".robocov-new", ".robocov.lock"
 _HEAD = {"format": "robocov-folder", "version": 1}
 _PICTURES = ("trajectories.png", "trajectories.svg", "cost.png", "cost.svg")
@@ -33,7 +33,7 @@ _FILES: dict[Kind, tuple[str, ...]] = {
     "story": ("story.json", "session.robocov", "cost.csv", "run.mp4", "comparison.mp4"),
 }
 """Files of a result of each kind, beside ``frames/`` and the folders of a comparison's runs."""
-_NAMES = {_MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
+_NAMES = {MANIFEST, "metrics.csv", REPORT, *(name for names in _FILES.values() for name in names)}
 _FRAME = re.compile(r"\d{6}\.png")
 _BEGINNINGS = {
     **{f"{kind}.json": re.compile(rf'"format":\s*"robocov-{kind}"'.encode()) for kind in _FILES},
@@ -195,7 +195,7 @@ def _carry_out(folder: Path) -> None:
         with suppress(OSError):
             (folder / parent).rmdir()  # fails, as it should, where there is something in it
     _discard_staging(folder)
-    (folder / _JOURNAL).replace(folder / _MANIFEST)
+    (folder / _JOURNAL).replace(folder / MANIFEST)
 
 
 @contextmanager
@@ -220,7 +220,7 @@ def _discard_staging(folder: Path) -> None:
 
 def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
     """Return the files of the result that is to be replaced, None where the folder is empty."""
-    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING, _MANIFEST}:
+    if not {path.name for path in folder.iterdir()} - {_LOCK, _STAGING, MANIFEST}:
         return None
     if not overwrite:
         raise InputError(f"{folder}: the folder is not empty; another --out, or --overwrite, was wanted")
@@ -234,7 +234,7 @@ def _replaceable(folder: Path, *, overwrite: bool) -> set[str] | None:
     return owned
 
 
-def _home(folder: Path, name: str = _MANIFEST) -> tuple[Path, str]:
+def _home(folder: Path, name: str = MANIFEST) -> tuple[Path, str]:
     """Return the folder whose manifest (or journal) names files in this one, and the way from there."""
     if not os.path.lexists(folder / name):
         real = Path(os.path.realpath(folder))  # which takes links that go round in circles
@@ -251,15 +251,15 @@ def _owned(folder: Path) -> set[str] | None:
     Without a manifest that can be read, as in a copy without hidden files, those that have the names of ours.
     """
     with suppress(InputError):  # one that is damaged still says whose folder it is
-        if manifest := _listing(folder / _MANIFEST):
+        if manifest := _listing(folder / MANIFEST):
             return manifest[0]
     kind = next((kind for kind in _FILES if _is_ours(folder / f"{kind}.json", f"{kind}.json")), None)
-    if kind is None and not os.path.lexists(folder / _MANIFEST):
+    if kind is None and not os.path.lexists(folder / MANIFEST):
         return None
     names = {name for name in _FILES[kind or "run"] if _is_file(folder / name)}
     names |= {name for name in ("metrics.csv", REPORT) if _is_ours(folder / name, name)}
     for part in _parts(folder) if kind == "comparison" else ():
-        inner = (*(_owned(part) or ()), _MANIFEST)
+        inner = (*(_owned(part) or ()), MANIFEST)
         names |= {f"{part.name}/{name}" for name in inner if _is_file(part / name)}
     return names | _frames(folder)
 

@@ -59,7 +59,7 @@ class Request:
 
     @property
     def step(self) -> float:
-        """What coordinates are rounded to, m."""
+        """Rounding step of coordinates, m."""
         return 10.0**-self.digits
 
     def rounded(self, points: Array) -> Array:

@@ -148,17 +148,26 @@ def _corner_distances(
 
 @inner_kernel
 def _shortest(
-    walls: Walls, index: AngularWallIndex, reach: Array, points: Array, last: Array, table: Array
-) -> None:
-    """Write the distances of sources and (m, 2) points, (n, m), by those to corners, (n, k) and (m, k)."""
-    for i in range(len(reach)):
-        for j in range(len(points)):
+    walls: Walls, index: AngularWallIndex, reach: Array, points: Array, last: Array, near: IntArray,
+    table: Array,
+) -> None:  # fmt: skip
+    """Write the distances of sources and (m, 2) points, (n, m), by those to corners, (n, k) and (m, k).
+
+    There is room for k numbers in `near`.
+    """
+    for j in range(len(points)):
+        count = 0
+        for k in range(len(near)):
+            if last[j, k] < np.inf:
+                near[count] = k
+                count += 1
+        for i in range(len(reach)):
             best = np.inf
             if sees(walls, index, i, points[j, 0], points[j, 1]):
                 dx, dy = points[j, 0] - index.sources[i, 0], points[j, 1] - index.sources[i, 1]
                 best = np.sqrt(dx * dx + dy * dy)
-            for k in range(reach.shape[1]):
-                best = min(best, reach[i, k] + last[j, k])
+            for k in range(count):
+                best = min(best, reach[i, near[k]] + last[j, near[k]])
             table[i, j] = best
 
 
@@ -281,13 +290,18 @@ class Geodesics:
         """Return the geodesic distances from (n, 2) to (m, 2) points, (n, m) m, inf where no way leads."""
         begins, _ = self.place(sources, "sources")
         ends, _ = self.place(targets, "targets")
+        return self.between(begins, ends) * self.grid.unit
+
+    def between(self, begins: Array, ends: Array) -> Array:
+        """Return the same of free places in grid coordinates, in grid steps."""
         index, reach, _ = self._to_corners(begins, bends=True)
         table = np.empty((len(begins), len(ends)))
         for k in range(0, len(ends), _TARGETS):
             some = ends[k : k + _TARGETS]
             part = np.empty((len(begins), len(some)))
-            _shortest(self.walls, index, reach, some, self._to_corners(some, bends=False)[1], part)
-            table[:, k : k + _TARGETS] = part * self.grid.unit
+            last = self._to_corners(some, bends=False)[1]
+            _shortest(self.walls, index, reach, some, last, np.empty(last.shape[1], np.int64), part)
+            table[:, k : k + _TARGETS] = part
         return table
 
     def path(self, source: Array, target: Array) -> Array:
@@ -295,7 +309,7 @@ class Geodesics:
         ends, _ = self.place(np.stack([source, target]), "ends of the path")
         index, reach, ways = self._to_corners(ends[:1], bends=True)
         last, shortest = self._to_corners(ends[1:], bends=False)[1], np.empty((1, 1))
-        _shortest(self.walls, index, reach, ends[1:], last, shortest)
+        _shortest(self.walls, index, reach, ends[1:], last, np.empty(last.shape[1], np.int64), shortest)
         if np.isinf(shortest[0, 0]):
             return np.empty((0, 2))
         total = reach[0] + last[0]

@@ -5,6 +5,7 @@ import json
 import math
 import re
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -13,7 +14,17 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.density import FINEST, Density, Raster
 from robocov.environment import Environment, Ring
-from robocov.errors import InputError, MapError, Mistake, one_line, reason, shown_json, unknown_name
+from robocov.errors import (
+    InputError,
+    MapError,
+    Mistake,
+    ParameterError,
+    one_line,
+    reason,
+    shown,
+    shown_json,
+    unknown_name,
+)
 from robocov.files.atomic import written
 from robocov.files.strictjson import located, parse, read_bytes, require_json
 from robocov.mapfile.check import check_rules
@@ -46,6 +57,8 @@ def load_map(source: str | Path) -> Environment:
 
 def map_file(source: str | Path) -> Path:
     """Return the file of the map of `load_map`, which may be missing; raise MapError for unknown names."""
+    if not isinstance(source, str | PathLike):
+        raise ParameterError(f"map: {shown(source)}, but a path, or the name of a bundled map, was wanted")
     if not isinstance(source, str) or any(char in source for char in "./\\\0"):
         return Path(source)
     known = bundled_maps()

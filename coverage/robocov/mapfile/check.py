@@ -36,7 +36,7 @@ _SAME_PLACE = 1e-6
 MANY_VERTICES = 5000
 """Of a map with more vertices it is said that it takes time."""
 _COST_SECONDS = 6.1e-8
-"""What `robocov.cost.CoverageCost` takes to begin, by the square of the vertices, as measured."""
+"""Seconds that `robocov.cost.CoverageCost` takes to begin, by the square of the vertices, as measured."""
 
 
 def check_rules(environment: Environment, where: str) -> None:

@@ -117,7 +117,7 @@ _DENSITY = {"kind": "gaussians", "floor": 0.2, "peaks": [_HOT_SPOT]}
 
 
 class _Key(NamedTuple):
-    """What stands at a key, and what messages say is wanted there, in its items, in their items, ..."""
+    """Expected value of a key, with the words of messages for it, for its items, for their items, ..."""
 
     type: Any
     description: str

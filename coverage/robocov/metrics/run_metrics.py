@@ -50,10 +50,10 @@ class RunMetrics:
     visible_area: Array
     """and in line of sight of a robot at any distance (an art gallery's guards)."""
     work: Array
-    """J, the integral of |F v| over the time so far, summed over the robots. F is the force that the
+    """J, the integral of ``|F v|`` over the time so far, summed over the robots. F is the force that the
     controller asked for, before any limit."""
     effort: Array
-    """N² s, the same of |F|²."""
+    """N² s, the same of ``|F|²``."""
     path_length: Array
     """m so far, mean over the robots."""
     components: IntArray

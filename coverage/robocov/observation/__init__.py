@@ -112,6 +112,9 @@ class Observations:
     """φ, how much each place counts: part of the task, known to all."""
     scans: Scans | None = None
     """A ray scan of each robot, in the steps in which the controller wants one."""
+    steering: Array | None = None
+    """(n, 2) rad from +x and rad/s, heading and turning rate of unicycles: a robot knows its own. None in a
+    team of points."""
 
     def neighbour_positions(self, robot: int) -> Array:
         """Return where a robot knows its neighbours to be, (k, 2) m, in the order of ``neighbours.of``."""
@@ -151,7 +154,7 @@ class Decision:
     cells: Cells | None = None
     """Those that the law used."""
     memory: Any = None
-    """What the robots remember; it is handed back at the next decision."""
+    """Memory of the robots; it is handed back at the next decision."""
 
 
 @dataclass(slots=True, eq=False)
@@ -185,6 +188,11 @@ class Snapshot:
         """Velocities, (n, 2) m/s."""
         return self.seen.velocities
 
+    @property
+    def steering(self) -> Array | None:
+        """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points."""
+        return self.seen.steering
+
 
 @dataclass(eq=False)
 class Cells(ABC):
@@ -199,7 +207,7 @@ class Cells(ABC):
     density: Density | None = None
     """φ of mass, centroid and moments; None for 1."""
     triangulation: NDArray[np.int32] | None = None
-    """What the next partition of slowly moving generators may start from, as its `warm`, if there is one."""
+    """Warm start of the next partition of slowly moving generators, as its `warm`, if there is one."""
 
     @property
     @abstractmethod

@@ -1,9 +1,10 @@
 """Occupancy grid of one robot, filled by its own range scans.
 
-A cell is *unknown* until a ray has passed it (then it is *free*) or ended in it (then it is a *wall*). The
-ends of neighbouring rays that are closer together than `BRIDGE` belong to one surface: what lies between
-them is *presumed* to be wall, until a ray passes there. Ways may lead through unknown cells; how much these
-count is said by their `openness`.
+A cell is *unknown* until a ray has passed it, or a robot was there (then it is *free*), or a ray has ended in
+it (then it is a *wall*, until rays have passed it several times and none has ended there). The ends of
+neighbouring rays that are closer together than `BRIDGE` belong to one surface: what lies between them is
+*presumed* to be wall, until a ray passes there. Ways may lead through unknown cells; how much these count is
+said by their `openness`.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from robocov.compiled import inlined_kernel, kernel
 from robocov.observation import headings
 from robocov.observation.region import Region
 
-UNKNOWN, FREE, PRESUMED, WALL = 0, 1, 2, 3
-"""What is known of a cell, the more the higher."""
+UNKNOWN, FREE, PRESUMED, WALL, SURE = 0, 1, 2, 3, 6
+"""Evidence of a cell, the more the higher; from `WALL` to `SURE` it is one, the surer the higher."""
 
 BRIDGE = 0.5  # no wider, m, than the passages that a robot should find; doors seen from afar would be closed
 _STRIDE = 0.7  # a ray is looked at after every so many cells
@@ -103,15 +104,46 @@ class DiscoveredMap:
         _enter_scan(state, grid, position, headings(len(distances)), far, hit)
         return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
 
+    def visited(self, places: Array, radius: float) -> DiscoveredMap:
+        """Return the map after robots of a radius, m, were at (k, 2) m: they fit there, so it is free."""
+        state = self.state.copy()
+        _enter_visits(state, np.array([*self.raster.origin, self.raster.cell]), places, radius)
+        return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
+
+    def walls_changed(self, before: DiscoveredMap) -> int:
+        """Return how many cells of walls have gone, or appeared in the open, since an earlier map."""
+        return (
+            0
+            if before is self
+            else _walls_gone(before.state, self.state) + _walls_gone(self.state, before.state)
+        )
+
     def merged(self, others: Iterable[DiscoveredMap]) -> DiscoveredMap:
-        """Return the map with what others know as well; the same one where they know nothing more."""
+        """Return the map with what others know of unseen cells; the same one where that is nothing."""
         state = self.state
         for other in others:
-            # a presumption does not stand against who has looked
-            theirs = np.where((other.state == PRESUMED) & (state == FREE), FREE, other.state)
-            mine = np.where((state == PRESUMED) & (other.state == FREE), FREE, state)
-            state = np.maximum(mine, theirs)
+            # who has looked knows better than who presumes, and each knows best what it has seen itself
+            unseen = (state == UNKNOWN) | ((state == PRESUMED) & (other.state != UNKNOWN))
+            state = np.where(unseen, other.state, state)
         return self if np.array_equal(state, self.state) else DiscoveredMap(self.raster, state)
+
+
+@kernel
+def _walls_gone(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> int:
+    """Return how many cells were walls before that are free now, with none but free cells around them.
+
+    At the border of walls a cell is now free and now a wall, as it is looked at from here or there.
+    """
+    count, (rows, columns) = 0, before.shape
+    for r in range(1, rows - 1):
+        for c in range(1, columns - 1):
+            if before[r, c] >= WALL and after[r, c] == FREE:
+                open_around = True
+                for i in range(r - 1, r + 2):
+                    for j in range(c - 1, c + 2):
+                        open_around = open_around and after[i, j] == FREE
+                count += open_around
+    return count
 
 
 @inlined_kernel
@@ -133,6 +165,8 @@ def _enter_scan(
             r, c = _cell_of(y, low_y, side, rows), _cell_of(x, low_x, side, columns)
             if state[r, c] == UNKNOWN:
                 state[r, c] = FREE
+            elif state[r, c] >= WALL:
+                state[r, c] = FREE if state[r, c] == WALL else state[r, c] - 1
             elif state[r, c] == PRESUMED:
                 off_x, off_y = (x - low_x) / side - c - 0.5, (y - low_y) / side - r - 0.5
                 if max(abs(off_x), abs(off_y)) < _CORE:
@@ -153,10 +187,30 @@ def _enter_scan(
                 r, c = _cell_of(y, low_y, side, rows), _cell_of(x, low_x, side, columns)
                 if state[r, c] == UNKNOWN:
                     state[r, c] = PRESUMED
+                elif state[r, c] >= WALL:
+                    state[r, c] = SURE
     for k in range(len(distances)):
         if hit[k]:
             r, c = _cell_of(ends[k, 1], low_y, side, rows), _cell_of(ends[k, 0], low_x, side, columns)
-            state[r, c] = WALL
+            state[r, c] = SURE
+
+
+@kernel
+def _enter_visits(state: NDArray[np.uint8], grid: Array, places: Array, radius: float) -> None:
+    """Enter as free all cells, but for walls, whose middle is within a radius of one of the places."""
+    low_x, low_y, side = grid
+    rows, columns = state.shape
+    for x, y in places:
+        first, last = _cell_of(y - radius, low_y, side, rows), _cell_of(y + radius, low_y, side, rows)
+        for r in range(first, last + 1):
+            left, right = (
+                _cell_of(x - radius, low_x, side, columns),
+                _cell_of(x + radius, low_x, side, columns),
+            )
+            for c in range(left, right + 1):
+                off_x, off_y = low_x + (c + 0.5) * side - x, low_y + (r + 0.5) * side - y
+                if state[r, c] < WALL and off_x * off_x + off_y * off_y <= radius * radius:
+                    state[r, c] = FREE
 
 
 def dilate(blocked: BoolArray, reach: float) -> BoolArray:

@@ -21,13 +21,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from robocov.arrays import Array, BoolArray, IntArray
 from robocov.compiled import kernel
-from robocov.planning.discovered import Raster, dilate
+from robocov.planning.discovered import UNKNOWN, DiscoveredMap, Raster, dilate
 
 Cell = TypeVar("Cell", bound=np.generic)
 
 _MOVES = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (1, -2), (2, 1), (2, -1))
 """Rows and columns of half the directions; the others are their opposites."""
 
+_DETOUR = 0.4  # part by which ways through what nobody has seen are longer, as walls turn up there
 _NEAREST = 12  # so many nodes are tried for the first, and the last, of a route
 _MOST_SOURCES = 180  # a plan for a team chooses among at most so many nodes
 _FINE = 0.5  # a straight line is looked at after every so many cells
@@ -84,28 +85,43 @@ def _stepped(middle: int, half: int, most: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False)
 class GridPlanner:
-    """Distances and routes among the blocked cells of a window."""
+    """Distances and routes in a window of a discovered map, around its walls."""
 
-    raster: Raster
+    known: DiscoveredMap
     window: Window
-    blocked: BoolArray  # (h, w), the window's cells that are walls
     clearance: float  # how far ways keep from walls, but for the last step to a node, m
-    _known: dict[int, Array] = field(default_factory=dict)
+    _tables: dict[int, Array] = field(default_factory=dict)
+
+    def updated(self, known: DiscoveredMap, window: Window) -> GridPlanner:
+        """Return the planner for a later map and window; the same one where it makes no difference."""
+        later = GridPlanner(known, window, self.clearance)
+        same = self.window == window and np.array_equal(self.blocked, later.blocked)
+        return self if same and np.array_equal(self.unknown, later.unknown) else later
+
+    @cached_property
+    def blocked(self) -> BoolArray:
+        """The window's cells that are walls, (h, w)."""
+        return self.window.cut(self.known.blocked, True)
+
+    @cached_property
+    def unknown(self) -> BoolArray:
+        """The window's cells that the robot has not seen, (h, w)."""
+        return np.asarray(self.window.cut(self.known.state, np.uint8(UNKNOWN)) == UNKNOWN)
 
     @property
     def spacing(self) -> float:
         """Between nodes, m."""
-        return self.window.stride * self.raster.cell
+        return self.window.stride * self.known.raster.cell
 
     @cached_property
     def nodes(self) -> Array:
         """Places of the nodes, (m, 2) m, row by row."""
-        return self.window.nodes(self.raster)
+        return self.window.nodes(self.known.raster)
 
     @cached_property
     def tight(self) -> BoolArray:
         """The cells that are too close to walls, (h, w)."""
-        return dilate(self.blocked, self.clearance / self.raster.cell)
+        return dilate(self.blocked, self.clearance / self.known.raster.cell)
 
     @cached_property
     def roomy(self) -> BoolArray:
@@ -115,7 +131,7 @@ class GridPlanner:
 
     @cached_property
     def _graph(self) -> csr_array:
-        """The graph of the nodes, its edges as long as they are.
+        """The graph of the nodes, its edges as long as they are; those that nobody has seen count as longer.
 
         Nodes in tight cells are the ends of ways and nothing more: no way leads on from there, be it through
         a hole in a wall that has not been seen as a whole.
@@ -127,27 +143,30 @@ class GridPlanner:
         for down, right in _MOVES:
             # nodes from which the move stays in the window, and all cells that it crosses
             high, wide, low = max(0, rows - down), max(0, columns - abs(right)), max(0, -right)
-            met = np.zeros((high, wide), dtype=np.uint8)
-            for row, column in _crossed(down, right, stride):
+            met, unseen = np.zeros((high, wide), dtype=np.uint8), np.zeros((high, wide))
+            crossed = _crossed(down, right, stride)
+            for row, column in crossed:
                 top, left = stride // 2 + row, stride // 2 + low * stride + column
-                met |= cells[top : top + high * stride : stride, left : left + wide * stride : stride]
+                part = slice(top, top + high * stride, stride), slice(left, left + wide * stride, stride)
+                met |= cells[part]
+                unseen += self.unknown[part]
+            longer = (1.0 + _DETOUR / len(crossed) * unseen).ravel()
             end = number[:high, low : low + wide].ravel()
             other = end + down * columns + right
             way, no_wall = (met & 1 == 0).ravel(), (met & 2 == 0).ravel()
             for one, two in ((end, other), (other, end)):
                 some = way | (no_wall & self.roomy[one] & ~self.roomy[two])
-                length = math.hypot(down, right) * self.spacing
-                edges.append((one[some], two[some], np.full(np.count_nonzero(some), length)))
+                edges.append((one[some], two[some], math.hypot(down, right) * self.spacing * longer[some]))
         begins, ends, lengths = (np.concatenate(part) for part in zip(*edges, strict=True))
         return csr_array((lengths, (begins, ends)), shape=(number.size, number.size))
 
     @cached_property
     def _frame(self) -> tuple[float, float, float, int, int, int, int]:
         """Lower left corner and side of the raster's cells, m; first and last row and column here."""
-        (rows, columns), (high, wide) = self.raster.shape, self.blocked.shape
+        (rows, columns), (high, wide) = self.known.raster.shape, self.blocked.shape
         row, column = self.window[:2]
         last = min(row + high, rows) - 1, min(column + wide, columns) - 1
-        return (*self.raster.origin, self.raster.cell, row, column, *last)
+        return (*self.known.raster.origin, self.known.raster.cell, row, column, *last)
 
     @cached_property
     def sources(self) -> IntArray:
@@ -166,14 +185,14 @@ class GridPlanner:
 
     def distances(self, node: int) -> Array:
         """Return the distances from a node to all nodes, (m,) m, infinite where there is no way."""
-        if node not in self._known:
-            self._known[node] = self.table(np.array([node]))[0]
-        return self._known[node]
+        if node not in self._tables:
+            self._tables[node] = self.table(np.array([node]))[0]
+        return self._tables[node]
 
     def near(self, nodes: Sequence[int], limit: float) -> list[Array]:
         """Return the same for some nodes, infinite beyond a limit, m; it is quicker the lower this is."""
         return [
-            self._known[node] if node in self._known else self._ways([node], [0.0], limit) for node in nodes
+            self._tables[node] if node in self._tables else self._ways([node], [0.0], limit) for node in nodes
         ]
 
     def table(self, nodes: IntArray) -> Array:

@@ -54,8 +54,8 @@ _SERIES = np.array([2.0 * comb(2 * m, m) / 4.0**m / (2 * m + 3) for m in range(1
 """Of (x - sin x cos x - 2/3 sin³ x) / sin⁵ x by powers of sin² x, the highest first."""
 
 _SAGITTA, _FINE = 2e-4, 2e-5
-"""How far outlines, and the polygons that stand for cells in integrals, may leave their arcs, relative to the
-region's diameter."""
+"""Largest deviation of outlines, and of the polygons that stand for cells in integrals, from their arcs,
+relative to the region's diameter."""
 
 _NOTHING = 1e-14
 """Area of a cell, relative to the region's, that is rounding."""

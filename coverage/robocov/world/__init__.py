@@ -25,7 +25,7 @@ from typing import TypeAlias
 import numpy as np
 import pymunk
 
-from robocov.arrays import Array, BoolArray, IntArray
+from robocov.arrays import Array, BoolArray, IntArray, frozen
 from robocov.conditions import Conditions
 from robocov.environment import Environment
 from robocov.errors import ParameterError, StartError
@@ -34,6 +34,7 @@ from robocov.robots import Team
 from robocov.world.engine import Engine, State, addresses_of, enter, free_substep, leave, response, substeps
 from robocov.world.relocation import nearest_free
 from robocov.world.solid import Mover, movers, solid_pieces
+from robocov.world.steering import gripped, steered
 
 LONGEST_SUBSTEP = 0.02  # s
 MAX_MASS_RATIO = 1000.0
@@ -65,6 +66,8 @@ class World:
     """Centres of the robots, (n, 2) m; read-only."""
     velocities: Array
     """(n, 2) m/s; read-only."""
+    steering: Array | None
+    """Heading and turning rate of unicycles, (n, 2) rad and rad/s; None in a team of points. Read-only."""
 
     def __init__(
         self,
@@ -73,6 +76,7 @@ class World:
         positions: Array,
         velocities: Array | None = None,
         *,
+        steering: Array | None = None,
         movers: tuple[Mover, ...] = (),
         failed_robots: Array | None = None,
         runs: int = 1,
@@ -88,6 +92,8 @@ class World:
         state = np.zeros((2, len(team), 2))
         state[0], state[1] = positions, 0.0 if velocities is None else velocities
         self._set_state(state)
+        self.steering = initial_steering(team, self.velocities, steering)
+        self._rolls, self._body = team.turns, np.column_stack([team.track_width, team.turning_rate])
         self._fast = velocities is not None
         """Whether a robot may be faster than it can be by itself."""
         self._moving = motion(movers, 0.0, 1.0)
@@ -102,6 +108,10 @@ class World:
         state = np.array([self.positions, self.velocities])
         state[0, rows], state[1, rows] = positions, 0.0
         self._set_state(state, [run])
+        if self.steering is not None:
+            steering = self.steering.copy()
+            steering[rows] = 0.0
+            self.steering = frozen(steering)
 
     def copy(self) -> World:
         """Return an independent world in the same state, which goes on identically."""
@@ -180,6 +190,14 @@ class World:
             answer = np.column_stack([answer[:, :4], limit])
         if len(external):
             limit = np.maximum(limit, self._speeds() + push * dt)
+        rolls, steering = self._rolls, self.steering
+        if steering is not None:
+            if len(external):
+                rolls = rolls & ~external.any(axis=1)
+            # who is carried keeps its heading
+            steering = steering * np.column_stack([np.ones(len(rolls)), rolls])
+            states = forces, self.velocities, steering, answer, self._body, rolls
+            forces, steering, answer = steered(*states, dt)
         engine.robots[:] = forces.reshape(self._runs, -1, 2)
         engine.forget_contacts()
         state = free_substep(engine.buffers, answer, external, dt)
@@ -188,6 +206,11 @@ class World:
             touching.setdefault(row // self._each, []).append(row)
         for run, rows in touching.items():
             self._resolve_contacts(run, np.array(rows), state, dt, limit)
+        if steering is not None:
+            self.steering = frozen(steering)
+            if touching:
+                room = limit - 0.5 * self.team.track_width * np.abs(steering[:, 1])
+                gripped(state[1], steering, room, rolls)
         self._set_state(state, touching)
         if unusual:
             self._fast = bool((self._speeds() > self.team.max_speed).any())
@@ -237,12 +260,14 @@ class ChangingWorld:
         positions: Array,
         velocities: Array | None = None,
         *,
+        steering: Array | None = None,
         time: float = 0.0,
     ) -> None:
         self._conditions, self._environment, self.team = conditions, environment, team
         self._pieces, self._movers = solid_pieces(environment), movers(environment)
         self.positions = np.array(positions, dtype=float)
         self.velocities = np.zeros_like(self.positions) if velocities is None else np.array(velocities)
+        self.steering = initial_steering(team, self.velocities, steering)
         self.working = conditions.working(time, len(team))
         self._failed = conditions.failed(time, len(team))
         for join in conditions.joins:
@@ -271,6 +296,9 @@ class ChangingWorld:
             external = None if external_forces is None else external_forces[rows]
             self._world.step(forces[rows], dt, external, time=time)
             self.positions[rows], self.velocities[rows] = self._world.positions, self._world.velocities
+            if self.steering is not None and self._world.steering is not None:
+                self.steering = self.steering.copy()
+                self.steering[rows] = self._world.steering
         working = self._conditions.working(time_after, len(self.team))
         failed = self._conditions.failed(time_after, len(self.team))
         if (working != self.working).any() or (failed != self._failed).any():
@@ -280,6 +308,8 @@ class ChangingWorld:
                 there[robot] = True
             self.working = working
             self.velocities[~working] = 0.0
+            if self.steering is not None:
+                self.steering = self.steering * np.column_stack([np.ones(len(working)), working])
             self._begin()
         self._protect()
 
@@ -302,11 +332,14 @@ class ChangingWorld:
         self._world: World | None = None
         if len(rows):
             state = self.team[rows], self.positions[rows], self.velocities[rows]
-            self._world = World(self._pieces, *state, movers=self._movers, failed_robots=self.failed_robots)
+            steering = None if self.steering is None else self.steering[rows]
+            movers, failed = self._movers, self.failed_robots
+            self._world = World(self._pieces, *state, steering=steering, movers=movers, failed_robots=failed)
 
     def _protect(self) -> None:
-        for array in (self.positions, self.velocities, self.working):
-            array.setflags(write=False)
+        for array in (self.positions, self.velocities, self.working, self.steering):
+            if array is not None:
+                array.setflags(write=False)
 
 
 class ContactSolver:
@@ -380,8 +413,18 @@ def obstacle_space(obstacles: Obstacles) -> pymunk.Space:
     return space
 
 
+def initial_steering(team: Team, velocities: Array, steering: Array | None) -> Array | None:
+    """Return heading and turning rate of a team, by default as it moves; None where nobody turns."""
+    if not team.turns.any():
+        return None
+    if steering is None:
+        # math's, which is the same on every processor
+        steering = np.array([(math.atan2(y, x), 0.0) for x, y in velocities.tolist()])
+    return frozen(steering)
+
+
 def robot_body(mass: float, radius: float) -> Robot:
-    """Return a frictionless disc that does not turn."""
+    """Return a frictionless disc; that of a unicycle turns in `World.steering`: no contact depends on it."""
     body = pymunk.Body(mass, math.inf)
     disc = pymunk.Circle(body, radius)
     disc.filter = _NO_WALL

@@ -178,7 +178,8 @@ def made(kind: type) -> Controller:
     return controller
 
 
-PLANNING = ("atlas", "atlas-shared")
+SHARING = ("atlas-shared", "frontier-median", "greedy-submodular", "voronoi-graph")
+PLANNING = ("atlas", *SHARING)
 """Controllers that take long to decide: one example is enough."""
 
 LIGHT = tuple(kind for kind in CONTROLLERS.values() if kind.name not in PLANNING)
@@ -238,10 +239,11 @@ def test_what_was_heard_matters(kind: type) -> None:
         for told in (heard, nearer)
     ]
     assert not np.array_equal(forces[0][0], forces[1][0])
-    if kind.name != "atlas-shared":
+    if kind.name not in SHARING:
         assert forces[0][1:].tobytes() == forces[1][1:].tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANNING)
 def test_those_that_plan_go_by_what_they_heard_too(name: str) -> None:
     kind, team = CONTROLLERS[name], Team.homogeneous(4)

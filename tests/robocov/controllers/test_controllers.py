@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from robocov.controllers import (
     CONTROLLERS,
     FLAGSHIP,
+    Adaptive,
+    Boosting,
     Controller,
     Individually,
     Lloyd,
@@ -52,16 +54,27 @@ class Homing:
 
 
 ROOM = Environment("room", tuple((x, y) for x, y in REGION.vertices.tolist()))
-COARSE = {"geodesic-lloyd": {"lattice": 8.0}}
-LARGEST = {"atlas": 12, "atlas-shared": 12}
+SHARING = ("frontier-median", "greedy-submodular", "voronoi-graph")
+COARSE = {
+    "geodesic-lloyd": {"lattice": 8.0},
+    "diffeomorphism": {"lattice": 8.0},
+    "adaptive": {"basis": 3.0},
+    **{name: {"nodes": 100.0, "period": 0.4} for name in SHARING},
+}
+LARGEST = {"atlas": 12, "atlas-shared": 12, **dict.fromkeys(SHARING, 3)}
 """Teams of laws that plan are small here: above their `MAX_PLANNING_GROUP` all robots are treated alike."""
 ALL = [
     *(informed(kind(**COARSE.get(name, {})), ROOM) for name, kind in CONTROLLERS.items()),
+    Adaptive(estimate="gp"),
+    *(Boosting(boost=word) for word in ("p", "neighbours")),
     *(Rapf(target=word, height=0.5) for word in ("sensing", "median")),
     Lloyd(target="median"),
     *(Rapf(cells="time", target=word) for word in ("centroid", "median")),
     Lloyd(cells="time"),
     Individually(Homing()),
+]
+EACH = [
+    pytest.param(each, id=each.name, marks=[pytest.mark.slow] if each.name in LARGEST else []) for each in ALL
 ]
 
 
@@ -92,7 +105,7 @@ def row(decision: Decision, i: int) -> list[np.ndarray]:
     return [part[i].copy() for part in parts]
 
 
-@pytest.mark.parametrize("controller", ALL, ids=lambda each: each.name)
+@pytest.mark.parametrize("controller", EACH)
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32), n=st.integers(2, 60), reach=st.floats(0.5, 6.0))
 def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: int, reach: float) -> None:
@@ -107,14 +120,10 @@ def test_a_robot_uses_only_what_it_knows(controller: Controller, seed: int, n: i
     for step in range(3):
         seen = observations(positions, reach, seed + step)
         seen = replace(seen, time=step * 0.2, scans=scans(controller, n, rng))
-        changed = with_others_changed(seen, i, reach, rng)
-        if information_of(controller) == "shared map" and changed.scans is not None:
-            told = connected(seen.neighbours, i)[:, None]
-            assert seen.scans is not None
-            distances = np.where(told, seen.scans.distances, changed.scans.distances)
-            changed = replace(
-                changed, scans=Scans(distances, np.where(told, seen.scans.hit, changed.scans.hit))
-            )
+        telling = np.arange(n) == i
+        if information_of(controller) == "shared map":
+            telling = connected(seen.neighbours, i)
+        changed = with_others_changed(seen, i, telling, reach, rng)
         decisions = controller.decide(seen, one), controller.decide(changed, other)
         for before, after in zip(row(decisions[0], i), row(decisions[1], i), strict=True):
             assert before.tobytes() == after.tobytes()
@@ -136,17 +145,18 @@ def connected(neighbours: Neighbours, i: int) -> np.ndarray:
     return reached
 
 
-def with_others_changed(seen: Observations, i: int, reach: float, rng: np.random.Generator) -> Observations:
-    """Return what is seen with all that robot i does not know changed."""
+def with_others_changed(
+    seen: Observations, i: int, telling: np.ndarray, reach: float, rng: np.random.Generator
+) -> Observations:
+    """Return what is seen with all changed that robot i does not know, and nobody who is `telling` it."""
     n, positions = len(seen.positions), seen.positions
-    others = np.arange(n) != i
-    heard = np.zeros(n, dtype=bool)
+    others, heard = ~telling, telling.copy()
     heard[seen.neighbours.of(i)] = True
     moved = positions.copy()
     strangers = np.flatnonzero(others & ~heard)
     for k in strangers:
         place = rng.uniform((0, -1), (12, 10))
-        if REGION.contains(place) and np.hypot(*(place - positions[i])) > reach:
+        if REGION.contains(place) and np.hypot(*(place - positions[telling]).T).min() > reach:
             moved[k] = place
     velocities = np.where(others[:, None], rng.normal(size=(n, 2)), seen.velocities)
     points = np.where(others[:, None], moved + rng.normal(size=(n, 2)), seen.obstacle_points)
@@ -170,7 +180,7 @@ def with_others_changed(seen: Observations, i: int, reach: float, rng: np.random
     return replace(changed, scans=Scans(distances, seen.scans.hit ^ others[:, None]))
 
 
-@pytest.mark.parametrize("controller", ALL, ids=lambda each: each.name)
+@pytest.mark.parametrize("controller", EACH)
 def test_the_information_test_can_fail(controller: Controller) -> None:
     """What a robot does know changes its decision: the property above is not empty."""
     positions = np.array([[4.0, 4.0], [5.0, 4.5], [8.0, 6.0]])
@@ -182,6 +192,7 @@ def test_the_information_test_can_fail(controller: Controller) -> None:
         "geodesic-lloyd": [1.2, 0.6],
         "atlas": [-2.5, -3.0],
         "atlas-shared": [-2.5, -3.0],
+        **{name: [-0.85, -0.45] for name in SHARING},
     }
     step = steps.get(controller.name, [0.6, 0.3])
     moved = observations(positions + [[0, 0], step, [0, 0]], np.inf, 1)
@@ -231,7 +242,7 @@ def test_repulsion_equals_a_plain_double_loop() -> None:
         np.testing.assert_allclose(forces[i], expected, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("controller", ALL, ids=lambda each: each.name)
+@pytest.mark.parametrize("controller", EACH)
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
 def test_coincident_robots_get_finite_forces(controller: Controller, n: int) -> None:
     positions = np.tile([5.0, 4.0], (n, 1))
@@ -288,6 +299,7 @@ def test_gains_are_validated_by_name_and_range() -> None:
         Gain("k", 1.0, "", 0.0, math.inf, "").validated(math.inf, "mine")
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(sorted(CONTROLLERS)),
     st.dictionaries(

@@ -83,6 +83,7 @@ def test_neighbour_offsets_by_all_distances() -> None:
         np.testing.assert_array_equal(away[i][~np.isnan(away[i, :, 0])], near)
 
 
+@pytest.mark.slow
 def test_robots_leave_each_others_reach_and_rest() -> None:
     """The claim: local dispersion alone spreads the team until nobody is near anybody."""
     starts = 30.0 + 0.3 * np.mgrid[-1:2, -1:2].reshape(2, -1).T

@@ -59,6 +59,7 @@ def test_a_step_to_the_goals_does_not_raise_the_cost(seed: int, kind: str, expon
     assert np.prod(1.0 + np.array(raised)) < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rooms", "trap", "museum"])
 def test_it_ends_below_its_start_and_below_lloyd(name: str) -> None:
     environment = load_map(name)
@@ -149,7 +150,8 @@ def test_what_each_law_goes_by() -> None:
     stated = {name: information_of(kind) for name, kind in CONTROLLERS.items()}
     assert stated["geodesic-lloyd"] == "whole map"
     own = {"rapf", "rpf", "lloyd", "howard", "poduri", "dispersion", "range-limited", "tangentbug", "barrier"}
-    assert {stated[name] for name in own} == {"own"}
+    assert {stated[name] for name in (*own, "visibility", "boosting")} == {"own"}
+    assert (stated["diffeomorphism"], stated["adaptive"]) == ("whole map", "shared map")
     for kind in CONTROLLERS.values():
         assert (information_of(kind) == "whole map") == hasattr(kind, "informed")
 

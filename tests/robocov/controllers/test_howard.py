@@ -92,6 +92,7 @@ def test_friction_takes_the_place_of_the_worlds_viscosity() -> None:
     assert simulation.velocities[0, 0] == pytest.approx(0.9 * np.exp(-0.5 * 2.0), rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_team_spreads_and_loses_its_energy() -> None:
     """The claim of the paper: the network spreads from one place, and comes to rest."""
     simulation = Simulation(SQUARE, Howard(), [[4.8, 5.0], [5.2, 5.0], [5.0, 5.4], [5.1, 4.6]])

@@ -42,6 +42,7 @@ def test_it_gets_out_of_a_u_trap() -> None:
     assert np.hypot(*(lloyd - middle)) > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reach", "detour"), [(1.0, 8.0), (2.0, 4.0), (8.0, 4.0)])
 def test_it_goes_round_with_any_sensor_that_sees_the_wall(reach: float, detour: float) -> None:
     """One that sees little follows the wall for longer."""
@@ -76,6 +77,7 @@ def test_in_a_convex_room_it_is_lloyd() -> None:
     np.testing.assert_allclose(bug, lloyd, atol=0.1)
 
 
+@pytest.mark.slow
 def test_the_team_covers_more_than_lloyds_does() -> None:
     """The claim of the paper, on the map that traps Lloyd's robots."""
     trap = load_map("trap")

@@ -165,6 +165,7 @@ def test_medium_maps_agree_with_the_brute_force(name):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * cost.geodesics.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lattice", "robots"), [(32, 1000), (128, 1), (256, 300), (512, 50)])
 def test_lattices_and_teams_of_every_size(lattice, robots):
     environment = drawn_map("polygons", 40, 5)

@@ -17,6 +17,7 @@ NUMBERS = st.integers(-40, 40).map(lambda k: k / 10)
 POINTS = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=4, unique=True).map(tuple)
 
 
+@pytest.mark.slow
 @given(POINTS, st.sampled_from(["loop", "back-and-forth"]))
 def test_it_is_where_the_obstacle_comes_by(points, repeat) -> None:
     path = ObstaclePath(points, 0.5, repeat)

@@ -86,6 +86,7 @@ def test_walls_are_of_one_thickness_and_corridors_of_one_width(seed: int) -> Non
     assert sum(len(wall.points) for wall in environment.obstacles) < 3 * count + 10  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_there_are_dead_ends_and_ways_round() -> None:
     for seed in range(20):
         environment = generated_map(seed, kind="mazes")

@@ -47,6 +47,7 @@ def samples(ring: np.ndarray, fine: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(points), np.repeat(areas, len(s)) / len(s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f", [Distance(), Sensing(0.5), Sensing(5.0)], ids=repr)
 @pytest.mark.parametrize("name", ["pentagon", "triangle"])
 def test_nothing_better_is_found_by_brute_force(f: Performance, name: str) -> None:

@@ -20,6 +20,7 @@ SQUARE = Region(np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]))
 FUNCTIONS = {"median": Distance(), "low": Sensing(0.3), "high": Sensing(3.0)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f", FUNCTIONS.values(), ids=FUNCTIONS)
 @pytest.mark.parametrize(
     ("density", "within"),

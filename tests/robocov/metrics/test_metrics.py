@@ -100,6 +100,7 @@ def test_contacts_are_counted_when_they_begin(record: Record) -> None:
     assert contacts(made, gap) == 4 + 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robots", [1, 2, 7, 130])
 def test_meetings_are_those_that_are_seen_pair_by_pair(record: Record, robots: int) -> None:
     """Of few robots all pairs are looked at at once, of many only the close ones."""

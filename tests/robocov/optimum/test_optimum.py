@@ -79,6 +79,7 @@ def test_no_pair_of_sites_is_better_than_two_robots(where):
     assert best.mean_distance >= of_all - cost.spacing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 3])
 def test_no_descent_of_another_kind_ends_below(count):
     cost = CoverageCost(TRAP, 24)
@@ -120,6 +121,7 @@ def lloyds(cost, positions):
         reached = after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rooms", "museum", "blocks-a", "trap"])
 def test_it_never_ends_above_its_seeds_nor_above_lloyds_iteration_from_them(name):
     where, lattice, restarts = load_map(name), 16, 6

@@ -23,7 +23,7 @@ def known(*walls: tuple[slice, slice]) -> DiscoveredMap:
 
 
 def ways(on: DiscoveredMap) -> GridPlanner:
-    return GridPlanner(RASTER, WINDOW, WINDOW.cut(on.blocked, True), 0.15)
+    return GridPlanner(on, WINDOW, 0.15)
 
 
 HALVES = (slice(0, 28), slice(39, 41))

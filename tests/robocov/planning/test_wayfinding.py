@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.observation.region import Region
-from robocov.planning.discovered import Raster, dilate
+from robocov.planning.discovered import FREE, UNKNOWN, WALL, DiscoveredMap, Raster, dilate
 from robocov.planning.wayfinding import GridPlanner, Window
 
 REGION = Region(np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]]))
@@ -18,7 +18,8 @@ RASTER = Raster(REGION, 0.1)
 
 def ways(blocked: np.ndarray, clearance: float = 0.15, most: int = 150) -> GridPlanner:
     window = Window.around(RASTER, np.array([3.0, 2.0]), math.inf, most)
-    return GridPlanner(RASTER, window, window.cut(blocked, True), clearance)
+    state = np.where(blocked, WALL, FREE).astype(np.uint8)
+    return GridPlanner(DiscoveredMap(RASTER, state), window, clearance)
 
 
 def walled(door: slice = slice(30, 37)) -> np.ndarray:
@@ -157,3 +158,21 @@ def test_a_window_may_jut_out_of_the_raster() -> None:
 def test_who_stands_in_a_wall_finds_a_way_out(place: list[float]) -> None:
     route = ways(walled(), most=600).route(np.array(place), np.array([5.0, 1.0]))
     assert np.isfinite(route).all()
+
+
+def test_ways_through_what_nobody_has_seen_are_longer() -> None:
+    state = np.full(RASTER.shape, FREE, dtype=np.uint8)
+    window = Window.around(RASTER, np.array([3.0, 2.0]), math.inf, 150)
+    seen = GridPlanner(DiscoveredMap(RASTER, state), window, 0.15)
+    assert seen.updated(DiscoveredMap(RASTER, state.copy()), window) is seen
+    dark = state.copy()
+    dark[:, 20:40] = UNKNOWN
+    unseen = seen.updated(DiscoveredMap(RASTER, dark), window)
+    node = int(seen.nearest(np.array([0.3, 2.0])))
+    before, after = (each.distances(node) for each in (seen, unseen))
+    there = np.isfinite(before) & (seen.nodes[:, 0] < 1.9)
+    assert np.array_equal(before[there], after[there])
+    across = np.isfinite(before) & (seen.nodes[:, 0] > 4.1)
+    straight = 2.0 / np.maximum(seen.nodes[across, 0] - 0.3, 1e-9)
+    assert (after[across] / before[across] > 1.0 + 0.3 * straight).all()
+    assert (after[across] / before[across] < 1.0 + 0.5 * straight).all()

@@ -494,3 +494,29 @@ def test_it_is_short_in_words(record: Record, empty: Environment) -> None:
     assert repr(record) == "<Record rapf on cluttered, 4 robots, 2.0 s>"
     assert repr(record.at(1.0)) == "<Snapshot at 1.00 s, 4 robots>"
     assert repr(Simulation(empty, Rpf(), [[5.0, 5.0]]).run(0.1)) == "<Record rpf on empty, 1 robot, 0.1 s>"
+
+
+def test_a_record_of_unicycles_holds_their_headings(cluttered: Environment, tmp_path: Path) -> None:
+    team = Team.homogeneous(3, kinematics="unicycle", turning_rate=2.0)
+    made = Simulation(cluttered, Rapf(), cluttered.start().sample(3, seed=2), team).run(1.0)
+    made.save(tmp_path)
+    again = Record.load(tmp_path)
+    assert made.steering is not None and again.steering is not None
+    assert made.steering.tobytes() == again.steering.tobytes() and made.steering[-1].any()
+    assert again.team.track_width.tolist() == team.track_width.tolist() and again.team.turning_rate[0] == 2.0
+    assert (again.snapshot(7).steering == made.steering[7]).all()
+    assert len(again.thinned(5.0).steering) == len(again.thinned(5.0).time) == 6  # type: ignore[arg-type]
+    frame = pytest.importorskip("pandas") and made.to_pandas()
+    assert list(frame)[-2:] == ["heading_rad", "turning_rate_rad_s"]
+    assert frame.heading_rad.iloc[-1] == made.steering[-1, -1, 0]
+    arrays = dict(np.load(tmp_path / "record.npz"))
+    del arrays["steering"]
+    np.savez(tmp_path / "record.npz", **arrays)
+    with pytest.raises(InputError, match="there is no array steering"):
+        Record.load(tmp_path)
+
+
+def test_a_record_of_points_is_as_ever(record: Record, tmp_path: Path) -> None:
+    record.save(tmp_path)
+    assert set(np.load(tmp_path / "record.npz")) == set(ARRAYS)
+    assert not {"track_width_m", "turning_rate_rad_per_s"} & set(record.to_json()["team"])

@@ -41,6 +41,7 @@ def test_small_teams_are_exact(n: int, name: str) -> None:
     assert cells.mass.sum() == pytest.approx(REGIONS[name].area, rel=1e-12)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(seeds, names, families, st.integers(1, 14))
 def test_every_family_is_exact(seed: int, name: str, family: Family, n: int) -> None:

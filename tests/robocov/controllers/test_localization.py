@@ -1,0 +1,135 @@
+"""Estimates under noise and late messages: exact where nothing is wrong, near the truth where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.conditions.perception import Perception
+from robocov.controllers import Atlas
+from robocov.controllers.localization import Estimates, localized, wary
+from robocov.environment import Environment
+from robocov.metrics import clearances, contacts
+from robocov.observation import Observations
+from robocov.observation.neighbours import Neighbours
+from robocov.observation.region import Region
+from robocov.robots import Team
+from robocov.simulation import Simulation
+
+SQUARE = np.array([[-99.0, -99.0], [99.0, -99.0], [99.0, 99.0], [-99.0, 99.0]])
+DT = 0.05
+
+
+def driven(paths: Array, conditions: Conditions) -> tuple[Observations, Estimates, list[Array]]:
+    """Drive robots along (t, n, 2) m; return the last estimates, and the errors of the own ones, (n,) m."""
+    n = paths.shape[1]
+    team = Team.homogeneous(n)
+    perception = Perception(conditions, team, DT)
+    inbox, estimates, errors = perception.begin(), Estimates.nothing(n), []
+    speeds = np.gradient(paths, DT, axis=0)
+    for k, (places, velocities) in enumerate(zip(paths, speeds, strict=True)):
+        walls = places + [1.0, 0.0]
+        truth = Observations(places, velocities, Neighbours(n), walls, Region(SQUARE), k * DT)
+        seen, inbox = perception.known(truth, inbox, np.ones(n, dtype=bool))
+        known, estimates = localized(seen, estimates, team)
+        assert np.allclose(known.obstacle_points - known.positions, [1.0, 0.0])
+        errors.append(np.hypot(*(known.positions - places).T))
+    return known, estimates, errors
+
+
+def lines(n: int, steps: int, seed: int = 0) -> Array:
+    chance = np.random.default_rng(seed)
+    begin, velocities = chance.uniform(-20, 20, (n, 2)), chance.uniform(-0.7, 0.7, (n, 2))
+    return np.asarray(begin + np.arange(steps)[:, None, None] * DT * velocities)
+
+
+@given(st.integers(0, 99), st.sampled_from([0.0, 0.3, 0.5]))
+def test_late_messages_of_who_goes_straight_on_are_made_up_for(seed: int, delay: float) -> None:
+    paths = lines(3, 60, seed)
+    known, _, errors = driven(paths, Conditions(delay=delay, message_rate=4.0))
+    assert max(map(np.max, errors)) < 1e-9
+    assert known.reported_positions is not None
+    _, other = known.neighbours.pairs()
+    assert np.allclose(known.reported_positions, paths[-1][other], atol=1e-9)
+
+
+def test_nobody_is_taken_to_go_on_for_ever() -> None:
+    paths = np.concatenate([lines(2, 40), np.repeat(lines(2, 40)[-1:], 60, axis=0)])
+    known, estimates, _ = driven(paths[:45], Conditions(delay=2.0, message_rate=2.0, forget_after=9.0))
+    robot, other = known.neighbours.pairs()
+    assert known.reported_positions is not None
+    ahead = np.hypot(*(known.reported_positions - estimates.at[robot, other]).T)
+    assert np.allclose(ahead, 1.5 * np.hypot(*estimates.going[robot, other].T))
+
+
+@given(st.integers(0, 30))
+def test_noise_is_averaged_out(seed: int) -> None:
+    paths = lines(4, 120, seed)
+    known, estimates, errors = driven(paths, Conditions(position_noise=0.1, seed=seed))
+    assert np.sqrt(np.mean(np.square(errors[80:]))) < 0.035
+    assert np.all((estimates.variance > 0.06**2) & (estimates.variance < 0.14**2))
+    assert known.reported_positions is not None
+    _, other = known.neighbours.pairs()
+    off = np.hypot(*(known.reported_positions - paths[-1][other]).T)
+    assert np.sqrt(np.mean(off**2)) < 0.08
+
+
+def test_who_is_carried_away_notices_it_at_once() -> None:
+    paths = lines(2, 100)
+    paths[60:] += [3.0, 0.0]
+    conditions = Conditions(position_noise=0.02)
+    team = Team.homogeneous(2)
+    perception, estimates = Perception(conditions, team, DT), Estimates.nothing(2)
+    inbox = perception.begin()
+    for k in range(62):
+        velocities = (paths[1] - paths[0]) / DT
+        truth = Observations(paths[k], velocities, Neighbours(2), paths[k], Region(SQUARE), k * DT)
+        seen, inbox = perception.known(truth, inbox, np.ones(2, dtype=bool))
+        known, estimates = localized(seen, estimates, team)
+    assert np.hypot(*(known.positions - paths[61]).T).max() < 0.1
+
+
+@given(st.integers(0, 20))
+def test_a_robot_knows_nothing_of_what_it_does_not_hear(seed: int) -> None:
+    """The first two and the last two are out of range of each other."""
+    team = Team.homogeneous(4, communication_range=5.0)
+    perception = Perception(Conditions(position_noise=0.1, loss=0.2), team, DT)
+    found = []
+    for far in (50.0, 70.0):
+        estimates, inbox = Estimates.nothing(4), perception.begin()
+        for k, places in enumerate(lines(4, 20, seed) * 0.05 + [[0, 0], [1, 0], [far, 0], [far, 1]]):
+            near = Neighbours.within(places, team.communication_range)
+            truth = Observations(places, places * 0.0, near, places, Region(SQUARE), k * DT)
+            seen, inbox = perception.known(truth, inbox, np.ones(4, dtype=bool))
+            known, estimates = localized(seen, estimates, team)
+        close = wary(known, estimates)
+        assert close.reported_positions is not None
+        rows = close.neighbours.pairs()[0] < 2
+        found.append([known.positions[:2].tobytes(), close.reported_positions[rows].tobytes()])
+    assert found[0] == found[1]
+
+
+def test_others_may_be_nearer_by_the_noise_and_with_time() -> None:
+    known, estimates, _ = driven(lines(3, 60), Conditions(position_noise=0.1, delay=0.5))
+    robot, other = known.neighbours.pairs()
+    close = wary(known, estimates)
+    assert known.reported_positions is not None and close.reported_positions is not None
+    before, after = (
+        np.hypot(*(each.reported_positions - each.positions[robot]).T) for each in (known, close)
+    )
+    doubt = np.sqrt(estimates.variance)[robot] + 0.25 * (known.time - estimates.sent[robot, other])
+    assert np.allclose(before - after, np.minimum(doubt, before / 2.0))
+
+
+@pytest.mark.slow
+def test_atlas_touches_nobody_though_positions_are_noisy() -> None:
+    room = Environment("room", ((0.0, 0.0), (6.0, 0.0), (6.0, 6.0), (0.0, 6.0)), ())
+    starts = [[0.5 + 0.35 * (k % 3), 0.5 + 0.35 * (k // 3)] for k in range(6)]
+    for seed in range(4):
+        conditions = Conditions(position_noise=0.1, seed=seed)
+        record = Simulation(room, Atlas(), starts, conditions=conditions).run(12.0)
+        assert contacts(record, clearances(record)) == 0
