@@ -1,0 +1,203 @@
+"""The frozen suite, version 1: its maps by families, its tracks, and the references of its file.
+
+The file ``suite-v1.json`` holds the SHA-256 of every map, so that a changed generator is noticed, and the
+best placements that were found for it. Robots begin at the first start of a map, drawn by seed.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from robocov.environment import Environment
+from robocov.errors import InputError, ParameterError, unknown_name
+from robocov.generator import GENERATORS, generated_map
+from robocov.mapfile import load_map, to_json
+from robocov_app.benchmark.drawn import KINDS, drawn_map
+from robocov_app.replication.studies import with_hot_spots
+from robocov_app.sweep.study import Study, StudyMap
+
+VERSION = "v1"
+FILE = Path(__file__).parent / f"suite-{VERSION}.json"
+
+LATTICE = 128  # sites along a side for all costs and references
+RADIUS = 0.1  # m, of the robots
+TEAM = 6
+
+_FIRST = 7001  # seed of the first map of a kind; those of tuning begin at 1
+_BUNDLED = (
+    *("blocks-a", "blocks-b", "cave", "corridor", "courtyard", "gaps", "l-shape", "museum", "office"),
+    *("rooms", "trap", "warehouse"),
+)
+_LARGE: dict[str, Any] = {"obstacles": 24, "side": 20.0}  # of the maps for large teams
+_LARGE_KINDS = ("polygons", "blocks", "rooms", "caves")
+
+
+def _numbered(kind: str, count: int, first: int = _FIRST) -> tuple[str, ...]:
+    return tuple(f"{kind}-{seed}" for seed in range(first, first + count))
+
+
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "bundled": _BUNDLED,
+    **{kind: _numbered(kind, 7) for kind in GENERATORS},
+    **{kind: _numbered(kind, 6) for kind in KINDS if kind != "traffic"},
+}
+"""The maps of the ideal track by their families."""
+
+_OTHERS: Mapping[str, tuple[str, ...]] = {
+    "density": tuple(
+        f"dense-{each}" for kind in FAMILIES if kind != "bundled" for each in _numbered(kind, 1)
+    ),
+    "moving": ("forklifts", *_numbered("traffic", 5)),
+    "large": tuple(f"large-{each}" for kind in _LARGE_KINDS for each in _numbered(kind, 2)),
+    "tuning": tuple(name for kind in FAMILIES if kind != "bundled" for name in _numbered(kind, 2, first=1)),
+}
+"""The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
+
+_CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
+
+
+@dataclass(frozen=True)
+class Track:
+    """Differences from the ideal track, where six robots hear each other everywhere."""
+
+    summary: str
+    maps: tuple[str, ...] = _CORE
+    seeds: tuple[int, ...] = (0,)
+    robots: int = TEAM
+    duration: float = 60.0  # s
+    changes: Mapping[str, Any] = field(default_factory=dict)  # of the study
+    failures: tuple[tuple[int, float], ...] = ()  # robot, and when it fails, s
+
+    @property
+    def survivors(self) -> int:
+        """Number of robots that work at the end."""
+        return self.robots - len(self.failures)
+
+
+_FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
+
+TRACKS: Mapping[str, Track] = {
+    "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
+    "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
+    "lossy": Track(
+        "2 messages a second, 0.5 s late, 30 % lost",
+        changes={"conditions": {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}},
+    ),
+    "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
+    "unicycle": Track("robots on two wheels turn before they drive", changes={"kinematics": "unicycle"}),
+    "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
+    "density": Track("two hot spots count 20 times as much", _OTHERS["density"]),
+    "moving": Track("obstacles move", _OTHERS["moving"]),
+    "large-team": Track("24 robots on 20 x 20 m", _OTHERS["large"], robots=24, duration=90.0),
+    "one-robot": Track("one robot", robots=1),
+    "tuning": Track("as ideal, for choosing gains: no result", _OTHERS["tuning"]),
+}
+"""The tracks by their names; `RATED` are those that count."""
+
+RATED = tuple(name for name in TRACKS if name != "tuning")
+QUICK = ("ideal", "short-range")
+"""The tracks of ``--quick``, of which it takes the first map of each family, with the first seed."""
+
+
+def heading(track: str) -> str:
+    """Return the name of a track as a heading.
+
+    >>> heading("short-range")
+    'Short range'
+    """
+    return track.capitalize().replace("-", " ")
+
+
+def family_of(name: str) -> str:
+    """Return the family of a map."""
+    return next(family for family, names in {**FAMILIES, **_OTHERS}.items() if name in names)
+
+
+def every_map() -> tuple[str, ...]:
+    """Return the names of all maps, in the order of the families."""
+    return tuple(name for names in (*FAMILIES.values(), *_OTHERS.values()) for name in names)
+
+
+@cache
+def made_map(name: str) -> Environment:
+    """Return the map of a name as it is made here and now; raises ParameterError for an unknown one."""
+    if name not in every_map():
+        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, every_map())}")
+    kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
+    if name.startswith("dense-"):
+        return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
+    if name.startswith("large-"):
+        return generated_map(int(seed), kind=kind, **_LARGE)
+    if kind in GENERATORS and name not in _BUNDLED:
+        return generated_map(int(seed), kind=kind)
+    return drawn_map(kind, int(seed)) if kind in KINDS else load_map(name)
+
+
+def hash_of(environment: Environment) -> str:
+    """Return the SHA-256 of a map's content."""
+    document = {**to_json(environment), "$schema": None}
+    return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def frozen() -> Mapping[str, Mapping[str, Any]]:
+    """Return what the suite's file says of each map: its ``sha256``, and its ``references`` by team sizes."""
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))["maps"])
+
+
+def suite_map(name: str) -> Environment:
+    """Return a map of the suite; raises InputError where it is not the one that was frozen."""
+    environment = made_map(name)
+    if name not in frozen() or hash_of(environment) != frozen()[name]["sha256"]:
+        raise InputError(
+            f"map {name}: it is not the one of suite {VERSION}: its file or its generator has changed; "
+            f"the map whose hash is in {FILE.name} was wanted"
+        )
+    return environment
+
+
+def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
+    """Return the maps of each track that are wanted, by default all; raises ParameterError."""
+    for name in tracks:
+        if name not in TRACKS:
+            raise ParameterError(f"--track: {unknown_name('track', name, TRACKS)}")
+    for name in maps:
+        made_map(name)
+    found = {}
+    for name in tracks or (QUICK if quick else RATED):
+        own = TRACKS[name].maps
+        if quick and not maps:
+            own = tuple({family_of(each): each for each in reversed(own)}[family_of(each)] for each in own)
+        found[name] = tuple(each for each in dict.fromkeys(own) if not maps or each in maps)
+    if not any(found.values()):
+        raise ParameterError(f"--maps: {', '.join(maps)}, but a map of {', '.join(found)} was wanted")
+    return {name: own for name, own in found.items() if own}
+
+
+def study_of(
+    name: str, maps: Sequence[StudyMap], controller: str, seeds: Sequence[int], folder: Path, **more: Any
+) -> Study:
+    """Return the runs of one controller on a track."""
+    track = TRACKS[name]
+    changes = dict(track.changes)
+    if track.failures:
+        words = " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)
+        changes["conditions"] = {"fail": words}
+    given: dict[str, Any] = {
+        "robots": (track.robots,),
+        "duration": track.duration,
+        "seeds": seeds,
+        "radius": RADIUS,
+    }
+    kept: dict[str, Any] = {
+        "lattice": LATTICE,
+        "cost_hz": 2.0,
+        "record_hz": 0.0,
+        "metrics": True,
+        "folder": folder,
+    }
+    return Study(tuple(maps), (controller,), **given, **kept, **changes, **more)

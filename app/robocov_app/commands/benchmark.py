@@ -1,0 +1,211 @@
+"""`robocov benchmark`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from robocov.errors import InputError, ParameterError, checked, counted
+from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.arguments import parsed_gains
+from robocov_app.terminal.interruption import INTERRUPTED, Interruption
+from robocov_app.terminal.output import BOLD, RIGHT, print_table
+
+FAILED = 1
+_USED = {  # the options that each action has beside --json
+    "run": ("controller", "set", "track", "maps", "quick", "out", "workers", "scheduler"),
+    "suite": (),
+    "verify": ("paths", "controller", "sample", "seed", "workers"),
+    "page": ("paths", "alone", "out", "title"),
+    "references": ("out", "workers"),
+}
+
+
+@dataclass
+class Arguments(JsonOption):
+    """Rate a controller on frozen maps, tracks, starts and seeds, by gaps to the best placements known.
+
+    `robocov benchmark --controller NAME --out DIR` does all runs, and goes on where it was whatever ends it;
+    DIR/result.json is small, and `robocov benchmark verify DIR` does a sample of its runs again, bit for bit.
+    `robocov benchmark page DIR ... --out FILE.html` compares them with the built-in controllers, whose
+    results the package holds; without DIR these alone. `suite` lists tracks and families; `references` makes
+    the best placements that the suite's file lacks. The controller `oracle` knows them.
+
+    Example: robocov benchmark --controller mine.py:Mine --quick --out mine
+    """
+
+    action: Annotated[
+        tyro.conf.Positional[Literal["run", "suite", "verify", "page", "references"]],
+        tyro.conf.arg(metavar="ACTION"),
+    ] = "run"
+    """run, suite, verify, page or references."""
+    paths: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[DIR ...]")] = ()
+    """Results, for verify and page."""
+    controller: str | None = None
+    """Name of a controller, or FILE.py:CLASS, or oracle; with verify only for one in a file."""
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="GAIN=VALUE ...")] = ()
+    """Gains that are not at their defaults."""
+    track: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TRACK ...")] = ()
+    """Only these tracks."""
+    maps: Annotated[tuple[str, ...], tyro.conf.arg(metavar="MAP ...")] = ()
+    """Only these maps."""
+    quick: bool = False
+    """Two tracks, with the first map of each family and one seed."""
+    out: Path | None = None
+    """Folder for the runs and their result, by default benchmark; or the page; or another references file."""
+    workers: int | None = None
+    """Processes on this machine; by default one a processor."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, whose workers do the runs."""
+    sample: int = 5
+    """How many runs are done again."""
+    seed: int = 0
+    """Another seed, another sample."""
+    alone: bool = False
+    """The page leaves out the built-in controllers."""
+    title: str = "Benchmark of coverage controllers"
+    """Of the page."""
+
+    def __post_init__(self) -> None:
+        if self.workers is not None:
+            checked("--workers", self.workers, 1, 1024, whole=True)
+        checked("--sample", self.sample, 0, 1_000_000, whole=True)
+        checked("--seed", self.seed, 0, 2**63 - 1, whole=True)
+        for names in _USED.values():
+            for name in names:
+                default = type(self).__dataclass_fields__[name].default
+                if getattr(self, name) != default and name not in _USED[self.action]:
+                    option = "DIR" if name == "paths" else f"--{name}"
+                    raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
+        if self.action == "run" and self.controller is None:
+            raise ParameterError("--controller: none, but the name of one, or FILE.py:CLASS, was wanted")
+        if (self.action == "verify" and len(self.paths) != 1) or (
+            self.action == "page" and self.alone and not self.paths
+        ):
+            many = "one result" if self.action == "verify" else "results"
+            told = f"{counted(len(self.paths), 'path')}, but {many} of a benchmark was wanted"
+            raise ParameterError(f"DIR: {told}")
+
+
+def command(options: Arguments) -> int:
+    """Do what is wanted."""
+    actions = {"run": _run, "suite": _suite, "verify": _verify, "page": _page, "references": _references}
+    return actions[options.action](options)
+
+
+def _run(options: Arguments) -> int:
+    from robocov_app.benchmark.running import RESULT, Contender, Selection, run_benchmark
+
+    assert options.controller is not None
+    contender = Contender(options.controller, parsed_gains(options.set))
+    selection, out = Selection(options.quick, options.track, options.maps), options.out or Path("benchmark")
+    where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
+    with Interruption() as stop:
+        result = run_benchmark(contender, selection, out, stop=stop, quiet=options.json, **where)
+    if result is None:
+        print(
+            json.dumps({"out": str(out), "interrupted": True})
+            if options.json
+            else "stopped; the same command goes on"
+        )
+        return INTERRUPTED
+    failed = sum("error" in row for row in result["rows"])
+    if options.json:
+        print(json.dumps({"out": str(out), "runs": len(result["rows"]), "failed": failed}))
+    else:
+        from robocov_app.benchmark.ratings import summary_rows
+
+        head, rows = summary_rows(result)
+        print_table([(name, RIGHT if k else BOLD) for k, name in enumerate(head)], rows)
+        print(f"{counted(len(result['rows']), 'run')}, {failed} failed; written to {out / RESULT}")
+    return FAILED if failed else 0
+
+
+def _suite(options: Arguments) -> int:
+    from robocov_app.benchmark import suite
+
+    if options.json:
+        tracks = {name: {"maps": track.maps, "seeds": track.seeds} for name, track in suite.TRACKS.items()}
+        print(json.dumps({"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK}))
+        return 0
+    rows = [
+        (
+            name,
+            str(len(track.maps)),
+            str(len(track.maps) * len(track.seeds)),
+            str(track.robots),
+            track.summary,
+        )
+        for name, track in suite.TRACKS.items()
+    ]
+    columns: list[tuple[str, Any]] = [
+        ("Track", BOLD),
+        ("Maps", RIGHT),
+        ("Runs", RIGHT),
+        ("Robots", RIGHT),
+        ("", {}),
+    ]
+    print_table(columns, rows, title=f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK)}")
+    print()
+    print_table(
+        [("Family", BOLD), ("Maps", {})], [(name, ", ".join(own)) for name, own in suite.FAMILIES.items()]
+    )
+    return 0
+
+
+def _verify(options: Arguments) -> int:
+    from robocov_app.benchmark.running import verify
+    from robocov_app.sweep.executors import processors
+
+    how: dict[str, Any] = {"sample": options.sample, "seed": options.seed, "quiet": options.json}
+    with Interruption() as stop:
+        workers = options.workers or processors()
+        count, found = verify(
+            options.paths[0], controller=options.controller, workers=workers, stop=stop, **how
+        )
+        if stop.requested:
+            return INTERRUPTED
+    if options.json:
+        print(json.dumps({"path": str(options.paths[0]), "runs": count, "differences": found}))
+    else:
+        print(*found, sep="\n", end="\n" if found else "")
+        verdict = f"{counted(len(found), 'difference')}" if found else "all alike, bit for bit"
+        print(f"{counted(count, 'run')} done again: {verdict}")
+    return FAILED if found else 0
+
+
+def _page(options: Arguments) -> int:
+    from robocov.files.atomic import written
+    from robocov_app.benchmark.page import page_of
+    from robocov_app.benchmark.running import bundled_results, read_result
+    from robocov_app.commands.report import check_target
+
+    target = options.out or Path("benchmark.html")
+    check_target(target, overwrite=False)
+    results = [read_result(path) for path in options.paths]
+    results += [] if options.alone else bundled_results(results)
+    data = page_of(results, options.title).encode("utf-8", "replace")
+    with written(target) as part:
+        part.write_bytes(data)
+    answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
+    print(json.dumps(answer) if options.json else f"written to {target} ({len(data) / 1e6:.2f} MB)")
+    return 0
+
+
+def _references(options: Arguments) -> int:
+    from robocov_app.benchmark import suite
+    from robocov_app.benchmark.references import make_references
+    from robocov_app.sweep.executors import processors
+
+    target, workers = options.out or suite.FILE, options.workers or processors()
+    if target.is_dir():
+        raise InputError(f"--out: {target}: a folder, but a file for the references was wanted")
+    with Interruption() as stop:
+        held, left = make_references(target, workers=workers, quiet=options.json, stop=stop)
+    answer = {"path": str(target), "references_and_bounds": held, "left": left}
+    print(json.dumps(answer) if options.json else f"{target}: {held} references and bounds, {left} left")
+    return INTERRUPTED if left else 0

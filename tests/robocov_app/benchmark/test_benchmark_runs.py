@@ -1,0 +1,346 @@
+"""The benchmark end to end: runs, result, verification, page; what is forged is found."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import re
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from called import COMMAND, answer, complaint
+from driven_browser import CHROMIUM, DRIVER, Browser
+from hypothesis import given
+from hypothesis import strategies as st
+from swept import HEAD, PULL, InProcess
+
+from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.page import Point, label_places, page_of, pareto_front
+from robocov_app.benchmark.running import (
+    ENTRIES,
+    RESULT,
+    TRACKS,
+    Contender,
+    Selection,
+    bundled_results,
+    rated,
+    read_result,
+    run_benchmark,
+    verify,
+)
+from robocov_app.cli import main
+from robocov_app.figures.styles import styles_of
+from robocov_app.terminal.interruption import Interruption
+
+MAPS = ("blocks-a", "blocks-b")
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of one second, in this process."""
+    for name in ("ideal", "lossy"):
+        track = replace(suite.TRACKS[name], duration=1.0, seeds=(0,))
+        monkeypatch.setitem(suite.TRACKS, name, track)  # type: ignore[arg-type]
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", InProcess)
+    monkeypatch.setattr("robocov_app.benchmark.running.LocalPool", InProcess)
+
+
+def ran(out: Path, controller: str = "rapf", *tracks: str, **gains: float) -> dict[str, Any]:
+    selection = Selection(tracks=tracks or ("ideal",), maps=MAPS)
+    with Interruption() as stop:
+        result = run_benchmark(Contender(controller, gains), selection, out, stop=stop, quiet=True)
+    assert result is not None
+    return result
+
+
+def checked(out: Path, **how: Any) -> tuple[int, list[str]]:
+    with Interruption() as stop:
+        return verify(out, stop=stop, quiet=True, **how)
+
+
+def forged(out: Path, change: Any) -> None:
+    result = json.loads((out / RESULT).read_text())
+    change(result)
+    (out / RESULT).write_text(json.dumps(result))
+
+
+@pytest.mark.usefixtures("short")
+def test_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ran(tmp_path / "a", "rapf", "ideal", "lossy")
+    ran(tmp_path / "b", "rapf", "ideal", k_rep=0.5)
+    result = read_result(tmp_path / "a")
+    assert [(row["track"], row["map"]) for row in result["rows"]] == [
+        (track, name) for track in ("ideal", "lossy") for name in MAPS
+    ]
+    for row in result["rows"]:
+        best = suite.frozen()[row["map"]]["references"]["6"]["mean_distance_m"]
+        assert row["gap"] == row["mean_distance_m"] / best - 1.0 > 0.0
+        assert row["told_bytes"] == pytest.approx(6 * 20 * (60 if row["track"] == "ideal" else 2))
+        assert row["deciding_s"] > 0.0
+    assert checked(tmp_path / "a", sample=1) == (1, [])
+    page = str(tmp_path / "page.html")
+    assert (
+        answer(capsys, "benchmark", "page", *(str(tmp_path / k) for k in "ab"), "--alone", "--out", page)[
+            "entries"
+        ]
+        == 2
+    )
+    text = Path(page).read_text()
+    assert "RAPF (k_rep 0.5)" in text and "Gap and way" in text and "<h2" in text
+
+
+def test_built_in_entries_are_whole() -> None:
+    """Each holds every run of all tracks that count, with gaps that follow from its costs."""
+    results = bundled_results()
+    assert {"rapf", "lloyd", "rpf", "oracle"} <= {result["entry"]["controller"] for result in results}
+    runs = {
+        (name, each, seed) for name, maps, seeds in Selection().parts() for each in maps for seed in seeds
+    }
+    for result in results:
+        assert {(row["track"], row["map"], row["seed"]) for row in result["rows"]} == runs
+        for row in result["rows"]:
+            assert "error" in row or row.items() >= rated(row["track"], row["map"], row).items()
+    # who gives a result of the same controller has it on the page in the place of the built-in one
+    assert len(bundled_results(results[:1])) == len(results) - 1
+
+
+@pytest.mark.slow
+def test_built_in_entries_are_what_comes_out() -> None:
+    path = ENTRIES / "rapf.json.gz"
+    with Interruption() as stop:
+        count, found = verify(path, sample=2, seed=3, workers=2, quiet=True, stop=stop)
+    assert count == 2
+    # other processors' libraries of linear algebra may round the last bit differently
+    for words in found:
+        numbers = re.search(r": ([\d.e-]+), but ([\d.e-]+) was found$", words)
+        alike = numbers and float(numbers[1]) == pytest.approx(float(numbers[2]), rel=1e-3)
+        assert words.startswith("made with") or alike, words
+
+
+PLACE = st.tuples(st.floats(100, 500), st.floats(80, 280), st.text("abcde", min_size=3, max_size=16))
+
+
+@given(st.lists(PLACE, min_size=2, max_size=4))
+def test_labels_of_few_points_stay_apart(given_points: list[tuple[float, float, str]]) -> None:
+    points = [Point(styles_of(["rapf"])[0], name, x, y, True) for x, y, name in given_points]
+    middles = label_places(np.array([(x, y) for x, y, _ in given_points]), points)
+    half = np.array([(3.0 * len(each.label), 6.5) for each in points])
+    for k, j in combinations(range(len(points)), 2):
+        apart = np.abs(middles[k] - middles[j]) - half[k] - half[j]
+        assert apart.max() > -1e-6
+
+
+@pytest.mark.usefixtures("short")
+def test_the_oracle_is_delivered_as_a_file(tmp_path: Path) -> None:
+    ran(tmp_path / "out", "oracle")
+    assert checked(tmp_path / "out", sample=1) == (1, [])
+    entry = read_result(tmp_path / "out")["entry"]
+    assert entry["information"] == "whole map" and entry["label"] == "Oracle"
+
+
+@pytest.mark.slow
+def test_the_oracle_arrives_though_its_robots_meet_in_corridors(tmp_path: Path) -> None:
+    selection = Selection(tracks=("ideal",), maps=("mazes-7006",))
+    with Interruption() as stop:
+        result = run_benchmark(Contender("oracle", {}), selection, tmp_path, stop=stop, quiet=True)
+    assert result is not None and max(row["gap"] for row in result["rows"]) < 1e-3
+
+
+@pytest.mark.usefixtures("short")
+def test_what_is_forged_is_found(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    ran(out)
+    honest = (out / RESULT).read_text()
+    for change, words in (
+        (lambda result: result["rows"][1].update(work_J=1.0), "blocks-b, seed 0: work_J: 1.0, but"),
+        (lambda result: result["rows"][0].update(gap=0.01), "blocks-a, seed 0: gap: 0.01, but"),
+        (lambda result: result["rows"].pop(), "blocks-b, seed 0: no row, but one was wanted"),
+        (lambda result: result["rows"][0].update(seed=7), "seed 7: a row of a run that was not selected"),
+        (lambda result: result["versions"].update(numpy="1.0"), "made with numpy 1.0 instead of"),
+    ):
+        (out / RESULT).write_text(honest)
+        forged(out, change)
+        assert any(words in each for each in checked(out, sample=9)[1]), words
+
+
+@pytest.mark.usefixtures("short")
+def test_code_in_a_file_is_verified_only_if_it_is_named_and_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine, out = tmp_path / "mine.py", tmp_path / "out"
+    mine.write_text(HEAD + PULL)
+    ran(out, f"{mine}:Mine")
+    assert str(tmp_path) not in (out / RESULT).read_text()
+    assert "--controller FILE.py:CLASS was wanted" in complaint(capsys, "benchmark", "verify", str(out))
+    assert checked(out, controller=f"{mine}:Mine", sample=1) == (1, [])
+    mine.write_text(HEAD + PULL + "\n# changed\n")
+    wrong = complaint(capsys, "benchmark", "verify", str(out), "--controller", f"{mine}:Mine")
+    assert "is not the source that was rated" in wrong
+
+
+@pytest.mark.usefixtures("short")
+def test_damaged_results_are_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    ran(out)
+    honest = json.loads((out / RESULT).read_text())
+    for part in ("", "entry", "selection", "rows"):
+        for name in honest["rows"][0] if part == "rows" else honest[part] if part else honest:
+            for value in (None, {"x": []}):
+                damaged = json.loads(json.dumps(honest))
+                whole = damaged["rows"][0] if part == "rows" else damaged[part] if part else damaged
+                whole.pop(name)
+                whole |= {} if value is None else {name: value}
+                if value is None or name not in ("gains", "set", "entry", "selection", "versions"):
+                    (out / RESULT).write_text(json.dumps(damaged))
+                    assert str(out / RESULT) in complaint(capsys, "benchmark", "verify", str(out)), name
+
+
+@pytest.mark.usefixtures("short")
+def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = ran(tmp_path / "out")
+    monkeypatch.setattr("robocov_app.sweep.sweeping.LocalPool", None)
+    assert ran(tmp_path / "out") == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--controller", "rapff"), "--controller: unknown controller 'rapff': did you mean 'rapf'"),
+        (("--controller", "rapf", "--set", "k_re=1"), "unknown gain 'k_re'"),
+        (("--controller", "rapf", "--track", "idael"), "did you mean 'ideal'"),
+        ((), "--controller: none, but"),
+        (("verify",), "DIR: 0 paths, but one result"),
+        (("page", "--alone"), "DIR: 0 paths, but results"),
+        (("page", "nowhere"), "nowhere: no such file"),
+        (("page", "TORN"), "torn.json.gz: Compressed file ended"),
+        (("suite", "--quick"), "--quick: robocov benchmark suite has no such option"),
+        (("--controller", "rapf", "--out", "FOREIGN"), "it holds something else than a benchmark"),
+        (("verify", "OTHER"), "it is no result of robocov benchmark"),
+    ],
+)
+def test_bad_input(
+    words: tuple[str, ...], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "letter.txt").write_text("Dear")
+    (tmp_path / "other.json").write_text("{}")
+    (tmp_path / "torn.json.gz").write_bytes(gzip.compress(b"{}" * 99)[:-9])
+    paths = {"FOREIGN": str(tmp_path), "OTHER": str(tmp_path / "other.json")}
+    paths["TORN"] = str(tmp_path / "torn.json.gz")
+    assert told in complaint(capsys, "benchmark", *(paths.get(word, word) for word in words))
+
+
+@given(st.lists(st.tuples(st.sampled_from([1.0, 2.0, 5.0, 9.0]), st.booleans()), min_size=1, max_size=12))
+def test_the_median_of_rest_is_kaplan_and_meiers(runs: list[tuple[float, bool]]) -> None:
+    rows = [{"settled_at_s": time if rested else None} for time, rested in runs]
+    share, median = ratings.Rating("", "", "ideal", rows, 0).at_rest()
+    # all that did not rest are censored at the end, so the curve is the plain share of those still moving
+    times = sorted(row["settled_at_s"] for row in rows if row["settled_at_s"] is not None)
+    wanted = next(
+        (t for t in times if sum(s > t for s in times) + len(rows) - len(times) <= len(rows) / 2), None
+    )
+    assert share == len(times) / len(rows)
+    assert median == wanted
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
+def test_nobody_beats_the_front(points: list[tuple[int, int]]) -> None:
+    front = {points[k] for k in pareto_front(points)}
+    beaten = {(x, y) for x, y in points if any(u <= x and v <= y and (u, v) != (x, y) for u, v in points)}
+    assert front == set(points) - beaten
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="kills a process")
+def test_what_is_killed_goes_on(tmp_path: Path) -> None:
+    words = (
+        "benchmark",
+        "--controller",
+        "lloyd",
+        "--track",
+        "one-robot",
+        "--workers",
+        "1",
+        "--json",
+        "--maps",
+    )
+    maps = ("blocks-a", "blocks-b", "polygons-7001", "polygons-7002", "plants-7001", "yards-7001")
+    command = [*COMMAND, *words, *maps, "--out", str(tmp_path / "killed")]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        runs, end = tmp_path / "killed" / TRACKS / "one-robot" / "runs", time.monotonic() + 120.0
+        while not (runs.is_dir() and any(not each.name.startswith(".") for each in runs.iterdir())):
+            assert time.monotonic() < end and process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    assert not (tmp_path / "killed" / RESULT).exists()
+    assert main([*words, *maps, "--out", str(tmp_path / "killed")]) == 0
+    assert main([*words, *maps, "--out", str(tmp_path / "whole")]) == 0
+    killed, whole = (
+        [{**row, "deciding_s": None} for row in read_result(tmp_path / name)["rows"]]
+        for name in ("killed", "whole")
+    )
+    assert killed == whole and len(whole) == len(maps)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    os.environ["SE_OFFLINE"] = "true"
+    shared = Browser(tmp_path_factory.mktemp("profile"))
+    try:
+        yield shared
+    finally:
+        shared.driver.quit()
+
+
+@pytest.mark.slow
+@pytest.mark.xdist_group("browser")
+@pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="not installed: chromium and chromedriver")
+def test_the_page_in_a_browser(browser: Browser, tmp_path: Path) -> None:
+    results = []
+    for k, name in enumerate(("rapf", "lloyd", "atlas")):
+        rows = [
+            {
+                **dict.fromkeys(("stuck_robots", "contacts"), 0),
+                "track": "ideal",
+                "map": each,
+                "seed": 0,
+                "gap": 0.1 * (k + 1) + 0.01 * j,
+                "gap_to_bound": 0.5 if k == 0 else None,
+                "mean_distance_m": 2.0,
+                "mean_distance_over_run_m": 3.0,
+                "near_final_s": 9.0,
+                "settled_at_s": 8.0 if k else None,
+                "path_length_m": 8.0 - k,
+                "work_J": 50.0,
+                "told_bytes": 4e5 * (k + 1),
+                "deciding_s": 0.1 * 20**k,
+            }
+            for j, each in enumerate(("rooms", "polygons-7001"))
+        ]
+        entry = {"controller": name, "label": name.upper(), "information": "own", "gains": {}, "set": {}}
+        entry |= {"source_sha256": None}
+        results.append({"entry": entry, "rows": rows, "method": ["As told."], "versions": {"numpy": "2"}})
+    page = tmp_path / "page.html"
+    page.write_text(page_of(results, "A <test> of names"), encoding="utf-8")
+    for width in (1280, 390):
+        browser.open(page, width)
+        assert browser.complaints() == []
+        assert browser.js("return performance.getEntriesByType('resource').length") == 0
+        assert browser.js("return document.documentElement.scrollWidth") <= width
+        assert len(browser.all("svg.plot")) == 3
+    assert browser.find("h1").text == "A <test> of names"
+    first = [each.text for each in browser.all("#ideal tbody th")][:3]
+    assert first == ["RAPF", "LLOYD", "ATLAS"]
+    assert [each.text for each in browser.all("#overview tbody th")] == first
+    gaps = [
+        float(each.text.split()[0])
+        for each in browser.all("#ideal .scroll:first-of-type tbody td:nth-child(4)")
+    ]
+    assert gaps == np.sort(gaps).tolist()

@@ -1,0 +1,107 @@
+"""The frozen suite: its maps are the ones of its file, its tracks apart from tuning, its references real."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robocov.controllers.geodesic_lloyd import Plan
+from robocov.cost import CoverageCost
+from robocov.environment import DiscStart, Environment, WallObstacle
+from robocov.errors import InputError, ParameterError
+from robocov.robots import Team
+from robocov.simulation import Simulation
+from robocov_app.benchmark import suite
+from robocov_app.benchmark.oracle import Oracle, assigned
+from robocov_app.benchmark.references import wanted_references
+
+SOME = ("rooms", "forklifts", "blocks-7001", "homes-7001", "traffic-7002", "dense-yards-7001")
+WALLED = Environment(
+    "walled",
+    ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)),
+    (WallObstacle(((2.0, 0.0), (2.0, 2.0)), 0.1),),
+    {"left": DiscStart((0.8, 0.8), 0.6)},
+)
+
+
+def frozen_hashes(names: tuple[str, ...]) -> dict[str, str]:
+    return {name: suite.frozen()[name]["sha256"] for name in names}
+
+
+def made_hashes(names: tuple[str, ...]) -> dict[str, str]:
+    return {name: suite.hash_of(suite.made_map(name)) for name in names}
+
+
+def test_some_maps_are_still_the_frozen_ones() -> None:
+    assert made_hashes(SOME) == frozen_hashes(SOME)
+
+
+@pytest.mark.slow
+def test_all_maps_are_still_the_frozen_ones() -> None:
+    names = suite.every_map()
+    assert made_hashes(names) == frozen_hashes(names)
+    assert set(suite.frozen()) == set(names)
+
+
+def test_a_changed_map_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    changed = replace(suite.made_map("rooms"), name="rooms, a little different")
+    monkeypatch.setattr(suite, "made_map", lambda name: changed)
+    with pytest.raises(InputError, match="map rooms: it is not the one of suite v1"):
+        suite.suite_map("rooms")
+
+
+def test_what_the_suite_promises() -> None:
+    assert len(suite.FAMILIES) >= 6
+    assert len(suite.TRACKS["ideal"].maps) >= 60
+    tuning = set(suite.TRACKS["tuning"].maps)
+    assert all(tuning.isdisjoint(suite.TRACKS[name].maps) for name in suite.RATED)
+    assert len(set(suite.every_map())) == len(suite.every_map())
+    for name, robots, _ in wanted_references():
+        assert len(suite.frozen()[name]["references"][str(robots)]["positions_m"]) == robots
+
+
+def test_a_reference_has_the_cost_that_it_tells() -> None:
+    for name, robots in (("rooms-7001", "4"), ("dense-yards-7001", "6")):
+        told = suite.frozen()[name]["references"][robots]
+        result = CoverageCost(suite.suite_map(name), suite.LATTICE)(np.array(told["positions_m"]))
+        assert result.mean_distance == pytest.approx(told["mean_distance_m"], rel=1e-12)
+
+
+def test_names_that_are_unknown() -> None:
+    with pytest.raises(ParameterError, match="--track: unknown track 'ideel': did you mean 'ideal'"):
+        suite.chosen(["ideel"], [], quick=False)
+    with pytest.raises(ParameterError, match="--maps: unknown map of the benchmark 'room'"):
+        suite.chosen([], ["room"], quick=False)
+    with pytest.raises(ParameterError, match="--maps: forklifts, but a map of ideal was wanted"):
+        suite.chosen(["ideal"], ["forklifts"], quick=False)
+
+
+def test_quick_has_one_map_of_each_family() -> None:
+    for maps in suite.chosen([], [], quick=True).values():
+        assert [suite.family_of(name) for name in maps] == list(suite.FAMILIES)
+
+
+def test_the_oracle_assigns_as_brute_force_does() -> None:
+    plan, rng = Plan(WALLED, 0.13, 8), np.random.default_rng(0)
+    for _ in range(5):
+        places, goals = rng.uniform((0.2, 0.2), (3.8, 2.8), (2, 4, 2)) * 1.0
+        far = plan.paths.distances(*(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        found = assigned(plan, *(np.clip(each, 0.2, (1.8, 2.8)) for each in (places, goals)))
+        best = min(itertools.permutations(range(4)), key=lambda order: (far[range(4), order] ** 2).sum())
+        assert found.tolist() == list(best)
+
+
+def test_the_oracle_walks_round_walls_and_heeds_who_has_failed() -> None:
+    goals = [[3.2, 0.6], [1.0, 2.4]]
+    stages = [[0.0, [0, 1], goals], [9.0, [1], [[0.5, 0.5]]]]
+    told = replace(WALLED, extra={"oracle": stages})
+    starts = WALLED.start("left").sample(2, seed=1)
+    record = Simulation(told, Oracle(), starts, Team.homogeneous(2)).run(18.0)
+    middle = record.positions[int(8.9 * 60)]
+    assert min(np.abs(middle - goals).max(), np.abs(middle[::-1] - goals).max()) < 0.05
+    assert np.abs(record.positions[-1] - [goals[1], (0.5, 0.5)]).max() < 0.05
+    with pytest.raises(ParameterError, match="the map does not tell the best placement"):
+        Simulation(WALLED, Oracle(), starts, Team.homogeneous(2))
