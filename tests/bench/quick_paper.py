@@ -20,8 +20,9 @@ def test_the_quick_study_finds_what_is_plain(tmp_path):
     assert not (out / "beyond.html").exists()
     claims = {claim["key"]: claim for claim in json.loads((out / "claims.json").read_text())}
     assert len(claims) == 15
-    assert claims["nonconvex-final-shared"]["verdict"] == "holds"
-    assert claims["nonconvex-motion-shared"]["verdict"] == "holds"
+    for key in ("nonconvex-final-shared", "nonconvex-motion-shared"):
+        # that RAPF is ahead in nine of ten runs is not shown by six maps, even if it always is
+        assert claims[key]["verdict"] in ("holds", "holds partly")
     assert claims["gap-rpf"]["verdict"] == "holds"
     assert claims["convex-spreading"]["verdict"] == "does not hold"
     assert claims["convex-final"]["estimate"] == pytest.approx(1.0, abs=0.03)

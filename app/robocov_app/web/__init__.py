@@ -1,0 +1,49 @@
+"""The window in a browser: its pictures go out, pointer, keys, wheel and the size of the page come in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robocov.extras import extra
+
+if TYPE_CHECKING:
+    from robocov_app.toolkit.window import BaseWindow
+    from robocov_app.web.server import WebDisplay
+
+
+def web_display(serve: bool, host: str, port: int, folder: Path) -> WebDisplay | None:
+    """Return where a window is served, None where it is not to be; RobocovError without the extra."""
+    if not serve:
+        return None
+    extra("websockets", "web")
+    from robocov_app.web.server import WebDisplay
+
+    return WebDisplay(host, port, folder)
+
+
+def show(window: BaseWindow, display: WebDisplay | None) -> None:
+    """Run a window until it is closed: on the screen, or in browsers."""
+    if display is None:
+        window.run()
+        return
+    from robocov_app.web.confined import confined
+
+    with display, confined(display.folder):
+        print(f"open {display.link}", flush=True)  # noqa: T201 - it is the answer
+        print(f"to watch only: {display.watch_link}", flush=True)  # noqa: T201
+        window.remote = display
+        window.run()
+
+
+def serve_each(command: Callable[[Any], int], options: Any) -> int:
+    """Serve a command's window to each visitor in a process of their own, until the process is stopped."""
+    extra("websockets", "web")
+    import asyncio
+
+    from robocov_app.web.each import Sessions
+
+    sessions = Sessions(command, options, options.most)
+    asyncio.run(sessions.serve(lambda words: print(words, flush=True)))  # noqa: T201
+    return 0

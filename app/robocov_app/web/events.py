@@ -1,0 +1,218 @@
+"""Messages of a page, checked; and pygame's events made of them."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+import pygame
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pygame.event import Event
+
+from robocov_app.toolkit import clipboard
+
+SMALLEST, LARGEST, MOST_PIXELS = 200, 7680, 4096 * 2304
+"""Least and greatest width and height of a page, and its greatest area, in pixels."""
+
+_Pixel = Annotated[float, Field(ge=-1e5, le=1e5)]
+_Turn = Annotated[float, Field(ge=-100.0, le=100.0)]
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class _OfHands(_Message):
+    held: int = Field(default=0, ge=0, le=15)  # Shift 1, Ctrl 2, Alt 4, Meta 8
+
+
+class PointerMoved(_OfHands):
+    """The pointer is elsewhere; `button` is held meanwhile, 0 for none."""
+
+    kind: Literal["move"]
+    x: _Pixel
+    y: _Pixel
+    button: int = Field(default=0, ge=0, le=3)
+
+
+class ButtonChanged(_OfHands):
+    """A button of the mouse is pressed, or let go."""
+
+    kind: Literal["button"]
+    x: _Pixel
+    y: _Pixel
+    button: int = Field(ge=1, le=3)
+    down: bool
+
+
+class WheelTurned(_OfHands):
+    """The wheel is turned by notches."""
+
+    kind: Literal["wheel"]
+    x: _Pixel
+    y: _Pixel
+    right: _Turn = 0.0
+    up: _Turn
+
+
+class KeyChanged(_OfHands):
+    """A key is pressed or let go; `key` is its name as browsers call it."""
+
+    kind: Literal["key"]
+    key: str = Field(min_length=1, max_length=20)
+    down: bool
+
+
+class TextTyped(_Message):
+    """A text is typed without keys: on a phone, or put together from several."""
+
+    kind: Literal["text"]
+    text: str = Field(max_length=1000)
+
+
+class TextPasted(_Message):
+    """A text is pasted from the clipboard of who controls."""
+
+    kind: Literal["paste"]
+    text: str = Field(max_length=100_000)
+
+
+class Left(_Message):
+    """The pointer has left the page, or the page is not typed into any more."""
+
+    kind: Literal["leave", "blur"]
+
+
+class PageChanged(_Message):
+    """Size of the page in the device's pixels, how many of these are one of CSS, and its colours."""
+
+    kind: Literal["page"]
+    width: int = Field(ge=SMALLEST, le=LARGEST)
+    height: int = Field(ge=SMALLEST, le=LARGEST)
+    ratio: float = Field(ge=0.25, le=8.0)
+    dark: bool
+
+
+class PictureShown(_Message):
+    """A picture has arrived."""
+
+    kind: Literal["shown"]
+    number: int = Field(ge=0, lt=2**32)
+
+
+class Control(_Message):
+    """Request to hand control to the page of a number; 0 asks for it."""
+
+    kind: Literal["control"]
+    to: int = Field(ge=0, lt=2**31)
+
+
+class Named(_Message):
+    """The name of who looks at a page."""
+
+    kind: Literal["name"]
+    name: str = Field(max_length=40)
+
+
+class Uploaded(_Message):
+    """A file that has been put into the folder, to be opened."""
+
+    kind: Literal["uploaded"] = "uploaded"
+    path: str
+
+
+OfHands = PointerMoved | ButtonChanged | WheelTurned | KeyChanged | TextTyped | TextPasted | Left
+"""Messages of hands to a window."""
+
+Message = OfHands | PageChanged | PictureShown | Control | Named
+
+_MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
+
+
+def message_of(text: str) -> Message:
+    """Return what a page tells; ValueError where that is none of the messages above."""
+    return _MESSAGES.validate_json(text)
+
+
+_KEYS = {
+    "Enter": pygame.K_RETURN,
+    "Shift": pygame.K_LSHIFT,
+    "Control": pygame.K_LCTRL,
+    "Alt": pygame.K_LALT,
+    "Meta": pygame.K_LMETA,
+    **{
+        name: getattr(pygame, f"K_{name.removeprefix('Arrow').upper()}")
+        for name in (
+            *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
+            *("Escape", "Backspace", "Tab", "Delete", "Insert", *(f"F{k}" for k in range(1, 13))),
+        )
+    },
+}
+# pygame names keys by what they are without Shift, browsers by what they write
+_UNSHIFTED = str.maketrans('!@#$%^&*()_+{}|:"<>?~', "1234567890-=[]\\;',./`")
+_MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KMOD_LMETA)
+
+
+class Hands:
+    """Turns what hands do to the page into pygame's events."""
+
+    def __init__(self) -> None:
+        self._at = (0, 0)
+
+    def events(self, message: OfHands | Uploaded) -> Iterator[Event]:
+        """Yield the events of a message."""
+        match message:
+            case PointerMoved():
+                yield self._moved(message.x, message.y, message.button)
+            case ButtonChanged():
+                yield self._moved(message.x, message.y, 0 if message.down else message.button)
+                kind = pygame.MOUSEBUTTONDOWN if message.down else pygame.MOUSEBUTTONUP
+                yield Event(kind, pos=self._at, button=message.button, touch=False)
+            case WheelTurned():
+                yield self._moved(message.x, message.y, 0)
+                right, up = message.right, message.up
+                turned: dict[str, Any] = {
+                    "x": round(right),
+                    "y": round(up),
+                    "precise_x": right,
+                    "precise_y": up,
+                }
+                yield Event(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
+            case KeyChanged():
+                yield from _key(message)
+            case TextTyped():
+                for letter in message.text:
+                    yield from _key(KeyChanged(kind="key", key=letter, down=True))
+                    yield from _key(KeyChanged(kind="key", key=letter, down=False))
+            case TextPasted():
+                clipboard.put(message.text)
+                for down in (True, False):
+                    yield from _key(KeyChanged(kind="key", key="v", down=down, held=2))
+            case Uploaded():
+                yield Event(pygame.DROPFILE, file=message.path)
+            case Left():
+                yield Event(pygame.WINDOWLEAVE if message.kind == "leave" else pygame.WINDOWFOCUSLOST)
+
+    def _moved(self, x: float, y: float, button: int) -> Event:
+        before, self._at = self._at, (round(x), round(y))
+        rel = self._at[0] - before[0], self._at[1] - before[1]
+        buttons = tuple(int(button == k) for k in (1, 2, 3))
+        return Event(pygame.MOUSEMOTION, pos=self._at, rel=rel, buttons=buttons, touch=False)
+
+
+def modifiers(held: int) -> int:
+    """Return pygame's modifiers of those that a message tells."""
+    return sum(mask for k, mask in enumerate(_MODIFIERS) if held >> k & 1)
+
+
+def _key(message: KeyChanged) -> Iterator[Event]:
+    name, held = message.key, message.held
+    writes = name if len(name) == 1 and not held & 0b1010 else ""
+    code = _KEYS.get(name)
+    if code is None:
+        if len(name) > 1:
+            return  # keys that neither write nor mean anything here
+        plain = name.lower().translate(_UNSHIFTED) if held & 1 else name.lower()
+        code = ord(plain) if len(plain) == 1 and plain.isascii() else 0
+    pressed: dict[str, Any] = {"key": code, "mod": modifiers(held), "unicode": writes, "scancode": 0}
+    yield Event(pygame.KEYDOWN if message.down else pygame.KEYUP, **pressed)
+    if message.down and writes:
+        yield Event(pygame.TEXTINPUT, text=writes)

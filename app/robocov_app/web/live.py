@@ -1,0 +1,62 @@
+"""A served window in a cell of a notebook: a process of its own, and a frame that shows it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import weakref
+from collections.abc import Sequence
+from html import escape
+from urllib.parse import urlsplit
+
+from robocov.errors import RobocovError
+from robocov.extras import extra
+
+
+class LiveWindow:
+    """The interactive window, live in the cell that shows it, until `close` or the end of the kernel.
+
+    `link`: its address, also for another tab. `arguments`: of ``robocov``, a command first. Raises
+    RobocovError with what the command says if it does not begin. JupyterHub needs jupyter-server-proxy.
+    """
+
+    def __init__(self, arguments: Sequence[str], height: int = 620) -> None:
+        extra("websockets", "web")
+        call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
+        pipe, none = subprocess.PIPE, subprocess.DEVNULL
+        self._process = subprocess.Popen(call, stdin=none, stdout=pipe, stderr=pipe, text=True)
+        self._end = weakref.finalize(self, _ended, self._process)
+        assert self._process.stdout is not None
+        self.height = height
+        found = re.match(r"open (\S+)", self._process.stdout.readline())
+        if found is None:
+            _, words = self._process.communicate()
+            raise RobocovError(words.strip().removeprefix("robocov: error: ") or "the window did not open")
+        self.link = found[1]
+
+    def close(self) -> None:
+        """End the window."""
+        self._end()
+
+    def _repr_html_(self) -> str:
+        link = self.link
+        if prefix := os.environ.get("JUPYTERHUB_SERVICE_PREFIX"):
+            place = urlsplit(link)
+            link = f"{prefix}proxy/{place.port}/?{place.query}"
+        style = f"width:100%;height:{self.height}px;border:0"
+        allowed = "clipboard-read; clipboard-write; fullscreen"
+        return f'<iframe src="{escape(link)}" style="{style}" allow="{allowed}" title="robocov"></iframe>'
+
+
+def _ended(process: subprocess.Popen[str]) -> None:
+    process.terminate()
+    try:
+        process.wait(5)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    for stream in (process.stdout, process.stderr):
+        if stream is not None:
+            stream.close()

@@ -1,0 +1,515 @@
+"""The server of a window: one page, its pictures and what hands do there, behind a token.
+
+The window's loop stays in the main thread and knows a `Remote` and nothing of browsers; the server has a
+thread of its own. Only ``websockets`` is needed. (rendercanvas' ``http`` backend, looked at in 2.7.2, has
+one canvas for a process, neither tokens nor origins checked, no control handed over, no text and no
+clipboard, and sends whole pictures as JPEG: all that is here would have come on top of it.)
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import os
+import secrets
+import threading
+from collections import deque
+from hashlib import sha256
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from importlib.resources import files
+from io import BytesIO
+from itertools import count, islice
+from pathlib import Path
+from time import monotonic, time
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, quote, unquote, urlsplit
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+import pygame
+
+from robocov.errors import InputError
+from robocov.files.atomic import written
+from robocov.files.result_folder import MANIFEST
+from robocov_app.terminal.output import free_name
+from robocov_app.toolkit import clipboard
+from robocov_app.toolkit.dialogs import MOST_LISTED
+from robocov_app.toolkit.input import shown_cursor
+from robocov_app.web.events import (
+    MOST_PIXELS,
+    Control,
+    Hands,
+    Left,
+    Message,
+    Named,
+    OfHands,
+    PageChanged,
+    PictureShown,
+    Uploaded,
+    message_of,
+    modifiers,
+)
+from robocov_app.web.pictures import Picture, encoded
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
+    from websockets.http11 import Request, Response
+
+    from robocov_app.toolkit.window import BaseWindow
+
+LONGEST = 1 << 17  # letters of a message that comes in
+LARGEST_UPLOAD = 1 << 24  # bytes of a file
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff", ".pgm")
+MAPS = (
+    *(
+        ".json",
+        ".geojson",
+        ".wkt",
+        ".svg",
+        ".dxf",
+        ".yaml",
+        ".yml",
+        ".tmx",
+        ".osm",
+        ".map",
+        ".scen",
+        ".world",
+    ),
+    *(".argos", ".xml"),
+)
+UPLOADS = frozenset((".robocov", *PICTURES, *MAPS))
+_OFFERED = UPLOADS | {".mp4", ".csv", ".html", ".pdf", ".zip"}  # what is saved is offered for download
+_MOST_COPIED = 100_000
+MOST_EVENTS = 400.0  # messages a second that are taken from one page; what is more waits in the line
+MOST_WAITING = 5000  # messages that wait for the window
+MOST_PAGES = 100
+NARROW = 700  # width of a page, in pixels of CSS, below which the panel is hidden
+IN_FLIGHT = 2  # pictures that are on their way to a page, at most
+
+_CURSORS = {
+    pygame.SYSTEM_CURSOR_HAND: "pointer",
+    pygame.SYSTEM_CURSOR_CROSSHAIR: "crosshair",
+    pygame.SYSTEM_CURSOR_IBEAM: "text",
+    pygame.SYSTEM_CURSOR_SIZEALL: "move",
+    pygame.SYSTEM_CURSOR_SIZEWE: "ew-resize",
+    pygame.SYSTEM_CURSOR_SIZENS: "ns-resize",
+    pygame.SYSTEM_CURSOR_SIZENESW: "nesw-resize",
+    pygame.SYSTEM_CURSOR_SIZENWSE: "nwse-resize",
+    pygame.SYSTEM_CURSOR_WAIT: "wait",
+    pygame.SYSTEM_CURSOR_NO: "not-allowed",
+}
+
+
+class Page:
+    """A browser that shows the window."""
+
+    def __init__(self, line: ServerConnection, number: int, teacher: bool) -> None:
+        self.line = line
+        self.number = number
+        self.teacher = teacher  # may take control at any time
+        self.name = f"{'Teacher' if teacher else 'Viewer'} {number}"
+        self.asks = False  # for control
+        self.shown: Picture | None = None  # the picture that it has, or will have
+        self.sent: deque[int] = deque()  # numbers of pictures on their way
+        self.told: dict[str, Any] = {}
+        self.size: PageChanged | None = None
+        self.changed = asyncio.Event()
+
+
+class WebDisplay:
+    """A window's pictures to browsers, and their events to the window: a `Remote`.
+
+    `host`, `port`: where it listens, 0 for any port that is free. `folder`: of what is saved and uploaded.
+    Who has the `link` may take control of the window; who has `watch_link` sees it, and controls it once
+    control is handed over. One page controls at a time: the first that may, until it hands over or is gone.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0, folder: Path = Path()) -> None:
+        self.host, self.port, self.folder = host, port, folder
+        self.token, self.watch_token = secrets.token_urlsafe(18), secrets.token_urlsafe(18)
+        self._numbers = count(1)
+        self._control: Page | None = None
+        self._saved: tuple[str, ...] = ()
+        self._looked, self._since = 0.0, time()
+        # browsers share cookies among all ports of a machine
+        self._cookie = f"robocov-{sha256(self.token.encode()).hexdigest()[:12]}"
+        self._waiting: deque[OfHands | Uploaded] = deque()
+        self._wanted: PageChanged | None = None
+        self._given: PageChanged | None = None
+        self._hands = Hands()
+        self._held, self._narrow = 0, False
+        self._picture: Picture | None = None
+        # also a page that is there before the first picture is told all of it
+        self._told: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
+        self._pages: list[Page] = []
+        self._encoded: dict[tuple[int, int], bytes] = {}
+        self._loop = asyncio.new_event_loop()
+        self._ended = asyncio.Event()
+        self._thread = threading.Thread(target=self._serve, name="web", daemon=True)
+        self._begun, self._called = threading.Event(), threading.Event()
+        self._trouble: OSError | None = None
+
+    # the window's side
+
+    def __enter__(self) -> WebDisplay:
+        """Listen; InputError where that cannot be."""
+        self._thread.start()
+        self._begun.wait()
+        if self._trouble is not None:
+            why = self._trouble.strerror or self._trouble
+            raise InputError(f"--port: {self.host}:{self.port} cannot be listened to: {why}")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let all pages go."""
+        self._loop.call_soon_threadsafe(self._ended.set)
+        self._thread.join(5.0)
+
+    @property
+    def link(self) -> str:
+        """The address of who controls."""
+        return f"{self._address}?token={self.token}"
+
+    @property
+    def watch_link(self) -> str:
+        """The address of those who watch."""
+        return f"{self._address}?token={self.watch_token}"
+
+    @property
+    def _address(self) -> str:
+        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something comes in, and so many seconds at most."""
+        if self._called.wait(max(seconds, 0.001)):  # other threads get their turn in any case
+            self._called.clear()
+
+    def receive(self, window: BaseWindow) -> None:
+        """Give the window the size and look of the page, and post what hands did there."""
+        wanted = self._wanted
+        if wanted is not None and wanted is not self._given:
+            self._given, size = wanted, (wanted.width, wanted.height)
+            if window.screen.get_size() != size:
+                pygame.display.set_mode(size, pygame.RESIZABLE)
+                pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+            narrow, before = wanted.width < NARROW * wanted.ratio, self._narrow
+            self._narrow, theme = narrow, "dark" if wanted.dark else "light"
+            window.suit(wanted.ratio, theme, panel=None if narrow == before else not narrow)
+        posted = False
+        while self._waiting:
+            held = getattr(self._waiting[0], "held", self._held)
+            if held != self._held:
+                if posted:  # what was done with other keys held is taken first
+                    self._called.set()
+                    return
+                self._held = held
+                pygame.key.set_mods(modifiers(held))
+            for event in self._hands.events(self._waiting.popleft()):
+                pygame.event.post(event)
+                posted = True
+
+    def send(self, surface: pygame.Surface) -> None:
+        """Show a picture where it is another than the last one."""
+        before = self._picture
+        picture = Picture.of(surface, 1 if before is None else before.number + 1)
+        title = next(iter(pygame.display.get_caption()), "robocov")
+        if monotonic() - self._looked >= 1.0:
+            self._looked, self._saved = monotonic(), saved_since(self.folder, self._since)
+        told = {"cursor": _CURSORS.get(shown_cursor(), "default"), "title": title, "saved": self._saved}
+        told["copied"] = clipboard.get()[:_MOST_COPIED]
+        changed = before is None or not np.array_equal(before.pixels, picture.pixels)
+        if changed or told != self._told:
+            self._picture, self._told = picture if changed else before, told
+            self._loop.call_soon_threadsafe(self._wake)
+
+    # the browsers' side, in the server's thread
+
+    def _wake(self) -> None:
+        for page in self._pages:
+            page.changed.set()
+
+    def _serve(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._listen())
+        finally:
+            self._begun.set()
+            self._loop.close()
+
+    async def _listen(self) -> None:
+        from websockets.asyncio.server import serve
+
+        try:
+            server = await serve(
+                self._talk,
+                self.host,
+                self.port,
+                process_request=self._answer,
+                compression=None,
+                max_size=LARGEST_UPLOAD,
+                max_queue=16,
+                write_limit=1 << 16,
+                server_header=None,
+            )
+        except OSError as error:
+            self._trouble = error
+            return
+        async with server:
+            self.port = server.sockets[0].getsockname()[1]
+            self._begun.set()
+            await self._ended.wait()
+
+    async def _answer(self, line: ServerConnection, request: Request) -> Response | None:
+        """Answer a request for the page; None lets a socket be opened."""
+        place = urlsplit(request.path)
+        given = (parse_qs(place.query).get("token") or [""])[0]
+        if not self._known(self._secret(request)):
+            return line.respond(
+                HTTPStatus.FORBIDDEN, "This needs the whole link that robocov printed, with its token.\n"
+            )
+        if place.path.endswith("/socket"):
+            if not _own_origin(request):
+                return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
+            if len(self._pages) >= MOST_PAGES:
+                return line.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages show this window.\n")
+            return None
+        folder, _, name = place.path.rpartition("/")
+        if folder.endswith("/saved") and unquote(name) in self._saved:
+            return await asyncio.to_thread(self._download, line, unquote(name))
+        if not place.path.endswith("/"):
+            return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
+        return self._page(line, given)
+
+    def _page(self, line: ServerConnection, given: str) -> Response:
+        nonce = secrets.token_urlsafe(12)
+        page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
+        answer = line.respond(HTTPStatus.OK, page)
+        headers = answer.headers
+        del headers["Content-Type"]
+        headers["Content-Type"] = "text/html; charset=utf-8"
+        framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
+        headers["Content-Security-Policy"] = (
+            f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
+            "connect-src 'self'; base-uri 'none'; form-action 'none'; "
+            f"frame-ancestors {framed}"
+        )
+        headers["Referrer-Policy"] = "no-referrer"
+        headers["X-Content-Type-Options"] = "nosniff"
+        headers["Cache-Control"] = "no-store"
+        if self._known(given):  # of no path: it is that of the page, also behind a proxy
+            headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
+        return answer
+
+    def _download(self, line: ServerConnection, name: str) -> Response:
+        """Answer with a file that was saved, or with a folder as a zip."""
+        answer, path = line.respond(HTTPStatus.OK, ""), self.folder / name
+        try:
+            answer.body = zipped(path) if path.is_dir() else path.read_bytes()
+        except OSError:
+            return line.respond(HTTPStatus.NOT_FOUND, "It is not there any more.\n")
+        name += ".zip" * path.is_dir()
+        for header in ("Content-Type", "Content-Length"):
+            del answer.headers[header]
+        answer.headers["Content-Type"] = "application/octet-stream"
+        answer.headers["Content-Length"] = str(len(answer.body))
+        answer.headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name)}"
+        answer.headers["X-Content-Type-Options"] = "nosniff"
+        return answer
+
+    def _secret(self, request: Request) -> str:
+        """Return the token that came with a request: in its address, else as a cookie."""
+        given = (parse_qs(urlsplit(request.path).query).get("token") or [""])[0]
+        return given or _cookie(request, self._cookie)
+
+    def _known(self, token: str) -> bool:
+        return _same(token, self.token) or _same(token, self.watch_token)
+
+    async def _talk(self, line: ServerConnection) -> None:
+        """Show a page the window for as long as it is there, and take what it tells."""
+        assert line.request is not None
+        page = Page(line, next(self._numbers), _same(self._secret(line.request), self.token))
+        self._pages.append(page)
+        self._give_control(self._control)
+        sender = asyncio.ensure_future(self._send_all(page))
+        try:
+            await self._take_all(page)
+        finally:
+            sender.cancel()
+            self._pages.remove(page)
+            self._give_control(self._control)
+
+    def _give_control(self, page: Page | None) -> None:
+        """Let a page control the window; the first that may where that one is gone."""
+        if page not in self._pages:
+            page = next((each for each in self._pages if each.teacher), None)
+        if page is not self._control:
+            self._control = page
+            if page is not None:
+                page.asks = False
+                self._wanted = page.size or self._wanted
+                self._called.set()
+            if self._held:  # keys that the one before has held
+                self._waiting.append(Left(kind="blur"))
+        self._wake()
+
+    async def _take_all(self, page: Page) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        allowed, before = MOST_EVENTS, monotonic()
+        try:
+            async for text in page.line:
+                now = monotonic()
+                allowed, before = min(allowed + (now - before) * MOST_EVENTS, MOST_EVENTS) - 1.0, now
+                while allowed < 0.0 or len(self._waiting) > MOST_WAITING:
+                    await asyncio.sleep(0.05)  # what is more waits in the line; nothing is lost
+                    allowed += 0.05 * MOST_EVENTS
+                try:
+                    if isinstance(text, bytes):
+                        await asyncio.to_thread(self._upload, page, text)
+                    elif len(text) > LONGEST:
+                        raise ValueError
+                    else:
+                        self._take(page, message_of(text))
+                except ValueError:
+                    await page.line.close(1008, "not understood")
+        except ConnectionClosed:
+            pass
+
+    def _take(self, page: Page, message: Message) -> None:
+        if isinstance(message, PictureShown):
+            while page.sent and page.sent[0] != message.number:
+                page.sent.popleft()
+            if page.sent:
+                page.sent.popleft()
+            page.changed.set()
+        elif isinstance(message, Control):
+            self._hand_over(page, message.to)
+        elif isinstance(message, Named):
+            page.name = "".join(filter(str.isprintable, message.name)).strip() or page.name
+            self._wake()
+        elif isinstance(message, PageChanged):
+            if message.width * message.height > MOST_PIXELS:
+                raise ValueError
+            page.size = message
+            if page is self._control:
+                self._wanted = message
+                self._called.set()
+        elif page is self._control:  # the others only watch
+            self._waiting.append(message)
+            self._called.set()
+
+    def _hand_over(self, page: Page, to: int) -> None:
+        """Let another page control, or note that one asks for it."""
+        if to == 0:
+            page.asks = not page.asks and page is not self._control
+            self._wake()
+        elif page is self._control or page.teacher:
+            self._give_control(next((each for each in self._pages if each.number == to), self._control))
+
+    def _upload(self, page: Page, data: bytes) -> None:
+        """Put a file into the folder, under a name that is free, and let the window open it."""
+        name, _, content = data.partition(b"\n")
+        path = Path(name.decode("utf-8"))
+        if page is not self._control or path.suffix.lower() not in UPLOADS or path.name != str(path):
+            raise ValueError
+        if len(path.name) > 100 or not path.name.isprintable() or path.name.startswith("."):
+            raise ValueError
+        target = self.folder / path.name
+        if target.exists():
+            target = free_name(self.folder, path.stem, path.suffix)
+        with written(target) as part:
+            part.write_bytes(content)
+        self._waiting.append(Uploaded(path=str(target)))
+        self._called.set()
+
+    async def _send_all(self, page: Page) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        try:
+            while True:
+                await page.changed.wait()
+                page.changed.clear()
+                told = self._told_to(page)
+                if told != page.told:
+                    page.told = told
+                    await page.line.send(json.dumps(told))
+                picture = self._picture
+                if picture is not None and picture is not page.shown and len(page.sent) < IN_FLIGHT:
+                    before, page.shown = page.shown, picture
+                    page.sent.append(picture.number)
+                    await page.line.send(await self._bytes(picture, before))
+        except ConnectionClosed:
+            pass
+
+    def _told_to(self, page: Page) -> dict[str, Any]:
+        """Return what a page is told beside pictures: the clipboard is of the one who controls alone."""
+        told = dict(self._told)
+        if page is not self._control:
+            told.pop("copied", None)
+        told["people"] = [
+            {"number": each.number, "name": each.name, "asks": each.asks, "controls": each is self._control}
+            for each in self._pages
+        ]
+        return {**told, "you": page.number, "teacher": page.teacher}
+
+    async def _bytes(self, picture: Picture, before: Picture | None) -> bytes:
+        """Return a picture as a page needs it that shows another; those who watch in step share it."""
+        key = picture.number, 0 if before is None else before.number
+        found = self._encoded.get(key)
+        if found is None:
+            found = await asyncio.to_thread(encoded, picture, before)
+            if len(self._encoded) >= 8:
+                self._encoded.pop(next(iter(self._encoded)))
+            self._encoded[key] = found
+        return found
+
+
+def _cookie(request: Request, name: str) -> str:
+    """Return a cookie that came with a request."""
+    try:
+        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
+    except CookieError:
+        return ""
+    return cookies[name].value if name in cookies else ""
+
+
+def _own_origin(request: Request) -> bool:
+    """Return whether a socket is opened by our own page; what is no browser names no origin."""
+    origins = request.headers.get_all("Origin")
+    hosts = request.headers.get_all("Host") + request.headers.get_all("X-Forwarded-Host")
+    return all(urlsplit(origin).netloc in hosts for origin in origins) and len(origins) < 2
+
+
+def _same(token: str, other: str) -> bool:
+    return hmac.compare_digest(token.encode(errors="replace"), other.encode())
+
+
+def saved_since(folder: Path, since: float) -> tuple[str, ...]:
+    """Return the names of what windows save that was written to a folder since a time, the newest first."""
+    try:
+        with os.scandir(folder) as there:
+            seen = [each for each in islice(there, MOST_LISTED) if _is_saved(each)]
+        found = [(changed, each.name) for each in seen if (changed := each.stat().st_mtime) >= since]
+    except OSError:
+        return ()
+    return tuple(name for _, name in sorted(found, reverse=True)[:20])
+
+
+def _is_saved(entry: os.DirEntry[str]) -> bool:
+    """Return whether it looks like a file that windows save, or a folder of results."""
+    if entry.name.startswith("."):
+        return False
+    return Path(entry, MANIFEST).exists() if entry.is_dir() else Path(entry).suffix.lower() in _OFFERED
+
+
+def zipped(folder: Path) -> bytes:
+    """Return a folder as a zip; links in it are left out."""
+    archive = BytesIO()
+    with ZipFile(archive, "w", ZIP_DEFLATED) as into:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file() and not path.is_symlink():
+                into.write(path, path.relative_to(folder.parent))
+    return archive.getvalue()

@@ -1,0 +1,140 @@
+"""The served windows in a real browser."""
+
+from pathlib import Path
+
+import pytest
+from driven_browser import CHROMIUM, DRIVER, Browser
+from served_window import served
+
+pytest.importorskip("websockets")
+
+MAPS = Path(__file__).parents[3] / "maps"
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and its driver"),
+    pytest.mark.xdist_group("web"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    browser = Browser(tmp_path_factory.mktemp("browser"))
+    yield browser
+    browser.driver.quit()
+
+
+@pytest.fixture(autouse=True)
+def blank(browser):
+    """Leave the page of a test before, which would look for its window."""
+    browser.driver.get("about:blank")
+    browser.complaints()
+
+
+def sized(browser, width, height, ratio=1.0):
+    size = {"width": width, "height": height, "deviceScaleFactor": ratio, "mobile": width < 500}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def canvas_size(browser):
+    return browser.js("const it = document.querySelector('canvas'); return [it.width, it.height]")
+
+
+def picture(browser):
+    return browser.js("return document.querySelector('canvas').toDataURL()")
+
+
+def rested(browser):
+    """Wait until the picture stays as it is."""
+    seen = [""]
+
+    def same():
+        before, seen[0] = seen[0], picture(browser)
+        return before == seen[0] and browser.js("return work.then(() => true)")
+
+    browser.until(same)
+    return seen[0]
+
+
+def test_the_demo_follows_hands_page_and_colours(browser, tmp_path):
+    sized(browser, 1280, 720)
+    browser.prefer(color_scheme="light")
+    with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+        browser.driver.get(link)
+        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        assert "token" not in browser.driver.current_url
+        begun = rested(browser)
+        mouse = {"button": "left", "buttons": 1, "clickCount": 1}
+        for kind, x in (("mousePressed", 60), ("mouseMoved", 160), ("mouseReleased", 160)):
+            event = {"type": kind, "x": x, "y": 240, **mouse}
+            browser.driver.execute_cdp_cmd("Input.dispatchMouseEvent", event)
+        browser.until(lambda: picture(browser) != begun)
+        panned = rested(browser)
+        browser.keys("f")
+        browser.until(lambda: picture(browser) != panned)
+        browser.keys("/")  # the palette, without the letter
+        browser.keys("seed 7")
+        typed = rested(browser)
+        browser.keys("\ue007")
+        browser.until(lambda: picture(browser) != typed)
+        sized(browser, 390, 844, 3.0)
+        browser.until(lambda: canvas_size(browser) == [1170, 2532])
+        light = rested(browser)
+        browser.prefer(color_scheme="dark")
+        browser.until(lambda: picture(browser) != light)
+        browser.driver.refresh()  # the cookie is enough
+        browser.until(lambda: canvas_size(browser) == [1170, 2532])
+        assert not browser.complaints()
+
+
+def test_a_class_watches_the_teacher_and_what_is_saved_is_downloaded(browser, tmp_path):
+    sized(browser, 1280, 720)
+    (tmp_path / "down").mkdir()
+    place = {"behavior": "allow", "downloadPath": str(tmp_path / "down")}
+    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", place)
+    (tmp_path / "files").mkdir()
+    with served("demo", "rooms", "--paused", "--folder", str(tmp_path / "files")) as link:
+        browser.driver.get(link)
+        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        begun = rested(browser)
+        upload = (
+            "const box = new DataTransfer(); box.items.add(new File([arguments[0]], 'corner.json'));"
+            "dispatchEvent(new DragEvent('drop', {dataTransfer: box, bubbles: true, cancelable: true}))"
+        )
+        browser.js(upload, (MAPS / "trap.json").read_text())
+        browser.until(lambda: picture(browser) != begun)
+        browser.until(lambda: browser.all("#saved a"))
+        browser.find("#saved a").click()
+        browser.until(lambda: (tmp_path / "down/corner.json").exists())
+        teacher = browser.driver.current_window_handle
+        browser.driver.switch_to.new_window("tab")
+        browser.driver.get(link)
+        browser.until(lambda: "Teacher 1 controls" in browser.find("summary").get_property("textContent"))
+        assert browser.js("return document.body.className") == "watching"
+        browser.until(lambda: canvas_size(browser) == [1280, 720])
+        browser.find("summary").click()
+        browser.find("#here button").click()  # a second window of the teacher's takes control
+        browser.until(lambda: browser.js("return document.body.className") == "")
+        browser.driver.close()
+        browser.driver.switch_to.window(teacher)
+        browser.until(lambda: browser.js("return document.body.className") == "")
+        assert not browser.complaints()
+
+
+def test_a_telephone_held_upright_has_large_letters_and_buttons_below(browser, tmp_path):
+    touch = {"enabled": True, "maxTouchPoints": 2}
+    browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", touch)
+    try:
+        sized(browser, 390, 844, 3.0)
+        with served("demo", "rooms", "--paused", "--folder", str(tmp_path)) as link:
+            browser.driver.get(link)
+            browser.until(lambda: canvas_size(browser) == [1170, 2400])
+            narrow = rested(browser)
+            box = "const box = document.querySelector('canvas').getBoundingClientRect(); "
+            assert browser.js(f"{box} return [box.left, box.top, box.width, box.height]") == [0, 0, 390, 800]
+            assert browser.js("return document.getElementById('touch').getBoundingClientRect().top") == 800
+            browser.find("[data-key=h]").click()
+            browser.until(lambda: picture(browser) != narrow)
+            assert browser.complaints() == []
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
