@@ -1,4 +1,4 @@
-"""Draws what the README shows of the windows: window.png, editor.png, both in the dark, and tour.mp4."""
+"""Draws the windows that README and handbook show, window.png and editor.png in both themes, and tour.mp4."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from robocov_app.viewer.window import Window
 
 HERE = Path(__file__).parent
+HANDBOOK = HERE.parent / "app/handbook/pictures"
 SIZE = (1280, 720)
 
 
@@ -47,7 +48,7 @@ def picture(theme: str, name: str) -> None:
         viewer.pass_time(60.0)  # what was said is old
         for _ in range(8):
             window.frame(0.0)
-        keep(window, name)
+        keep(window, HERE / name)
 
 
 def editor(theme: str, name: str) -> None:
@@ -68,13 +69,13 @@ def editor(theme: str, name: str) -> None:
             window.frame(0.1)
         for _ in range(8):
             window.frame(0.1)
-        keep(window, name)
+        keep(window, HANDBOOK / name)
 
 
-def keep(window: Window | EditorWindow, name: str) -> None:
+def keep(window: Window | EditorWindow, file: Path) -> None:
     """Save what a window shows, as small as it can be."""
     small = Image.fromarray(pixels(window.screen)).quantize(256, dither=Image.Dither.NONE)
-    small.save(HERE / name, optimize=True)
+    small.save(file, optimize=True)
 
 
 def film(name: str) -> None:

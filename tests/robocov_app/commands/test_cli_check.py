@@ -16,7 +16,7 @@ from called import COMMAND
 
 from robocov.mapfile import bundled_maps
 from robocov_app.cli import main
-from robocov_app.commands import check
+from robocov_app.commands.maps import check
 
 GOOD = """{
   "format": "robocov-map", "version": 1,

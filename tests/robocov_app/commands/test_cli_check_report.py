@@ -4,7 +4,7 @@ import pytest
 
 from robocov.environment import CircleObstacle, DiscStart, Environment, WallObstacle
 from robocov.mapfile.check import check_map
-from robocov_app.commands.check import report_lines
+from robocov_app.commands.maps.check import report_lines
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from called import COMMAND, answer, complaint
 from robocov.generator import GENERATORS, generated_map
 from robocov.mapfile import bundled_maps, dump_map, load_map
 from robocov_app.cli import main
-from robocov_app.commands.generate import KindName
+from robocov_app.commands.maps.generate import KindName
 from robocov_app.replication.plan import QUICK
 from robocov_app.replication.studies import claim_maps, convex_maps, generated_maps
 

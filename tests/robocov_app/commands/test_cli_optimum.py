@@ -31,6 +31,7 @@ def test_the_answer_is_that_of_the_library_and_its_positions_cost_as_much(
     assert row["undescended_mean_distances_m"] == best.undescended.tolist()
     assert row["robots"] == row["restarts"] == 3
     assert row["runs"] == []
+    assert row["lower_bound"] is None
     assert row["agreement"] == {
         "0.001": best.agreement(0.001),
         "0.005": best.agreement(),
@@ -50,6 +51,18 @@ def test_it_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert "1 robot, 5 restarts in" in said
     assert "within 0.5% of the best     5" in said
     assert "[5.000, 5.000]" in said
+
+
+def test_a_lower_bound_is_proved_when_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    how = ("optimum", "square", "--lattice", "12", "--restarts", "2", "--robots", "1", "--bound")
+    bound = (row := answer(capsys, *how))["lower_bound"]
+    assert bound["mean_distance_m"] < row["mean_distance_m"]
+    assert bound["cost_m3"] == pytest.approx(100.0 * bound["mean_distance_m"])
+    assert bound["gap"] == pytest.approx(1.0 - bound["mean_distance_m"] / row["mean_distance_m"])
+    assert bound["gap"] < 0.001
+    assert main([*how, "--precision", "0.5"]) == 0
+    assert "lower bound     3." in (said := capsys.readouterr().out)
+    assert "m, no placement is more than 0." in said
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -124,6 +137,7 @@ def test_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (("rooms", "--restarts", "0"), "--restarts: 0, but a whole number from 1 to 100000 was wanted"),
         (("rooms", "--lattice", "1"), "--lattice: 1, but a whole number from 2 to 2048 was wanted"),
         (("rooms", "--seed", "-1"), "--seed: -1, but"),
+        (("rooms", "--precision", "0"), "--precision: 0.0, but a number from 1e-05 to 1 was wanted"),
         (("rooms", "--radius", "-1"), "radius: -1.0 m, but a number above 0 was wanted"),
         (("square", "--radius", "6"), "there is no room for any in map 'Square'"),
         (("rooms", "--plot", "a.jpg"), "'.jpg'"),

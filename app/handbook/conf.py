@@ -1,0 +1,25 @@
+"""Settings of Sphinx for the handbook; `robocov handbook --out site` builds it."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+project = "robocov"
+author = copyright = "The robocov authors"  # noqa: A001
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "reference"]
+exclude_patterns = ["README.md"]
+myst_enable_extensions = ["attrs_inline", "colon_fence"]
+myst_heading_anchors = 3
+html_theme = "furo"
+html_title = "robocov"
+html_copy_source = False
+html_show_sphinx = False
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+python_maximum_signature_line_length = 90
+toc_object_entries_show_parents = "hide"
+# a terminal's characters, and a map with comments, are no language that the highlighter knows
+suppress_warnings = ["misc.highlighting_failure"]

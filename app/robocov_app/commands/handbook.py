@@ -1,0 +1,104 @@
+"""`robocov handbook`."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from robocov.errors import InputError, OutputError, RobocovError
+
+
+@dataclass
+class Arguments:
+    """Open the handbook in a browser: tutorials, guides, and a reference of every command and name.
+
+    It is built at first use, and again after the program has changed (pip install "robocov[docs]"), and
+    kept in the user's cache; reading and searching it needs no network.
+
+    Example: robocov handbook --out site
+    """
+
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """Build it into this new folder, as static pages for any host, instead of opening it."""
+
+
+def command(options: Arguments) -> None:
+    """Build the pages where they are missing or old, and open or name them."""
+    if options.out is not None:
+        built(options.out)
+        print(f"saved in {options.out}/: begin with index.html")
+        return
+    import webbrowser
+
+    from robocov.files.array_files import ArrayCache
+
+    cache = ArrayCache.of_user()
+    home = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
+    pages = home / state_of_sources()
+    if not (pages / "index.html").is_file():
+        if cache is not None:
+            shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
+        print("building the handbook, once ...", file=sys.stderr)
+        built(pages)
+    index = pages / "index.html"
+    print(index)
+    webbrowser.open(index.as_uri())
+
+
+def sources() -> Path:
+    """Return the folder of the handbook's sources: in the package, else in the checkout."""
+    app = Path(__file__).resolve().parents[1]
+    return next(each for each in (app / "handbook", app.parent / "handbook") if each.is_dir())
+
+
+def state_of_sources() -> str:
+    """Return a name that changes when a page or a module of the program does."""
+    import robocov
+    from robocov.files.array_files import ArrayCache
+
+    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
+    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
+    generated = sources() / "reference"
+    stats = (f"{file} {file.stat().st_mtime_ns}" for file in files if generated not in file.parents)
+    return ArrayCache.key(*stats)
+
+
+def built(folder: Path) -> None:
+    """Build the pages into a new folder; a warning of Sphinx is an error.
+
+    Raises InputError where the folder has something in it, RobocovError where Sphinx is missing or complains.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
+    _require_sphinx()
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as work:
+            # a copy: the reference is written beside the other pages, and packages may be read-only
+            copy, pages = Path(work, "sources"), Path(work, "pages")
+            shutil.copytree(sources(), copy, ignore=shutil.ignore_patterns("reference", "__pycache__"))
+            call = [*(sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html")]
+            call += ["-d", str(Path(work, "doctrees")), str(copy), str(pages)]
+            done = subprocess.run(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            if done.returncode:
+                raise RobocovError(f"the handbook cannot be built: {done.stderr.strip()}")
+            pages.replace(folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
+
+
+def _require_sphinx() -> None:
+    from importlib.util import find_spec
+
+    if missing := [name for name in ("sphinx", "furo", "myst_parser") if find_spec(name) is None]:
+        raise RobocovError(
+            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
+            f"the pages can be read as text, too: {sources() / 'index.md'}"
+        )
