@@ -9,8 +9,7 @@ from drawn_sketches import HALL
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.editor.model.autosave import KIND, Autosave, content, recoverable
-from robocov_app.editor.model.file import saved, state_of
+from robocov_app.editor.model.document import KIND, Autosave, content, recoverable, state_of, write_sketch
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.toolkit.autosave import Autosaver, discard
 
@@ -29,7 +28,7 @@ def kept(folder: Path, sketch: Sketch, path: Path | None = None, disk=None) -> N
 
 def test_a_map_comes_back_with_its_file(tmp_path):
     path = tmp_path / "hall.json"
-    disk = saved(SKETCH, path)
+    disk = write_sketch(SKETCH, path)
     kept(tmp_path / "drafts", with_circles(5), path, disk)
     (found,) = recoverable(tmp_path / "drafts")
     assert (found.path, found.name, found.obstacles, found.disk) == (path, "Hall", 5, disk)
@@ -41,10 +40,10 @@ def test_a_map_comes_back_with_its_file(tmp_path):
 
 def test_one_whose_file_holds_it_already_is_not_offered(tmp_path):
     path = tmp_path / "hall.json"
-    disk = saved(with_circles(3), path)
+    disk = write_sketch(with_circles(3), path)
     kept(tmp_path / "drafts", with_circles(3), path, disk)
     assert recoverable(tmp_path / "drafts") == ()
-    saved(with_circles(4), path, disk)
+    write_sketch(with_circles(4), path, disk)
     assert len(recoverable(tmp_path / "drafts")) == 1
 
 

@@ -16,7 +16,7 @@ from robocov.environment import CircleObstacle, Environment, PolygonObstacle
 from robocov.errors import MapError
 from robocov.mapfile import dump_map, load_map, save_map, to_json
 from robocov_app.editor.edits import density as density_edits
-from robocov_app.editor.model.file import opened, saved
+from robocov_app.editor.model.document import read_sketch, write_sketch
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch, sketch_text
@@ -33,11 +33,11 @@ def heavy(density=ONE) -> Sketch:
 def test_it_passes_through_unchanged(density, tmp_path):
     path = tmp_path / "heavy.json"
     save_map(Environment("heavy", RING, density=density), path)
-    sketch, disk = opened(path)
+    sketch, disk = read_sketch(path)
     assert sketch.density == density and sketch.environment() == load_map(path)
     assert sketch_text(sketch) == path.read_text() == dump_map(load_map(path))
     edited, _ = sketch.added([CircleObstacle((5.0, 5.0), 0.5)])
-    saved(edited, path, disk)
+    write_sketch(edited, path, disk)
     assert load_map(path).density == density and len(load_map(path).obstacles) == 1
 
 
@@ -48,13 +48,13 @@ def test_a_picture_is_read_when_the_map_is(tmp_path):
     }
     path = tmp_path / "heavy.json"
     path.write_text(json.dumps(document))
-    sketch, _ = opened(path)
+    sketch, _ = read_sketch(path)
     assert sketch.density == load_map(path).density and isinstance(sketch.density, Raster)
-    saved(sketch, tmp_path / "elsewhere.json")
+    write_sketch(sketch, tmp_path / "elsewhere.json")
     (tmp_path / "phi.png").unlink()
     assert load_map(tmp_path / "elsewhere.json").density == sketch.density
     with pytest.raises(MapError, match=r"heavy.json:.*density.picture: .phi.png.: no such file"):
-        opened(path)
+        read_sketch(path)
 
 
 def test_what_is_no_density_is_refused_with_its_place():

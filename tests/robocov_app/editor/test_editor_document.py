@@ -22,8 +22,7 @@ from robocov.environment import (
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, dump_map, load_map, parse_map, to_json
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.model.annotations import annotated, taken_apart
-from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.background import Background, annotated, taken_apart
 from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch, draft_document, geometry_of, sketch_text

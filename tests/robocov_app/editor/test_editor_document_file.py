@@ -9,9 +9,7 @@ from robocov.environment import CircleObstacle
 from robocov.errors import MapError, RobocovError
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.editor.edits import create, properties
-from robocov_app.editor.model.autosave import recoverable
-from robocov_app.editor.model.document import FIRST_SHEET, Document
-from robocov_app.editor.model.file import ChangedError
+from robocov_app.editor.model.document import FIRST_SHEET, ChangedError, Document, recoverable
 from robocov_app.editor.model.selection import Selection
 
 PILLAR = CircleObstacle((5, 5), 1.0)

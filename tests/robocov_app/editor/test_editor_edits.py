@@ -80,7 +80,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     assert change.selection == Selection.of("start 2")
     change = create.points_start_drawn(sketch, [(1.0, 1.0), (2.0, 1.0), (1.0, 1.00001)])
     assert change.sketch.starts[-1] == ("start", PointsStart(((1.0, 1.0), (2.0, 1.0))))
-    assert create.uniform_start_added(sketch).sketch.start("start") == UniformStart()
+    assert create.anywhere_added(sketch).sketch.start("start") == UniformStart()
 
 
 @pytest.mark.parametrize(

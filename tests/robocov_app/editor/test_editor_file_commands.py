@@ -18,8 +18,7 @@ from robocov.errors import InputError, MapError
 from robocov.mapfile import load_map, save_map
 from robocov_app.cli import main
 from robocov_app.editor.edits import create
-from robocov_app.editor.model.autosave import recoverable
-from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.document import Document, recoverable
 from robocov_app.editor.ui.commands import run_typed
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.launch import editor_window, offer

@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, OutputError
 from robocov.mapfile import load_map
-from robocov_app.editor.model import file
-from robocov_app.editor.model.file import ChangedError, opened, saved, state_of
+from robocov_app.editor.model import document
+from robocov_app.editor.model.document import ChangedError, read_sketch, state_of, write_sketch
 from robocov_app.editor.model.sketch import Sketch, sketch_text
 
 SKETCH = Sketch("Hall", boundary=HALL)
@@ -20,15 +20,15 @@ SKETCH = Sketch("Hall", boundary=HALL)
 @given(drafts())
 def test_what_is_saved_is_opened_again(tmp_path, sketch):
     path = tmp_path / "draft.json"
-    saved(sketch, path, over=True)
-    again, disk = opened(path)
+    write_sketch(sketch, path, over=True)
+    again, disk = read_sketch(path)
     assert again == sketch
     assert state_of(disk) == "same"
     assert [file.name for file in tmp_path.iterdir()] == ["draft.json"]
 
 
 def test_what_runs_can_be_loaded(tmp_path):
-    saved(SKETCH, tmp_path / "map.json")
+    write_sketch(SKETCH, tmp_path / "map.json")
     assert load_map(tmp_path / "map.json") == SKETCH.environment()
 
 
@@ -36,19 +36,19 @@ def test_a_file_that_is_there_is_not_overwritten_unasked(tmp_path):
     path = tmp_path / "map.json"
     path.write_text("precious")
     with pytest.raises(ChangedError, match="such a file already"):
-        saved(SKETCH, path)
+        write_sketch(SKETCH, path)
     assert path.read_text() == "precious"
-    disk = saved(SKETCH, path, over=True)
-    assert saved(SKETCH, path, disk).digest == disk.digest
+    disk = write_sketch(SKETCH, path, over=True)
+    assert write_sketch(SKETCH, path, disk).digest == disk.digest
     # known of, but by another name
     (tmp_path / "other.json").write_text("precious")
     with pytest.raises(ChangedError):
-        saved(SKETCH, tmp_path / "other.json", disk)
+        write_sketch(SKETCH, tmp_path / "other.json", disk)
 
 
 def test_changes_on_disk_are_noticed(tmp_path):
     path = tmp_path / "map.json"
-    disk = saved(SKETCH, path)
+    disk = write_sketch(SKETCH, path)
     assert state_of(disk) == "same"
     os.utime(path, ns=(1, 1))
     assert state_of(disk) == "same", "merely touched"
@@ -56,44 +56,44 @@ def test_changes_on_disk_are_noticed(tmp_path):
     path.write_text(text.replace("12", "13"))
     assert state_of(disk) == "changed", "of the same length"
     with pytest.raises(ChangedError, match="changed by something else"):
-        saved(SKETCH, path, disk)
+        write_sketch(SKETCH, path, disk)
     path.unlink()
     assert state_of(disk) == "gone"
     # what has gone can be written again
-    assert state_of(saved(SKETCH, path, disk)) == "same"
+    assert state_of(write_sketch(SKETCH, path, disk)) == "same"
 
 
 def test_two_windows_on_one_file_do_not_overwrite_each_other(tmp_path):
     path = tmp_path / "map.json"
-    saved(SKETCH, path)
-    (first, disk_of_first), (second, disk_of_second) = opened(path), opened(path)
+    write_sketch(SKETCH, path)
+    (first, disk_of_first), (second, disk_of_second) = read_sketch(path), read_sketch(path)
     one, _ = first.added([CircleObstacle((1.0, 1.0), 0.5)])
     other, _ = second.added([CircleObstacle((2.0, 2.0), 0.5)])
-    disk_of_first = saved(one, path, disk_of_first)
+    disk_of_first = write_sketch(one, path, disk_of_first)
     with pytest.raises(ChangedError):
-        saved(other, path, disk_of_second)
-    assert opened(path)[0] == renumbered(one)
-    saved(other, path, disk_of_second, over=True)
+        write_sketch(other, path, disk_of_second)
+    assert read_sketch(path)[0] == renumbered(one)
+    write_sketch(other, path, disk_of_second, over=True)
     assert state_of(disk_of_first) == "changed"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and modes")
 def test_links_and_modes_stay(tmp_path):
     target = tmp_path / "target.json"
-    saved(SKETCH, target)
+    write_sketch(SKETCH, target)
     target.chmod(0o640)
     link = tmp_path / "link.json"
     link.symlink_to(target)
-    sketch, disk = opened(link)
-    saved(sketch.added([CircleObstacle((1.0, 1.0), 0.5)])[0], link, disk)
+    sketch, disk = read_sketch(link)
+    write_sketch(sketch.added([CircleObstacle((1.0, 1.0), 0.5)])[0], link, disk)
     assert link.is_symlink()
-    assert len(opened(target)[0].obstacles) == 1
+    assert len(read_sketch(target)[0].obstacles) == 1
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
 
 
 def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
     path = tmp_path / "map.json"
-    disk = saved(SKETCH, path)
+    disk = write_sketch(SKETCH, path)
     before = path.read_bytes()
 
     def full(self, data):
@@ -101,29 +101,29 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path, monkeypatch):
 
     monkeypatch.setattr("pathlib.Path.write_bytes", full)
     with pytest.raises(OutputError, match=r"map\.json: cannot be written: No space left"):
-        saved(SKETCH.added([CircleObstacle((1.0, 1.0), 0.5)])[0], path, disk)
+        write_sketch(SKETCH.added([CircleObstacle((1.0, 1.0), 0.5)])[0], path, disk)
     monkeypatch.undo()
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["map.json"]
     for bad in (tmp_path, tmp_path / "none" / "map.json", tmp_path / "map.json" / "x.json"):
         with pytest.raises(OutputError) as caught:
-            saved(SKETCH, bad, over=True)
+            write_sketch(SKETCH, bad, over=True)
         assert "\n" not in str(caught.value)
     with pytest.raises(OutputError):
-        saved(SKETCH, tmp_path / "a\0b.json")
+        write_sketch(SKETCH, tmp_path / "a\0b.json")
 
 
 def test_what_cannot_be_opened_is_said(tmp_path):
     with pytest.raises(MapError, match="no such file"):
-        opened(tmp_path / "none.json")
+        read_sketch(tmp_path / "none.json")
     (tmp_path / "not.json").write_text("{")
     with pytest.raises(MapError, match=r"not.json:1:2: .*not JSON"):
-        opened(tmp_path / "not.json")
+        read_sketch(tmp_path / "not.json")
 
 
 def test_paths_are_absolute(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    disk = saved(SKETCH, file.Path("map.json"))
+    disk = write_sketch(SKETCH, document.Path("map.json"))
     assert disk.path.is_absolute()
     monkeypatch.chdir(tmp_path.parent)
     assert state_of(disk) == "same"

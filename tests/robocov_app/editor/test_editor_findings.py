@@ -9,7 +9,7 @@ import pytest
 from driven_editor import Hands, of_map, opened_editor, sheet
 
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
-from robocov_app.editor.canvas.captions import map_words
+from robocov_app.editor.canvas.canvas import map_words
 from robocov_app.editor.canvas.overlay import STEM
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.theme import DARK, LIGHT
@@ -94,6 +94,7 @@ def test_a_sheet_with_nothing_on_it_is_drawn_too(tmp_path: Path) -> None:
             hands.key("escape", times=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
 def test_everything_at_once_is_drawn_at_every_scale_and_in_the_dark(tmp_path: Path, scale: float) -> None:
     starts = (("disc", DiscStart((8, 2), 0.8)), ("spots", PointsStart(((1, 1), (1.5, 1)))))

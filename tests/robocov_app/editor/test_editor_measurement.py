@@ -41,6 +41,7 @@ def rastered(free: shapely.Geometry, radius: float, cell: float) -> tuple[np.nda
     return parts, swept & inside
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(sound_sketches(least=1, most=6), st.sampled_from([0.1, 0.25, 0.6]))
 def test_what_robots_reach_is_what_a_raster_says(sketch, radius):

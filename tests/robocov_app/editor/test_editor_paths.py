@@ -10,7 +10,7 @@ from driven_editor import opened_editor, sheet
 from robocov.environment import CircleObstacle, ObstaclePath, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov.mapfile import load_map
-from robocov_app.editor.edits import motion_path, properties, transform
+from robocov_app.editor.edits import paths, properties, transform
 from robocov_app.editor.edits.transform import Affine
 from robocov_app.editor.model.parser import parse_sketch
 from robocov_app.editor.model.selection import Selection
@@ -24,7 +24,7 @@ DESK = PolygonObstacle(((5.0, 7.0), (7.0, 7.0), (7.0, 8.0), (5.0, 8.0)))
 
 
 def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
-    path = motion_path.path_of(sketch, key)
+    path = paths.path_of(sketch, key)
     assert path is not None
     return path
 
@@ -34,44 +34,44 @@ def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
 
 def test_the_first_way_point_makes_a_path_from_the_obstacles_middle() -> None:
     sketch = sheet(DESK)
-    change = motion_path.way_point_added(sketch, 0, (1.0, 3.00004), speed=0.3)
+    change = paths.way_point_added(sketch, 0, (1.0, 3.00004), speed=0.3)
     assert led(change.sketch) == ObstaclePath(((6.0, 7.5), (1.0, 3.0)), 0.3, "back-and-forth")
     assert change.selection == Selection.of(0)
     # where it is drawn it stays
     assert change.sketch.environment().at(0.0).obstacles[0].polygon.equals(DESK.polygon)
-    more = motion_path.way_point_added(change.sketch, 0, (1.0, 1.0)).sketch
-    between = motion_path.way_point_added(more, 0, (3.0, 6.0), 1).sketch
+    more = paths.way_point_added(change.sketch, 0, (1.0, 1.0)).sketch
+    between = paths.way_point_added(more, 0, (3.0, 6.0), 1).sketch
     assert led(between).points == ((6.0, 7.5), (3.0, 6.0), (1.0, 3.0), (1.0, 1.0))
 
 
 def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
     sketch = sheet(MOVING)
-    moved = motion_path.way_point_moved(sketch, 0, 1, (7.0, 3.0)).sketch
+    moved = paths.way_point_moved(sketch, 0, 1, (7.0, 3.0)).sketch
     assert led(moved).points[1] == (7.0, 3.0)
-    fewer = motion_path.way_point_removed(moved, 0, 0).sketch
+    fewer = paths.way_point_removed(moved, 0, 0).sketch
     assert led(fewer).points == ((7.0, 3.0), (8.0, 6.0))
-    assert motion_path.path_of(motion_path.way_point_removed(fewer, 0, 1).sketch, 0) is None
+    assert paths.path_of(paths.way_point_removed(fewer, 0, 1).sketch, 0) is None
     with pytest.raises(MapError, match="no such way point"):
-        motion_path.way_point_moved(sketch, 0, 3, (1.0, 1.0))
+        paths.way_point_moved(sketch, 0, 3, (1.0, 1.0))
     with pytest.raises(MapError, match="in one place"):
-        motion_path.way_point_moved(fewer, 0, 0, (8.0, 6.0))
+        paths.way_point_moved(fewer, 0, 0, (8.0, 6.0))
     with pytest.raises(MapError, match="too far away"):
-        motion_path.way_point_moved(sketch, 0, 0, (float("nan"), 0.0))
+        paths.way_point_moved(sketch, 0, 0, (float("nan"), 0.0))
 
 
 def test_speed_and_what_happens_at_the_end() -> None:
     sketch, both = sheet(MOVING, DESK, replace(CART, center=(5.0, 5.0), path=ROUND)), Selection.of(0, 1, 2)
-    turned = motion_path.path_turned(sketch, both).sketch
+    turned = paths.path_turned(sketch, both).sketch
     assert [led(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
-    assert led(motion_path.path_turned(turned, both).sketch).repeat == "loop"
-    paced = motion_path.path_paced(sketch, both, 0.25).sketch
-    assert led(paced, 2).speed == 0.25 and motion_path.path_of(paced, 1) is None
-    gone = motion_path.path_removed(sketch, both).sketch
-    assert motion_path.moving(sketch) == (0, 2) and motion_path.moving(gone) == ()
+    assert led(paths.path_turned(turned, both).sketch).repeat == "loop"
+    paced = paths.path_paced(sketch, both, 0.25).sketch
+    assert led(paced, 2).speed == 0.25 and paths.path_of(paced, 1) is None
+    gone = paths.path_removed(sketch, both).sketch
+    assert paths.moving(sketch) == (0, 2) and paths.moving(gone) == ()
     for act in (
-        motion_path.path_turned,
-        motion_path.path_removed,
-        lambda *two: motion_path.path_paced(*two, 1.0),
+        paths.path_turned,
+        paths.path_removed,
+        lambda *two: paths.path_paced(*two, 1.0),
     ):
         with pytest.raises(MapError, match="select an obstacle that moves"):
             act(sketch, Selection.of(1))
@@ -80,25 +80,25 @@ def test_speed_and_what_happens_at_the_end() -> None:
 @pytest.mark.parametrize("text", ["0", "-1", "11", "fast", "nan"])
 def test_what_is_no_speed_is_refused(text: str) -> None:
     with pytest.raises(MapError, match="m/s was wanted"):
-        motion_path.speed_of(text)
+        paths.speed_of(text)
 
 
 def test_what_is_near() -> None:
-    assert motion_path.way_point_at(ROUND, (8.1, 2.1), 0.2) == 1
-    assert motion_path.way_point_at(ROUND, (5.0, 2.0), 0.2) is None
-    assert motion_path.leg_at(ROUND, (5.0, 2.1), 0.2) == 1
+    assert paths.way_point_at(ROUND, (8.1, 2.1), 0.2) == 1
+    assert paths.way_point_at(ROUND, (5.0, 2.0), 0.2) is None
+    assert paths.leg_at(ROUND, (5.0, 2.1), 0.2) == 1
     # the leg back to the first way point is one of loops only
-    assert motion_path.leg_at(ROUND, (5.0, 4.0), 0.2) == 3
-    assert motion_path.leg_at(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
+    assert paths.leg_at(ROUND, (5.0, 4.0), 0.2) == 3
+    assert paths.leg_at(replace(ROUND, repeat="back-and-forth"), (5.0, 4.0), 0.2) is None
 
 
 @pytest.mark.parametrize("points", [(), ((1.0, 1.0),), ((1.0, 1.0), (1.0, 1.0))])
 def test_a_drafts_path_that_leads_nowhere_breaks_nothing(points, tmp_path: Path) -> None:
     broken = replace(CART, path=ObstaclePath(points, 0.0))
-    assert not motion_path.goes(broken.path)
-    assert motion_path.path_words(broken.path) == "leads nowhere"
-    motion_path.way_point_at(broken.path, (0.0, 0.0), 1.0)
-    assert motion_path.leg_at(broken.path, (9.0, 9.0), 0.1) is None
+    assert not paths.goes(broken.path)
+    assert paths.path_words(broken.path) == "leads nowhere"
+    paths.way_point_at(broken.path, (0.0, 0.0), 1.0)
+    assert paths.leg_at(broken.path, (9.0, 9.0), 0.1) is None
     with opened_editor(tmp_path, sheet(broken)) as hands:
         hands.editor.select(Selection.of(0))
         hands.key("l")
@@ -127,7 +127,7 @@ def test_a_circle_that_becomes_a_polygon_goes_on_moving() -> None:
 
 
 def test_it_is_kept_in_the_file() -> None:
-    sketch = motion_path.way_point_added(sheet(DESK), 0, (1.0, 3.0)).sketch
+    sketch = paths.way_point_added(sheet(DESK), 0, (1.0, 3.0)).sketch
     again = parse_sketch(sketch_text(sketch), "map")
     assert led(again) == led(sketch)
     assert again.environment().moves
@@ -144,7 +144,7 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
         hands.click_all((4.0, 4.0))
         assert "click the obstacle" in editor.message
         hands.click_all((2.0, 2.0), (2.1, 2.1))
-        assert editor.selection == Selection.of(0) and motion_path.moving(hands.sketch) == ()
+        assert editor.selection == Selection.of(0) and paths.moving(hands.sketch) == ()
         hands.click_all((6.0, 2.0), (6.0, 5.0))
         points = np.array(led(hands.sketch).points)
         np.testing.assert_allclose(points, [[2, 2], [6, 2], [6, 5]], atol=0.03)
@@ -166,14 +166,14 @@ def test_a_path_is_drawn_dragged_typed_and_undone(tmp_path: Path) -> None:
             hands.key("ctrl+z")
         assert len(led(hands.sketch).points) == 2
         hands.key("ctrl+z")
-        assert motion_path.moving(hands.sketch) == ()
+        assert paths.moving(hands.sketch) == ()
 
 
 def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
     with opened_editor(tmp_path, sheet(MOVING, DESK)) as hands:
         hands.key("o")
         hands.click_all((2.0, 2.3), (6.0, 7.3), (2.0, 7.5))
-        assert motion_path.moving(hands.sketch) == (0, 1)
+        assert paths.moving(hands.sketch) == (0, 1)
         assert led(hands.sketch) == ROUND
         hands.key("return")
         assert not hands.editor.selection and hands.editor.tool.name == "path"
@@ -181,7 +181,7 @@ def test_another_obstacle_is_led_after_it(tmp_path: Path) -> None:
         hands.key("escape")
         assert hands.editor.tool is hands.editor.selector and hands.editor.selection == Selection.of(1)
         hands.key("alt+o")
-        assert motion_path.moving(hands.sketch) == (0,)
+        assert paths.moving(hands.sketch) == (0,)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -193,7 +193,7 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
         hands.editor.message = ""
         hands.frames(2)
         before = hands.picture()
-        change = motion_path.way_point_added(hands.sketch, 0, (8.0, 2.0))
+        change = paths.way_point_added(hands.sketch, 0, (8.0, 2.0))
         hands.editor.change(replace(change, selection=Selection(), words=""))
         hands.editor.message = ""
         hands.frames(2)
@@ -214,7 +214,7 @@ def test_paths_are_seen_and_obstacles_shown_moving(tmp_path: Path, theme: str) -
 def test_what_is_saved_moves_in_a_run(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     with opened_editor(tmp_path, sheet(CART)) as hands:
-        hands.editor.change(motion_path.way_point_added(hands.sketch, 0, (8.0, 2.0)))
+        hands.editor.change(paths.way_point_added(hands.sketch, 0, (8.0, 2.0)))
         hands.editor.document.save(path)
     environment = load_map(path)
     assert environment.at(4.0).obstacles[0].center == pytest.approx((4.0, 2.0))
@@ -229,4 +229,4 @@ def test_a_command_and_buttons_change_it(tmp_path: Path) -> None:
         hands.push("path:repeat")
         assert led(hands.sketch).repeat == "back-and-forth"
         hands.push("path:none")
-        assert motion_path.moving(hands.sketch) == ()
+        assert paths.moving(hands.sketch) == ()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits.simplify import simplified, straightened
+from robocov_app.editor.edits.vertices import simplified, straightened
 from robocov_app.editor.model.selection import Selection, ring_points
 from robocov_app.editor.model.sketch import Sketch
 

@@ -5,7 +5,7 @@ import time
 from driven_editor import sheet
 
 from robocov.environment import PolygonObstacle
-from robocov_app.editor.tools.snap_targets import MANY, Snapper, vertex_count
+from robocov_app.editor.tools.snapping import MANY, Snapper, vertex_count
 
 SMALL = sheet(PolygonObstacle(((1, 1), (2, 1), (2, 2))))
 LARGE = sheet(PolygonObstacle(tuple((5 + k * 1e-3, 5 + (k % 2) * 0.1) for k in range(MANY + 1))))

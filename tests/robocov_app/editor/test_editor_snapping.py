@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, DiscStart, PointsStart, PolygonObstacle, WallObstacle
 from robocov_app.editor.model.selection import Vertex, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
-from robocov_app.editor.tools.snap_targets import Targets
-from robocov_app.editor.tools.snapping import KINDS, Snapping, snapped, snapped_angle, snapped_move
+from robocov_app.editor.tools.snapping import KINDS, Snapping, Targets, snapped, snapped_angle, snapped_move
 
 BOX = PolygonObstacle(((1.0, 1.0), (4.0, 1.0), (4.0, 3.0), (1.0, 3.0)))
 PILLAR = CircleObstacle((7.03, 5.04), 0.51)

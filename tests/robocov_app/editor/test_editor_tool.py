@@ -4,17 +4,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.tools.tool import (
+from robocov_app.editor.model.geometry import (
     ANGLE,
-    PointerEvent,
-    Tool,
     at_round_angle,
     bearing_words,
-    constrained_point,
+    distance,
     length_words,
     ring_area,
 )
+from robocov_app.editor.tools.tool import PointerEvent, Tool, constrained_point
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)

@@ -14,9 +14,9 @@ from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.ui.panel import TABS
-from robocov_app.editor.ui.status import facts
+from robocov_app.editor.ui.window import facts
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit import help as help_page
+from robocov_app.toolkit import command as help_page
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.layout import SMALLEST
 
@@ -343,6 +343,7 @@ def test_the_clipboard_keeps_texts_also_without_a_display() -> None:
     assert clipboard.get() == "text"
 
 
+@pytest.mark.slow
 def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp_path: Path) -> None:
     generator = np.random.default_rng(0)
     rings = []
@@ -400,6 +401,7 @@ def test_all_things_are_listed_also_those_that_are_hidden(hands: Hands) -> None:
     assert hands.editor.selection.items == {0}
 
 
+@pytest.mark.slow
 def test_many_selected_things_are_outlined_once_and_look_the_same(tmp_path: Path, monkeypatch) -> None:
     shapes = [CircleObstacle((k % 20 * 0.45 + 0.5, k // 20 * 0.8 + 0.5), 0.2) for k in range(210)]
     pictures = []

@@ -1,6 +1,7 @@
 import time
 from contextlib import closing
 
+import pytest
 from drawn_sketches import HALL, changes, sound_sketches
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -31,6 +32,7 @@ def same(a, b) -> bool:
     )
 
 
+@pytest.mark.slow
 def test_it_says_what_the_function_says_after_every_change():
     history = [SKETCH]
     history.append(transform.moved(history[-1], Selection.of(0), 1.0, 0.0).sketch)

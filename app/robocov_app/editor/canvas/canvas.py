@@ -1,4 +1,4 @@
-"""The canvas: the sheet under a camera, and all that is drawn on top of it while it is edited."""
+"""The canvas: the sheet under a camera, what is drawn on top of it, and the strips above and below."""
 
 from dataclasses import replace
 from functools import partial
@@ -7,31 +7,110 @@ from pathlib import Path
 import numpy as np
 import pygame
 import shapely
+from pygame import Rect, Surface
 
 from robocov.environment import Point
+from robocov.errors import counted
 from robocov_app.editor.canvas import overlay
-from robocov_app.editor.canvas.captions import Strips
-from robocov_app.editor.canvas.map_layers import Sheet, View
-from robocov_app.editor.canvas.overlay import accent
-from robocov_app.editor.edits.motion_path import goes, moving
+from robocov_app.editor.canvas.map_layers import Sheet, View, beyond
+from robocov_app.editor.canvas.overlay import accent, legend_entries
+from robocov_app.editor.edits.paths import goes, moving
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 from robocov_app.editor.model.validation import Problem
-from robocov_app.editor.tools.handles import KNOB, frame_of, handles
 from robocov_app.editor.tools.select import Moving
+from robocov_app.editor.tools.tool import KNOB, frame_of, handles
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.team import Team
-from robocov_app.render import sprites
+from robocov_app.render import annotations, sprites
 from robocov_app.render.camera import Camera
-from robocov_app.render.canvas import Canvas
+from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.density import range_label, value_range
+from robocov_app.render.fonts import shortened
+from robocov_app.render.heatmaps import density_entry
 from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme, mix
-from robocov_app.toolkit.cache import Latest
-from robocov_app.toolkit.layout import Layout
+from robocov_app.toolkit.layout import Box, Layout
+
+
+class Strips:
+    """Draws the strips, and says what they leave to the sheet."""
+
+    def __init__(self, editor: Editor) -> None:
+        self._editor = editor
+        self._entries: list[LegendEntry] = []
+        self._rows = 1
+        self._rows_for: object = None
+        self._unfree: Latest[bool] = Latest()
+        self._legend: Latest[Surface] = Latest()
+
+    def room(self, box: Box, scale: float) -> tuple[float, float, float, float]:
+        """Return what of a box is left: left, top, width and height, px."""
+        left, top, width, height = box
+        has_legend = "legend" in self._editor.shown
+        above = round((10 + annotations.LEGEND_ROW * self._rows) * scale) if has_legend else 0
+        below = max(height - above - round(annotations.STRIP * scale), 1)
+        return float(left), float(top + above), float(width), float(below)
+
+    def update(self, canvas: Canvas, team: Team | None) -> None:
+        """Look what there is to tell, on a canvas as wide as the sheet."""
+        editor = self._editor
+        self._entries = self._found(team)
+        rows = max(len(annotations.legend_rows(canvas, self._entries)), 1)
+        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
+        # while things come and go the legend does not become lower again: the map is not to jump
+        self._rows = max(rows, self._rows) if key == self._rows_for else rows
+        self._rows_for = key
+
+    def _found(self, team: Team | None) -> list[LegendEntry]:
+        sketch, shown = self._editor.sketch, self._editor.shown
+        if "legend" not in shown:
+            return []
+        unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
+        standing = "robots" in shown and team is not None and bool(team.places)
+        measurement = self._editor.measurement if "impassable" in shown else None
+        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=unfree)
+        density = sketch.density
+        if density is not None and not density.uniform and sketch.boundary:
+            x, y = zip(*sketch.boundary, strict=True)
+            span = value_range(density, (min(x), min(y), max(x), max(y)))
+            found.append(density_entry(range_label(span)))
+        return found
+
+    def draw(self, screen: Surface, canvas: Canvas, box: Box) -> None:
+        """Draw both strips."""
+        left, top, width, height = box
+        if self._entries:
+            key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
+            wide = replace(canvas, surface=Surface((width, 1)))
+            legend = self._legend.of(None, key, lambda: annotations.legend_strip(self._entries, wide))
+            screen.blit(legend, (left, top))
+        high = round(annotations.STRIP * canvas.scale)
+        foot = screen.subsurface(Rect(left, top + height - high, width, high))
+        own = replace(canvas, surface=foot)
+        annotations.draw_scale_bar(own)
+        taken = (annotations.EDGE + 90) * canvas.scale + annotations.bar_length(own) * canvas.camera.zoom
+        size = canvas.text_size(canvas.theme.text)
+        words = shortened(map_words(self._editor), size, width - taken - annotations.EDGE * canvas.scale)
+        own.text(words, (width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
+
+
+def map_words(editor: Editor) -> str:
+    """Return what the strip below the sheet says: whose map it is, and what it is like."""
+    sketch, measurement = editor.sketch, editor.measurement
+    unsaved = "● " if editor.document.unsaved else ""
+    said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
+    if measurement is not None:
+        said.append(f"{measurement.free_area:.2f} m² free")
+        if grave := sum(problem.grave for problem in measurement.problems):
+            said.append(f"draft: {counted(grave, 'problem')}")
+    return "   ·   ".join(said)
+
 
 MANY = 200  # selected things from which on their outlines are drawn once, and then the picture of them
 REACH = 12.0  # pixels at scale 1 that a finger is wide
@@ -53,9 +132,9 @@ class EditorCanvas:
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
         self._camera: Camera | None = None
-        self._hatched: Latest[tuple[pygame.Surface, pygame.Rect] | None] = Latest()
-        self._carried: Latest[pygame.Surface] = Latest()
-        self._outlined: Latest[pygame.Surface] = Latest()
+        self._hatched: Latest[tuple[Surface, Rect] | None] = Latest()
+        self._carried: Latest[Surface] = Latest()
+        self._outlined: Latest[Surface] = Latest()
 
     # cameras
 
@@ -70,7 +149,7 @@ class EditorCanvas:
 
     @property
     def camera(self) -> Camera:
-        """What is shown where."""
+        """The camera, from world coordinates to pixels."""
         if self._camera is None:
             self.fit()
         assert self._camera is not None
@@ -147,7 +226,7 @@ class EditorCanvas:
 
     @property
     def reach(self) -> float:
-        """How many metres a finger is wide."""
+        """Width of a finger, m."""
         return REACH * self.layout.scale / self.camera.zoom
 
     def problem_at(self, pixel: Point) -> Problem | None:
@@ -167,11 +246,11 @@ class EditorCanvas:
         shown = frozenset(editor.shown)
         return View(self.camera, self.theme, layout.scale, layout.size, shown, editor.grid, folder)
 
-    def draw(self, screen: pygame.Surface) -> None:
+    def draw(self, screen: Surface) -> None:
         """Draw all of it."""
         editor, shown, theme = self.editor, self.editor.shown, self.theme
-        box = pygame.Rect(self.layout.arena)
-        self.strips.update(self._view().canvas(pygame.Surface((box.width, 1))), self.team)
+        box = Rect(self.layout.arena)
+        self.strips.update(self._view().canvas(Surface((box.width, 1))), self.team)
         if self.camera.view != self._view_box():
             self._look(self.camera.within(self._view_box()))
         view = self._view()
@@ -226,19 +305,19 @@ class EditorCanvas:
     def _lifted_fill(self) -> Colour:
         return mix(self.theme.obstacle, accent(self.theme), 0.22)
 
-    def _hatch(self, screen: pygame.Surface, view: View, measurement: Measurement) -> None:
+    def _hatch(self, screen: Surface, view: View, measurement: Measurement) -> None:
         look = view.camera, view.theme.name, view.scale, view.size
         patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
         if patch is not None:
             screen.blit(*patch, special_flags=_BLEND)
 
-    def _carry(self, screen: pygame.Surface, view: View, drag: Moving) -> None:
+    def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
         """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
         sketch, colour = self.editor.sketch, accent(self.theme)
 
-        def drawn() -> pygame.Surface:
-            page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
+        def drawn() -> Surface:
+            page = Surface(view.size, pygame.SRCALPHA, 32)
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
             self.sheet.draw_items(view.canvas(page), there, self._lifted_fill, colour)
             for owner in drag.moving.owners - drag.moving.items:
@@ -278,7 +357,7 @@ class EditorCanvas:
             canvas.stamp(partial(sprites.disc, size, fill, theme.robot_ring, rim, edge, text), at)
 
     def _draw_selection(
-        self, screen: pygame.Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
+        self, screen: Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
     ) -> None:
         editor, selector, colour = self.editor, self.editor.selector, accent(self.theme)
         floor = self.theme.background
@@ -292,8 +371,8 @@ class EditorCanvas:
             for owner in owners:
                 self._draw_owner(canvas, sketch, owner, colour, 2.0)
 
-        def outlined() -> pygame.Surface:
-            page = pygame.Surface(view.size, pygame.SRCALPHA, 32)
+        def outlined() -> Surface:
+            page = Surface(view.size, pygame.SRCALPHA, 32)
             outline(view.canvas(page))
             return page
 
@@ -329,7 +408,7 @@ class EditorCanvas:
         if preview is not None:
             overlay.draw_preview(canvas, preview, self.at)
         if editor.typed:
-            overlay.draw_typed(canvas, editor.typed, self.at or pygame.Rect(self.camera.view).center)
+            overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
 
 
 def _changed(base: Sketch, now: Sketch) -> frozenset[int]:

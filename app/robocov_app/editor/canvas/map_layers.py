@@ -1,22 +1,109 @@
 """The sheet: floor, picture, grid, obstacles and boundary on one page; only what changed is drawn anew."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pygame
 import shapely
+from pygame import Rect, Surface
+from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov_app.editor.canvas.drawn_rings import Outline, Outlines
 from robocov_app.editor.canvas.reference_image import ReferenceImage
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
 from robocov_app.render.fonts import shortened
 from robocov_app.render.heatmaps import draw_shading
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix, robot_hues
-from robocov_app.toolkit.cache import Latest
+
+_FORGOTTEN = 4  # how many times more outlines than obstacles are kept, those of what was undone among them
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Screen geometry of an obstacle."""
+
+    rings: list[Array]  # (k, 2) m; of each of its parts the outer ring, then its holes
+    outer: list[bool]  # which of them are outer rings
+    lines: list[Array]  # (k, 2) m; of what covers nothing
+    bounds: Array  # (4,) m
+    geometry: BaseGeometry
+
+    @cached_property
+    def name_place(self) -> tuple[float, float, float, float]:
+        """The place with most room for a name: x, y, width, height, m."""
+        return name_place(self.geometry)
+
+
+def name_place(geometry: BaseGeometry) -> tuple[float, float, float, float]:
+    """Return where a name has most room in a geometry, and how much: x, y, width, height, m."""
+    best = (0.0, 0.0, 0.0, 0.0)
+    if geometry.is_empty:
+        return best
+    for y in (geometry.centroid.y, geometry.representative_point().y):
+        for part in _cut(geometry, 0, y):
+            x = part.centroid.x
+            columns = [each for each in _cut(geometry, 1, x) if each.bounds[1] <= y <= each.bounds[3]]
+            if columns and part.length > best[2] * 1.2:
+                best = (x, columns[0].centroid.y, part.length, columns[0].length)
+    return best
+
+
+def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]:
+    low_x, low_y, high_x, high_y = geometry.bounds
+    ends = [(low_x - 1.0, at), (high_x + 1.0, at)] if axis == 0 else [(at, low_y - 1.0), (at, high_y + 1.0)]
+    parts = shapely.get_parts(shapely.intersection(geometry, shapely.LineString(ends)))
+    return [part for part in parts if part.length > 0.0]
+
+
+def outline_of(geometry: BaseGeometry) -> Outline:
+    """Return the outline of a geometry."""
+    rings: list[Array] = []
+    outer: list[bool] = []
+    lines: list[Array] = []
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, shapely.Polygon):
+            rings += [np.asarray(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)]
+            outer += [True] + [False] * len(part.interiors)
+        elif not part.is_empty:
+            lines.append(shapely.get_coordinates(part))
+    return Outline(rings, outer, lines, np.array(shapely.bounds(geometry)), geometry)
+
+
+class Outlines:
+    """Outlines of obstacles, made once for each."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Item, Outline]] = {}
+        self._bounds: Latest[Array] = Latest()
+
+    def of(self, item: Item) -> Outline:
+        """Return the outline of an obstacle."""
+        known = self._known.get(id(item))
+        if known is None or known[0] is not item:
+            known = self._known[id(item)] = (item, outline_of(item.geometry))
+        return known[1]
+
+    def bounds(self, sketch: Sketch) -> Array:
+        """Return the bounds of all obstacles of a sketch, (n, 4) m, in their order."""
+        return self._bounds.of(sketch, None, lambda: self._all_bounds(sketch))
+
+    def _all_bounds(self, sketch: Sketch) -> Array:
+        if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
+            self._known = {}
+        return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
+
+    def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
+        """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
+        low_x, low_y, high_x, high_y = self.bounds(sketch).T
+        there = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
+        return [sketch.obstacles[k] for k in np.flatnonzero(there) if not sketch.obstacles[k].hidden]
+
 
 # pixels at scale 1
 FINE, COARSE = 11.0, 55.0  # between the fine and the strong lines of the grid, at least
@@ -31,7 +118,7 @@ SEEN_THROUGH = 0.62  # opacity of obstacles over a picture
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How a sheet is looked at."""
+    """View of a sheet: pan, zoom and size."""
 
     camera: Camera
     theme: Theme
@@ -42,12 +129,12 @@ class View:
     folder: Path  # what a picture's path counts from
 
     @property
-    def clip(self) -> pygame.Rect:
+    def clip(self) -> Rect:
         """The pixels that show the world."""
         left, top, width, height = (round(value) for value in self.camera.view)
-        return pygame.Rect(left, top, width, height)
+        return Rect(left, top, width, height)
 
-    def canvas(self, surface: pygame.Surface) -> Canvas:
+    def canvas(self, surface: Surface) -> Canvas:
         """Return a canvas for a surface."""
         return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
 
@@ -64,13 +151,13 @@ class Sheet:
         self.outlines = Outlines()
         self.underlaid = ReferenceImage()
         self.full = self.patched = self.scrolled = 0  # how often it was drawn whole, in part, and moved
-        self._page: pygame.Surface | None = None
-        self._look: tuple[object, ...] = ()
+        self._page: Surface | None = None
+        self._look: object = None
         self._camera: Camera | None = None
         self._drawn: dict[int, Item] = {}
         self._beyond: Latest[shapely.Geometry] = Latest()
 
-    def page(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> pygame.Surface:
+    def page(self, view: View, sketch: Sketch, lifted: frozenset[int] = frozenset()) -> Surface:
         """Return the page with a sketch, without the obstacles that are being dragged."""
         left, top, width, height = view.camera.view
         view = replace(view, camera=view.camera.within((left + BIAS, top + BIAS, width, height)))
@@ -83,7 +170,7 @@ class Sheet:
         page = self._page
         if page is None or look != self._look or self._camera is None:
             return self._all(view, sketch, items, look)
-        boxes: list[pygame.Rect] = []
+        boxes: list[Rect] = []
         if view.camera.center != self._camera.center:
             moved = self._scroll(page, view)
             if moved is None:
@@ -101,17 +188,15 @@ class Sheet:
             self.patched += 1
         return page
 
-    def _all(
-        self, view: View, sketch: Sketch, items: dict[int, Item], look: tuple[object, ...]
-    ) -> pygame.Surface:
+    def _all(self, view: View, sketch: Sketch, items: dict[int, Item], look: object) -> Surface:
         if self._page is None or self._page.get_size() != view.size:
-            self._page = pygame.Surface(view.size, 0, 32)
+            self._page = Surface(view.size, 0, 32)
         self._look, self._camera, self._drawn = look, view.camera, items
         self._paint(self._page, view, sketch, items, view.clip)
         self.full += 1
         return self._page
 
-    def _scroll(self, page: pygame.Surface, view: View) -> list[pygame.Rect] | None:
+    def _scroll(self, page: Surface, view: View) -> list[Rect] | None:
         """Move the page with the camera; return what came into sight, None where it cannot be moved."""
         assert self._camera is not None
         before = self._camera.to_pixels(np.array(view.camera.center))
@@ -129,29 +214,27 @@ class Sheet:
         boxes = []
         if whole_x:
             left = clip.left if whole_x > 0 else clip.right + whole_x
-            boxes.append(pygame.Rect(left, clip.top, abs(whole_x), clip.height))
+            boxes.append(Rect(left, clip.top, abs(whole_x), clip.height))
         if whole_y:
             # beside the strip that is there already, so that the two do not overlap
             top = clip.top if whole_y > 0 else clip.bottom + whole_y
             left = clip.left + max(whole_x, 0)
-            boxes.append(pygame.Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
+            boxes.append(Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
         return boxes
 
-    def _box(self, view: View, item: Item) -> pygame.Rect:
+    def _box(self, view: View, item: Item) -> Rect:
         low_x, low_y, high_x, high_y = self.outlines.of(item).bounds.tolist()
         if not np.isfinite(low_x):
-            return pygame.Rect(0, 0, 0, 0)
+            return Rect(0, 0, 0, 0)
         ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
         (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
         edge = round(_EDGE * view.scale)
-        box = pygame.Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
+        box = Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
         return box.inflate(2 * edge, 2 * edge)
 
     # painting
 
-    def _paint(
-        self, page: pygame.Surface, view: View, sketch: Sketch, items: dict[int, Item], box: pygame.Rect
-    ) -> None:
+    def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
         page.set_clip(box)
         theme, camera, canvas = view.theme, view.camera, view.canvas(page)
         page.fill(outside_colour(theme), box)
@@ -176,7 +259,7 @@ class Sheet:
         if picture is None or not picture.shown:
             self.draw_items(canvas, there)
         else:
-            over = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+            over = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = camera.within((camera.view[0] - box.x, camera.view[1] - box.y, *camera.view[2:]))
             self.draw_items(Canvas(over, shifted, theme, view.scale, robot_hues(0)), there)
             over.set_alpha(round(255 * SEEN_THROUGH))
@@ -187,7 +270,7 @@ class Sheet:
             self._names(canvas, there)
         page.set_clip(None)
 
-    def _grid(self, page: pygame.Surface, view: View, box: pygame.Rect, *, fine: bool) -> None:
+    def _grid(self, page: Surface, view: View, box: Rect, *, fine: bool) -> None:
         """Draw the grid: lines where it snaps if they are far enough apart, strong ones at round places."""
         zoom, theme = view.camera.zoom, view.theme
         close, wide = grid_steps(view.grid, zoom, view.scale)
@@ -202,9 +285,9 @@ class Sheet:
             columns = view.camera.to_pixels(np.column_stack([xs, np.zeros(len(xs))]))[:, 0]
             rows = view.camera.to_pixels(np.column_stack([np.zeros(len(ys)), ys]))[:, 1]
             for x in columns[(columns >= box.left - 2) & (columns <= box.right + 2)].tolist():
-                page.fill(colour, pygame.Rect(round(x - width / 2), box.top, width, box.height))
+                page.fill(colour, Rect(round(x - width / 2), box.top, width, box.height))
             for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
-                page.fill(colour, pygame.Rect(box.left, round(y - width / 2), box.width, width))
+                page.fill(colour, Rect(box.left, round(y - width / 2), box.width, width))
 
     def _draw_beyond(self, canvas: Canvas, sketch: Sketch) -> None:
         """Draw what robots take for free although it lies outside the boundary: it is in their hull."""
@@ -222,12 +305,12 @@ class Sheet:
         """Draw obstacles: first what they cover, then their edges, so that each can be told apart."""
         fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
         plain = [self.outlines.of(item) for item in items]
-        rings = [ring for each in plain if not each.has_holes for ring in each.rings]
+        rings = [ring for each in plain if all(each.outer) for ring in each.rings]
         if rings:
             corners, ends = _joined(canvas, rings)
             canvas.polygons(corners, ends, [fill] * len(ends))
         for each in plain:
-            if each.has_holes:
+            if not all(each.outer):
                 _draw_holed(canvas, each, fill)
         rings = [ring for each in plain for ring in each.rings]
         if rings:
@@ -308,7 +391,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
 def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
     """Draw an obstacle with holes on a page of its own, so that what lies below shows in them."""
     clip = canvas.surface.get_clip()
-    page = pygame.Surface(clip.size, pygame.SRCALPHA, 32)
+    page = Surface(clip.size, pygame.SRCALPHA, 32)
     shift = np.array(clip.topleft, dtype=float)
     own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
     for ring, outer in zip(outline.rings, outline.outer, strict=True):
@@ -316,9 +399,9 @@ def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
     canvas.surface.blit(page, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-def _merged(boxes: list[pygame.Rect]) -> list[pygame.Rect]:
+def _merged(boxes: list[Rect]) -> list[Rect]:
     """Return boxes that cover the same, no two of which overlap; fewer, where there are many."""
-    merged: list[pygame.Rect] = []
+    merged: list[Rect] = []
     for box in boxes if len(boxes) <= 40 else [boxes[0].unionall(boxes[1:])]:
         each = box.copy()
         while (k := each.collidelist(merged)) >= 0:

@@ -7,18 +7,17 @@ from itertools import pairwise
 import numpy as np
 import pygame
 import shapely
+from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
-from robocov_app.editor.canvas.drawn_rings import outline_of
-from robocov_app.editor.canvas.map_layers import View, outside_colour
-from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour
+from robocov_app.editor.model.geometry import distance, length_words
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.validation import Problem
-from robocov_app.editor.tools.handles import Handle
 from robocov_app.editor.tools.snapping import Guide
-from robocov_app.editor.tools.tool import Preview, length_words
+from robocov_app.editor.tools.tool import Handle, Preview
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, bounded
 from robocov_app.render.theme import Colour, Theme, mix
@@ -101,16 +100,14 @@ def draw_grips(
             canvas.line((x, y), (x, y + stem), edge, canvas.width(1.0))
             _disc(canvas, (x, y), 5.5 if large else 4.5, (floor, edge, edge), 1.6)
         elif handle.kind == "scale":
-            _square(canvas, x, y, floor, large=large)
+            _square(canvas, (x, y), floor, large=large)
         else:
-            _square(canvas, x, y, edge if handle.vertex in chosen else floor, large=large, rounded=True)
+            _square(canvas, (x, y), edge if handle.vertex in chosen else floor, large=large, rounded=True)
 
 
-def _square(
-    canvas: Canvas, x: float, y: float, fill: Colour, *, large: bool = False, rounded: bool = False
-) -> None:
+def _square(canvas: Canvas, at: Point, fill: Colour, *, large: bool = False, rounded: bool = False) -> None:
     half = SQUARE * canvas.scale * (1.4 if large else 1.0)
-    box = pygame.Rect(round(x - half), round(y - half), round(2 * half) + 1, round(2 * half) + 1)
+    box = Rect(round(at[0] - half), round(at[1] - half), round(2 * half) + 1, round(2 * half) + 1)
     if canvas.surface.get_rect().colliderect(box):
         radius = round(half) if rounded else 0
         pygame.draw.rect(canvas.surface, fill, box, border_radius=radius)
@@ -203,10 +200,10 @@ def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
         low, high = np.floor(corners.min(axis=0)), np.ceil(corners.max(axis=0))
-        box = pygame.Rect(*np.clip([*low, *(high - low + 1)], -30000, 30000).astype(int).tolist())
+        box = Rect(*np.clip([*low, *(high - low + 1)], -30000, 30000).astype(int).tolist())
         box = box.clip(canvas.surface.get_clip())
         if box.width and box.height:
-            page = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+            page = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = np.rint(np.clip(corners - np.array(box.topleft), -30000, 30000)).tolist()
             pygame.draw.polygon(page, (*mix(canvas.theme.obstacle, colour, 0.35), 130), shifted)
             canvas.surface.blit(page, box)
@@ -226,13 +223,13 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
         if preview.closed:
             canvas.dashes(line[-1].tolist(), line[0].tolist(), colour, canvas.width(1.0))
     for x, y in line.tolist():
-        _square(canvas, x, y, floor, rounded=True)
+        _square(canvas, (x, y), floor, rounded=True)
     if preview.lengths:
         _draw_lengths(canvas, preview.line)
     for k, rim in enumerate(preview.rings):
         canvas.outline(pixels(canvas, rim), colour, canvas.width(2.2 if k == preview.chosen else 1.2))
     for k, (x, y) in enumerate(pixels(canvas, preview.dots).tolist()):
-        _square(canvas, x, y, floor, large=k == preview.chosen, rounded=True)
+        _square(canvas, (x, y), floor, large=k == preview.chosen, rounded=True)
     if preview.box is not None:
         _draw_selecting(canvas, preview.box, touched=preview.touched)
     if preview.words and at is not None:
@@ -260,10 +257,10 @@ def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
 def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bool) -> None:
     ends = pixels(canvas, corners)
     low, high = ends.min(axis=0), ends.max(axis=0)
-    box = pygame.Rect(*np.rint([*low, *(high - low)]).astype(int).tolist()).clip(canvas.surface.get_clip())
+    box = Rect(*np.rint([*low, *(high - low)]).astype(int).tolist()).clip(canvas.surface.get_clip())
     colour = canvas.theme.start if touched else accent(canvas.theme)
     if box.width and box.height:
-        page = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+        page = Surface(box.size, pygame.SRCALPHA, 32)
         page.fill((*colour, 34))
         canvas.surface.blit(page, box)
     (left, top), (right, bottom) = low.tolist(), high.tolist()
@@ -279,7 +276,7 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
     theme, scale, surface = canvas.theme, canvas.scale, canvas.surface
     words, hint, large = f"{text}▏", "Enter", theme.text * 1.1
     wide = canvas.text_width(words, large, bold=True) + canvas.text_width(hint, theme.small_text)
-    box = pygame.Rect(0, 0, wide + round(26 * scale), round(26 * scale))
+    box = Rect(0, 0, wide + round(26 * scale), round(26 * scale))
     box.topleft = round(at[0] + 14 * scale), round(at[1] + 14 * scale)
     box.clamp_ip(surface.get_rect())
     pygame.draw.rect(surface, theme.panel, box, border_radius=round(5 * scale))
@@ -293,7 +290,7 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
 # where robots do not pass
 
 
-def hatched(view: View, measurement: Measurement) -> tuple[pygame.Surface, pygame.Rect] | None:
+def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
     theme = view.theme
     areas = ((measurement.sealed, sealed_colour(theme), 0.5), (measurement.impassable, theme.trajectory, 1.0))
@@ -304,14 +301,14 @@ def hatched(view: View, measurement: Measurement) -> tuple[pygame.Surface, pygam
     low_x, low_y, high_x, high_y = shapely.total_bounds(every)
     ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
     (left, top), (right, bottom) = bounded(ends).tolist()
-    box = pygame.Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
+    box = Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
     box = box.clip(view.clip)
     if not (box.width and box.height):
         return None
-    patch = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+    patch = Surface(box.size, pygame.SRCALPHA, 32)
     edged = view.canvas(patch)
     for polygons, colour, strength in parts:
-        mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+        mask = Surface(box.size, pygame.SRCALPHA, 32)
         for each in polygons:
             _stencil(view.canvas(mask), each, box.topleft)
         lines = _lines(box.size, colour, view.scale, box.topleft, strength)
@@ -346,9 +343,9 @@ def _stencil(canvas: Canvas, area: shapely.Polygon, corner: tuple[int, int]) -> 
 
 def _lines(
     size: tuple[int, int], colour: Colour, scale: float, corner: tuple[int, int], strength: float = 1.0
-) -> pygame.Surface:
+) -> Surface:
     """Return a page of slanted lines over a tint; they keep their place when the sheet is moved."""
-    page = pygame.Surface(size, pygame.SRCALPHA, 32)
+    page = Surface(size, pygame.SRCALPHA, 32)
     page.fill((*colour, round(56 * strength)))
     width, height = size
     step, thick, ink = max(4, round(HATCH * scale)), max(1, round(1.2 * scale)), round(235 * strength)
@@ -450,23 +447,16 @@ def draw_badge(
 # the legend
 
 
-def legend_entries(
-    measurement: Measurement | None, *, starts: bool, team: bool, unfree: bool
-) -> list[LegendEntry]:
+def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
     """Return what the legend explains."""
-    found = measurement
     rows: list[tuple[object, str, Glyph]] = [
-        (True, "obstacle", _obstacle_glyph),
+        (True, "obstacle", lambda on, x, y: _swatch(on, x, y, on.theme.obstacle, on.theme.obstacle_edge)),
         (True, "boundary", _boundary_glyph),
         (unfree, "outside, in the robots' hull", _beyond_glyph),
         (starts, "start", lambda canvas, x, y: _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)),
         (team, "robot", _robot_glyph),
-        (
-            found and not found.impassable.is_empty,
-            "too narrow for a robot",
-            partial(_hatch_glyph, narrow=True),
-        ),
-        (found and not found.sealed.is_empty, "cut off", partial(_hatch_glyph, narrow=False)),
+        (found and found.impassable, "too narrow for a robot", partial(_hatch_glyph, narrow=True)),
+        (found and found.sealed, "cut off", partial(_hatch_glyph, narrow=False)),
         (found and found.problems, "problem", partial(draw_badge, grave=True, radius=6.5, rim=1.0)),
     ]
     return [LegendEntry(text, glyph) for is_there, text, glyph in rows if is_there]
@@ -474,13 +464,9 @@ def legend_entries(
 
 def _swatch(canvas: Canvas, x: float, y: float, fill: Colour, edge: Colour) -> None:
     size = 11 * canvas.scale
-    box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
+    box = Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
     pygame.draw.rect(canvas.surface, fill, box)
     pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
-
-
-def _obstacle_glyph(canvas: Canvas, x: float, y: float) -> None:
-    _swatch(canvas, x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 
 
 def _beyond_glyph(canvas: Canvas, x: float, y: float) -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
+from pygame import Rect, Surface
 
 from robocov_app.editor.model.background import Background
 from robocov_app.render.camera import Camera
@@ -21,13 +22,11 @@ class ReferenceImage:
 
     def __init__(self) -> None:
         self._of: Path | None = None
-        self._picture: pygame.Surface | None = None
+        self._picture: Surface | None = None
         self._shrunk = 1.0
         self.trouble = ""
 
-    def draw(
-        self, page: pygame.Surface, background: Background, folder: Path, camera: Camera, clip: pygame.Rect
-    ) -> None:
+    def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
         """Draw the picture on a page; `folder` is where its path counts from."""
         self._load(folder / background.path)
         picture = self._picture
@@ -51,7 +50,7 @@ class ReferenceImage:
             if last_x <= first_x or last_y <= first_y:
                 return
             part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
-            at = pygame.Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
+            at = Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
             to_x, to_y = round(left + last_x * factor), round(top + last_y * factor)
             size = max(to_x - at.x, 1), max(to_y - at.y, 1)
             if max(size) > _LARGEST_SHOWN:

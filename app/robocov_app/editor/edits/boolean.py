@@ -1,7 +1,4 @@
-"""Selected obstacles united, subtracted, intersected; walls and circles become polygons.
-
-The result, perhaps several obstacles, takes the place, the name and the note of the lowest.
-"""
+"""Selected obstacles combined into polygons, with the place, the name and the note of the lowest."""
 
 import math
 from collections.abc import Sequence

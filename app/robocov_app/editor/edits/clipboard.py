@@ -1,7 +1,4 @@
-"""Copy and paste, as JSON text: within a window, between windows, and into a text editor.
-
-A whole map, an obstacle, a list of them, or a list of points (a polygon) can be pasted, too.
-"""
+"""Copy and paste as JSON text: also of whole maps, obstacles, and lists of obstacles or of points."""
 
 from dataclasses import replace
 from typing import Any
@@ -35,10 +32,7 @@ def copied(sketch: Sketch, selection: Selection) -> str:
 
 
 def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | None = None) -> Change:
-    """Paste what `copied` returned, its middle at a place, m (None: where it was), still on the grid.
-
-    A boundary becomes the map's if that has none; else it is left out, or a polygon if it was copied alone.
-    """
+    """Paste copied text, its middle at a place, m (None: as it was); a boundary only where there is none."""
     part = _part(text)
     shapes: list[tuple[Obstacle, str]] = [(item.shape, item.note) for item in part.obstacles]
     new_boundary = part.boundary is not None and sketch.boundary is None

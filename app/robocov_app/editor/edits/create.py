@@ -1,4 +1,4 @@
-"""Edits that draw: obstacles, the boundary, starts."""
+"""Edits that draw: obstacles, the boundary, starts, and doors in walls, which stay walls."""
 
 import re
 from collections.abc import Sequence
@@ -6,23 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from shapely import LineString
+from shapely.ops import substring
 
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    StartSpec,
-    UniformStart,
-    WallObstacle,
-)
+from robocov import environment as env
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, tenths
-from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
+from robocov_app.editor.model.hit_test import obstacles_at
+from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
@@ -37,7 +30,7 @@ def drawn(sketch: Sketch, shape: Obstacle) -> Change:
 
 def polygon_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     """Put a polygon down; it may cross itself, which `problems` will say."""
-    return drawn(sketch, PolygonObstacle(_outline(points, "a polygon")))
+    return drawn(sketch, env.PolygonObstacle(_outline(points, "a polygon")))
 
 
 def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
@@ -45,12 +38,12 @@ def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
     low, high = ring_near(np.array([np.minimum(a, b), np.maximum(a, b)]))
     if min(high[0] - low[0], high[1] - low[1]) < SHORTEST:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
-    return replace(drawn(sketch, PolygonObstacle(rectangle(low, high))), words="rectangle drawn")
+    return replace(drawn(sketch, env.PolygonObstacle(rectangle(low, high))), words="rectangle drawn")
 
 
 def circle_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
     """Put a circle down."""
-    return drawn(sketch, CircleObstacle(point_near(center), _radius(radius, "a circle")))
+    return drawn(sketch, env.CircleObstacle(point_near(center), _radius(radius, "a circle")))
 
 
 def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
@@ -60,7 +53,7 @@ def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
         raise MapError("a wall needs two points that are apart")
     if not SMALLEST <= width <= LARGEST:
         raise MapError(f"a wall's width is at least {1000 * SMALLEST:g} mm")
-    return drawn(sketch, WallObstacle(line, tenths(width)))
+    return drawn(sketch, env.WallObstacle(line, tenths(width)))
 
 
 def boundary_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
@@ -72,7 +65,7 @@ def boundary_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
 
 def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
     """Add a start that is a disc."""
-    return start_added(sketch, DiscStart(point_near(center), _radius(radius, "a start")))
+    return start_added(sketch, env.DiscStart(point_near(center), _radius(radius, "a start")))
 
 
 def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
@@ -80,12 +73,12 @@ def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     places = tuple(dict.fromkeys(ring_near(np.array(points, dtype=float).reshape(-1, 2))))
     if not places:
         raise MapError("a start needs a place for a robot at least")
-    return start_added(sketch, PointsStart(places))
+    return start_added(sketch, env.PointsStart(places))
 
 
-def uniform_start_added(sketch: Sketch) -> Change:
+def anywhere_added(sketch: Sketch) -> Change:
     """Add a start anywhere in the free space."""
-    return start_added(sketch, UniformStart())
+    return start_added(sketch, env.UniformStart())
 
 
 def start_added(sketch: Sketch, spec: StartSpec) -> Change:
@@ -97,7 +90,7 @@ def start_added(sketch: Sketch, spec: StartSpec) -> Change:
 def free_name(sketch: Sketch, name: str) -> str:
     """Return a name for a start that no start has yet: this one, or with a number after it.
 
-    >>> free_name(Sketch(starts=(("start", UniformStart()),)), "start")
+    >>> free_name(Sketch(starts=(("start", env.UniformStart()),)), "start")
     'start 2'
     """
     taken = {each for each, _ in sketch.starts}
@@ -135,3 +128,73 @@ def _radius(radius: float, what: str) -> float:
     if not SHORTEST <= radius <= LARGEST:
         raise MapError(f"{what} needs a radius: drag from its middle to its rim")
     return tenths(radius)
+
+
+def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
+    """Return the wall within `reach` metres of a point, the topmost."""
+    keys = obstacles_at(sketch, point, reach)
+    return next((key for key in keys if isinstance(sketch.item(key).shape, env.WallObstacle)), None)
+
+
+def door_at(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
+    """Return both sides of a door whose middle is as near to a point as the wall allows."""
+    line = _line(sketch, key)
+    a, b = map(line.interpolate, _span(line, point, min(width, line.length)))
+    return (float(a.x), float(a.y)), (float(b.x), float(b.y))
+
+
+def on_wall(sketch: Sketch, key: int, point: Point) -> Point:
+    """Return the place on a wall's line that is nearest to a point."""
+    line = _line(sketch, key)
+    place = line.interpolate(line.project(shapely.Point(point)))
+    return float(place.x), float(place.y)
+
+
+def door_width(width: float) -> float:
+    """Return the width of a door, m; MapError where it is none."""
+    if not SHORTEST <= width <= LARGEST:
+        raise MapError(f"a door's width is at least {100 * SHORTEST:g} cm")
+    return width
+
+
+def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
+    """Open a door of a width, m, its middle as near to a point as the wall allows."""
+    line = _line(sketch, key)
+    if door_width(width) > line.length - SMALLEST:
+        raise MapError(f"the {display_name(sketch, key)} is not longer than a door of {width:g} m")
+    return _opened(sketch, key, *_span(line, point, width))
+
+
+def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
+    """Open a wall between the places on it that are nearest to two points."""
+    line = _line(sketch, key)
+    begin, end = sorted(line.project(shapely.Point(place)) for place in (a, b))
+    door_width(end - begin)
+    return _opened(sketch, key, begin, end)
+
+
+def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
+    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
+    return middle - width / 2, middle + width / 2
+
+
+def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
+    """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
+    line, wall = _line(sketch, key), sketch.item(key).shape
+    assert isinstance(wall, env.WallObstacle)
+    pieces = []
+    for low, high in ((0.0, begin), (end, line.length)):
+        if high - low >= SMALLEST:
+            points = tuple(map(rounded, substring(line, low, high).coords))
+            pieces.append(replace(wall, points=points))
+    if not pieces:
+        raise MapError(f"nothing would be left of the {display_name(sketch, key)}")
+    words = f"door of {end - begin:.3g} m opened in {display_name(sketch, key)}"
+    return replace_obstacles(sketch, {key: pieces}, words)
+
+
+def _line(sketch: Sketch, key: int) -> LineString:
+    wall = sketch.item(key).shape
+    if not isinstance(wall, env.WallObstacle) or len(set(wall.points)) < 2:
+        raise MapError("doors are opened in walls")
+    return LineString(wall.points)

@@ -14,30 +14,23 @@ from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform
 from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
 from robocov_app.editor.model.measurement import reach_of
-from robocov_app.editor.model.selection import (
-    Change,
-    Selection,
-    numbered_name,
-    ring_points,
-    rings_of,
-    with_rings,
-)
+from robocov_app.editor.model.selection import Change, Selection, numbered_name, rings_of, with_rings
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Kind, Problem, examined
 
 TITLES: Final[dict[Kind, str]] = {
     "no boundary": "Draw one",
     "crossing": "Repair",
+    "double": "Merge",
+    "narrow": "Widen",
     "spot": "Move",
     "no room": "Move",
     "outside": "Delete",
     "twice": "Delete",
-    "double": "Merge",
     "sealed": "Fill",
-    "narrow": "Widen",
     "cut off": "Fill",
 }
-"""What a button says that mends a problem of a kind; of others there is none."""
+"""Button label of the fix for each kind of problem; other kinds have none."""
 
 _MARGIN = 0.5  # metres between a boundary that is drawn round everything and what it is drawn round
 _OVER = 0.002  # metres by which what fills a place reaches into what is round it
@@ -79,8 +72,7 @@ def _fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
     if kind in ("outside", "twice"):
         return properties.deleted(sketch, Selection.of(owner))
     if kind == "double":
-        closed = rings_of(sketch, owner)[0][2]
-        rings = [distinct(ring, closed=closed) for ring in ring_points(sketch, owner)]
+        rings = [distinct(points, closed=closed) for _, points, closed in rings_of(sketch, owner)]
         words = f"{numbered_name(sketch, owner)}: vertices merged"
         return Change(with_rings(sketch, owner, rings), Selection.of(owner), words)
     if kind in ("spot", "no room") and isinstance(owner, str) and where is not None:

@@ -163,11 +163,8 @@ def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
     if not selection.items:
         raise MapError("select obstacles first")
     chosen = tuple(item for item in sketch.obstacles if item.key in selection.items)
-    others = tuple(item for item in sketch.obstacles if item.key not in selection.items)
-    orders = {
-        "top": (others + chosen, "brought to the top"),
-        "bottom": (chosen + others, "sent to the bottom"),
-    }
+    rest = tuple(item for item in sketch.obstacles if item.key not in selection.items)
+    orders = {"top": (rest + chosen, "brought to the top"), "bottom": (chosen + rest, "sent to the bottom")}
     if where not in orders:
         raise MapError("top or bottom was wanted")
     order, way = orders[where]

@@ -10,19 +10,10 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 import shapely
 
+from robocov import environment as env
 from robocov.arrays import Array
 from robocov.density import Density, Gaussians, WeightedPolygons
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    StartSpec,
-    WallObstacle,
-)
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import free_name
@@ -99,39 +90,34 @@ class Affine:
         return self.ring([point])[0]
 
     def shape(self, shape: Obstacle) -> Obstacle:
-        """Return where an obstacle goes, with its path; its speed stays.
-
-        Where lengths do not all scale alike, a circle becomes a polygon, and a wall keeps its width.
-        """
+        """Return where an obstacle goes; stretched, circles become polygons and walls keep their width."""
         factor = self.factor
         path = None if shape.path is None else replace(shape.path, points=self.ring(shape.path.points))
-        if isinstance(shape, PolygonObstacle):
+        if isinstance(shape, env.PolygonObstacle):
             holes = tuple(self.ring(hole) for hole in shape.holes)
             return replace(shape, vertices=self.ring(shape.vertices), holes=holes, path=path)
-        if isinstance(shape, WallObstacle):
+        if isinstance(shape, env.WallObstacle):
             width = _times(shape.width, factor or 1.0)
             return replace(shape, points=self.ring(shape.points), width=width, path=path)
         if factor is None:
-            return PolygonObstacle(self.ring(shape.polygon.exterior.coords[:-1]), (), shape.name, path)
+            return env.PolygonObstacle(self.ring(shape.polygon.exterior.coords[:-1]), (), shape.name, path)
         return replace(shape, center=self.point(shape.center), radius=_times(shape.radius, factor), path=path)
 
     def start(self, spec: StartSpec) -> StartSpec:
         """Return where a start goes; one in the whole free space stays, and no disc becomes an ellipse."""
-        if isinstance(spec, PointsStart):
-            return PointsStart(self.ring(spec.positions))
-        if isinstance(spec, DiscStart):
+        if isinstance(spec, env.PointsStart):
+            return env.PointsStart(self.ring(spec.positions))
+        if isinstance(spec, env.DiscStart):
             factor = self.factor
             if factor is None:
                 raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
-            return DiscStart(self.point(spec.center), _times(spec.radius, factor))
+            return env.DiscStart(self.point(spec.center), _times(spec.radius, factor))
         return spec
 
     def _about(self, point: Point) -> Affine:
-        """Return the map with the same matrix that leaves a point where it is."""
         x, y = point
-        return replace(
-            self, x0=x - self.xx * x - self.xy * y + self.x0, y0=y - self.yx * x - self.yy * y + self.y0
-        )
+        x0, y0 = x - self.xx * x - self.xy * y + self.x0, y - self.yx * x - self.yy * y + self.y0
+        return replace(self, x0=x0, y0=y0)
 
 
 def _times(length: float, factor: float) -> float:
@@ -154,10 +140,7 @@ def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point |
 def scaled(
     sketch: Sketch, selection: Selection, fx: float, fy: float | None = None, about: Point | None = None
 ) -> Change:
-    """Scale what is selected by fx (and fy, by default the same), about its middle unless a point is given.
-
-    Radii and widths of walls grow only when both are the same, see `Affine.shape`; below 0 mirrors.
-    """
+    """Scale by fx and fy about the middle or a point, see `Affine.shape`; factors below 0 mirror."""
     fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
         raise MapError("a factor that is not 0 was wanted")
@@ -322,7 +305,7 @@ def box_of(sketch: Sketch, owner: Owner) -> Box | None:
     if isinstance(owner, int) and owner != BOUNDARY:
         item = sketch.item(owner)
         # a typed size is that of the circle, not of the polygon that stands for it
-        if not isinstance(item.shape, CircleObstacle):
+        if not isinstance(item.shape, env.CircleObstacle):
             return None if item.geometry.is_empty else item.geometry.bounds
     points = [point for ring in ring_points(sketch, owner) for point in ring]
     return _around((*point, *point) for point in points) if points else None
@@ -333,7 +316,7 @@ def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
     owners = selection.owners
     boxes = []
     if len(owners) > _MANY:  # all at once
-        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, CircleObstacle)]
+        sharp = [k for k in selection.items if not isinstance(sketch.item(k).shape, env.CircleObstacle)]
         rows = shapely.bounds(sketch.geometries[[sketch.places[key] for key in sharp]])
         boxes = [(a, b, c, d) for a, b, c, d in rows[np.isfinite(rows).all(axis=1)].tolist()]
         owners = owners - frozenset(sharp)
@@ -348,7 +331,6 @@ def _around(boxes: Iterable[Box]) -> Box:
 
 
 def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
-    """Return the boxes of the selected obstacles and starts, in the order of the sketch."""
     owners: list[Owner] = [item.key for item in sketch.obstacles if item.key in selection.items]
     owners += [name for name, _ in sketch.starts if name in selection.starts]
     return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}

@@ -1,4 +1,4 @@
-"""Edits of single vertices: of polygons and their holes, walls, the boundary, rims of circles, starts."""
+"""Edits of vertices: moved, inserted, deleted, cut off, left out, straightened; walls joined and split."""
 
 import math
 from collections import defaultdict
@@ -7,20 +7,14 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
+import shapely
+from shapely import LineString, Polygon
 
-from robocov.arrays import Array
-from robocov.environment import (
-    SAGITTA,
-    CircleObstacle,
-    DiscStart,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    WallObstacle,
-)
-from robocov.errors import MapError
-from robocov.mapfile.models import SMALLEST
+from robocov import environment as env
+from robocov.arrays import Array, BoolArray
+from robocov.environment import Point, Ring
+from robocov.errors import MapError, counted
+from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import (
     Change,
@@ -67,12 +61,12 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
     for owner, moves in by_owner.items():
         if isinstance(owner, str):
             spec = sketch.start(owner)
-            if isinstance(spec, DiscStart):
-                sketch = sketch.with_start(owner, DiscStart(*_with_rim(spec, moves)))
+            if isinstance(spec, env.DiscStart):
+                sketch = sketch.with_start(owner, env.DiscStart(*_with_rim(spec, moves)))
                 continue
         elif owner != BOUNDARY:
             shape = sketch.item(owner).shape
-            if isinstance(shape, CircleObstacle):
+            if isinstance(shape, env.CircleObstacle):
                 center, radius = _with_rim(shape, moves)
                 sketch = sketch.with_shapes({owner: replace(shape, center=center, radius=radius)})
                 continue
@@ -83,15 +77,15 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
     return sketch
 
 
-def _with_rim(round_one: CircleObstacle | DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
+def _with_rim(disc: env.CircleObstacle | env.DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
     by_index = {vertex.index: place for vertex, place in moves.items()}
     place = point_near(by_index[min(by_index)])
     if 0 in by_index:
-        return place, round_one.radius
-    radius = tenths(math.dist(round_one.center, place))
+        return place, disc.radius
+    radius = tenths(math.dist(disc.center, place))
     if radius < SMALLEST:
         raise MapError("a circle needs a radius: drag its rim away from its centre")
-    return round_one.center, radius
+    return disc.center, radius
 
 
 def inserted(sketch: Sketch, edge: Edge) -> Change:
@@ -135,15 +129,15 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
             raise MapError("the boundary needs three corners at least")
         return with_rings(sketch, owner, rings)
     if isinstance(owner, str):
-        if not isinstance(sketch.start(owner), PointsStart):
+        if not isinstance(sketch.start(owner), env.PointsStart):
             raise MapError("the points of a disc cannot be deleted: delete the start itself")
         if rings[0]:
             return with_rings(sketch, owner, rings)
         return replace(sketch, starts=tuple(pair for pair in sketch.starts if pair[0] != owner))
     shape = sketch.item(owner).shape
-    if isinstance(shape, CircleObstacle):
+    if isinstance(shape, env.CircleObstacle):
         raise MapError("the points of a circle cannot be deleted: delete the circle itself")
-    if len(rings[0]) < (2 if isinstance(shape, WallObstacle) else 3):
+    if len(rings[0]) < (2 if isinstance(shape, env.WallObstacle) else 3):
         return sketch.without({owner})
     # a hole goes that has too few left, but one that was broken before and is not touched stays
     kept = [ring for k, ring in enumerate(rings) if k == 0 or k not in gone or len(ring) >= 3]
@@ -153,7 +147,7 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
 def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
     """Take a hole of a polygon away."""
     shape = sketch.item(key).shape
-    if not isinstance(shape, PolygonObstacle) or not 1 <= ring <= len(shape.holes):
+    if not isinstance(shape, env.PolygonObstacle) or not 1 <= ring <= len(shape.holes):
         raise MapError("there is no such hole")
     holes = shape.holes[: ring - 1] + shape.holes[ring:]
     after = sketch.with_shapes({key: replace(shape, holes=holes)})
@@ -176,7 +170,7 @@ def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
         raise MapError("a radius above 0 m was wanted")
 
     def cut(turn: float) -> tuple[float, int]:
-        step = 2.0 * math.acos(max(1.0 - SAGITTA / radius, 0.0))
+        step = 2.0 * math.acos(max(1.0 - env.SAGITTA / radius, 0.0))
         return radius * math.tan(turn / 2.0), min(_MOST_SEGMENTS, math.ceil(turn / step))
 
     return _cut(sketch, selection, cut, "rounded")
@@ -290,7 +284,7 @@ def split(sketch: Sketch, vertex: Vertex) -> Change:
 def joined(sketch: Sketch, selection: Selection) -> Change:
     """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
     items = [item for item in sketch.obstacles if item.key in selection.items]
-    shapes = [item.shape for item in items if isinstance(item.shape, WallObstacle)]
+    shapes = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
     if len(shapes) < 2 or len(shapes) < len(items):
         raise MapError("select two or more walls to join, and nothing else")
     chain, *rest = [wall.points for wall in shapes]
@@ -301,7 +295,7 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
         del rest[k]
     name = next((wall.name for wall in shapes if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
-    whole = replace(items[0], shape=WallObstacle(chain, shapes[0].width, name), note=note)
+    whole = replace(items[0], shape=env.WallObstacle(chain, shapes[0].width, name), note=note)
     kept = sketch.without(item.key for item in items[1:]).obstacles
     after = replace(sketch, obstacles=tuple(whole if item.key == whole.key else item for item in kept))
     return Change(after, Selection.of(whole.key), f"{len(items)} walls joined")
@@ -317,10 +311,131 @@ def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
     return min(ways, key=lambda way: way[0])
 
 
-def _wall(sketch: Sketch, vertex: Vertex) -> tuple[int, WallObstacle]:
+def _wall(sketch: Sketch, vertex: Vertex) -> tuple[int, env.WallObstacle]:
     place_of(sketch, vertex)
     if isinstance(vertex.of, int) and vertex.of in sketch.places:
         shape = sketch.item(vertex.of).shape
-        if isinstance(shape, WallObstacle):
+        if isinstance(shape, env.WallObstacle):
             return vertex.of, shape
     raise MapError("that is no wall")
+
+
+_STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
+
+
+def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
+    """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
+    if not (math.isfinite(tolerance) and 0.0 <= tolerance <= LARGEST):
+        raise MapError("a tolerance of 0 m or more was wanted")
+    after, before = sketch, 0
+    for owner in _owners(sketch, selection):
+        rings = ring_points(sketch, owner)
+        fewer = _simpler(rings, tolerance, closed=rings_of(sketch, owner)[0][2])
+        before += sum(map(len, rings)) - sum(map(len, fewer))
+        if fewer != rings:
+            after = with_rings(after, owner, fewer)
+    if not before:
+        raise MapError("no vertex can be left out at that tolerance")
+    words = "1 vertex left out" if before == 1 else f"{before} vertices left out"
+    return Change(after, selection.without_vertices(), words)
+
+
+def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
+    """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
+    if not 0.0 < degrees <= 30.0:
+        raise MapError("an angle of up to 30 degrees was wanted")
+    after, count = sketch, 0
+    for owner in _owners(sketch, selection):
+        rings = []
+        for _, points, closed in rings_of(sketch, owner):
+            rings.append(_straight(points, degrees, closed=closed))
+            count += rings[-1] != points
+        if any(new != old for new, old in zip(rings, ring_points(sketch, owner), strict=True)):
+            after = with_rings(after, owner, rings)
+    if not count:
+        raise MapError(f"no edge is within {degrees:g} degrees of level or upright, and not so already")
+    return Change(after, selection.without_vertices(), f"{counted(count, 'outline')} straightened")
+
+
+def _owners(sketch: Sketch, selection: Selection) -> list[Owner]:
+    everything = not (selection.items or selection.boundary)
+    owners: list[Owner] = [
+        item.key
+        for item in sketch.obstacles
+        if (everything or item.key in selection.items) and rings_of(sketch, item.key)
+    ]
+    if selection.boundary and sketch.boundary is not None:
+        owners.append(BOUNDARY)
+    if not owners:
+        raise MapError("select polygons, walls or the boundary first")
+    return owners
+
+
+def _simpler(rings: tuple[Ring, ...], tolerance: float, *, closed: bool) -> tuple[Ring, ...]:
+    """Return the rings of one thing with fewer vertices; the vertices that stay are the same."""
+    sound = _is_sound(rings, closed=closed)
+    for step in range(_STEPS):
+        fewer = tuple(_fewer(ring, tolerance / 2**step, closed=closed) for ring in rings)
+        if _is_sound(fewer, closed=closed) >= sound:
+            return fewer
+    return rings
+
+
+def _is_sound(rings: tuple[Ring, ...], *, closed: bool) -> bool:
+    if not closed:
+        return True
+    return min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid)
+
+
+def _fewer(ring: Ring, tolerance: float, *, closed: bool) -> Ring:
+    if len(set(ring)) < (4 if closed else 3):
+        return ring
+    if not closed:
+        return tuple(LineString(ring).simplify(tolerance, preserve_topology=False).coords)
+    # begin at a vertex that stays: the one farthest from the middle is a corner of the hull
+    points = np.array(ring)
+    first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
+    turned = np.roll(points, -first, axis=0)
+    line = LineString(np.concatenate([turned, turned[:1]])).simplify(tolerance, preserve_topology=False)
+    kept = [(float(x), float(y)) for x, y in line.coords[:-1]]
+    if len(set(kept)) < 3 or not shapely.MultiPoint(kept).convex_hull.area > 0.0:
+        return ring
+    # in the order in which they were
+    there = set(kept)
+    return tuple(point for point in ring if point in there)
+
+
+def _straight(ring: Ring, degrees: float, *, closed: bool) -> Ring:
+    points = np.array(ring, dtype=float).reshape(-1, 2)
+    if len(points) < 2:
+        return ring
+    edges = np.roll(points, -1, axis=0) - points
+    if not closed:
+        edges[-1] = np.nan
+    slope = math.tan(math.radians(degrees))
+    size = np.abs(edges)
+    moved = points.copy()
+    # level edges give their ends the same y, upright ones the same x
+    for axis, flat in ((1, size[:, 1] <= slope * size[:, 0]), (0, size[:, 0] <= slope * size[:, 1])):
+        for run in _runs(flat & (size.max(axis=1) > 0.0)):
+            values = points[run, axis]
+            moved[run, axis] = (values.min() + values.max()) / 2
+    if closed and (len({tuple(p) for p in moved.tolist()}) < 3 or Polygon(moved).area == 0.0):
+        return ring
+    return ring_near(moved)
+
+
+def _runs(flat: BoolArray) -> list[list[int]]:
+    """Return the vertices of each run of edges of a ring that are flat, one after another."""
+    count = len(flat)
+    if flat.all():
+        return []
+    first = int(np.flatnonzero(~flat)[0]) + 1
+    runs: list[list[int]] = []
+    for k in (np.arange(first, first + count) % count).tolist():
+        if not flat[k]:
+            continue
+        if not runs or runs[-1][-1] != k:
+            runs.append([k])
+        runs[-1].append((k + 1) % count)
+    return runs

@@ -1,1 +1,1 @@
-"""What is edited: sketches, their files, their problems. Knows no pygame."""
+"""Editor model: sketches, their files, their problems. Knows no pygame."""

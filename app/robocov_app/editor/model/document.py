@@ -2,18 +2,250 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
-from robocov.errors import MapError
+from robocov.errors import MapError, OutputError, counted, one_line
+from robocov.files.atomic import writable, written
+from robocov.files.strictjson import read_bytes
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.editor.model import file
-from robocov_app.editor.model.autosave import KIND, Autosave, content
-from robocov_app.editor.model.file import OnDisk, State
-from robocov_app.editor.model.history import History
+from robocov_app.editor.model.parser import parse_sketch, sketch_of
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.sketch import Sketch, draft_document, sketch_text
+from robocov_app.toolkit import autosave
 from robocov_app.toolkit.autosave import Autosaver
+
+
+@dataclass
+class _Step:
+    before: Sketch
+    selected_before: Selection
+    after: Change
+    drag: Hashable | None
+
+
+class History:
+    """A sketch as it is now, and all that it was; a window that selects something sets `selection`."""
+
+    def __init__(self, sketch: Sketch, *, saved: bool = True) -> None:
+        self.sketch = sketch
+        self.selection = Selection()
+        self._done: list[_Step] = []
+        self._undone: list[_Step] = []
+        self._saved = sketch if saved else None
+        self._broken = False
+
+    def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
+        """Take a change, merged with the last of the same `drag`; return whether it changed anything."""
+        before, selected = self.sketch, self.selection
+        last = self._done[-1] if self._done else None
+        merges = drag is not None and not self._broken and last is not None and last.drag == drag
+        self._broken = False
+        self.selection = change.selection
+        if change.sketch == before:
+            return False
+        if merges and last is not None:
+            self._done.pop()
+            before, selected = last.before, last.selected_before
+        self.sketch = change.sketch
+        self._undone = []
+        if change.sketch != before:
+            self._done.append(_Step(before, selected, change, drag))
+        return True
+
+    def undo(self) -> Change | None:
+        """Take the newest change back; return what was there before, in the words of what was taken back."""
+        if not self._done:
+            return None
+        step = self._done.pop()
+        self._undone.append(step)
+        return self._now(Change(step.before, step.selected_before, step.after.words))
+
+    def redo(self) -> Change | None:
+        """Do again what was undone last; None if there is nothing."""
+        if not self._undone:
+            return None
+        step = self._undone.pop()
+        self._done.append(step)
+        return self._now(step.after)
+
+    def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
+        """Change the sketch as it is and at every step, without a step of its own."""
+        steps = [*self._done, *self._undone]
+        sketches = [self.sketch, *(step.before for step in steps), *(step.after.sketch for step in steps)]
+        # the same sketch stays the same in all steps
+        new = {id(sketch): change(sketch) for sketch in {id(each): each for each in sketches}.values()}
+        for step in steps:
+            step.before = new[id(step.before)]
+            step.after = replace(step.after, sketch=new[id(step.after.sketch)])
+        self.sketch = new[id(self.sketch)]
+
+    @property
+    def past(self) -> tuple[str, ...]:
+        """Undoable changes in words, the newest first."""
+        return tuple(step.after.words for step in reversed(self._done))
+
+    @property
+    def future(self) -> tuple[str, ...]:
+        """Redoable changes in words, the next first."""
+        return tuple(step.after.words for step in reversed(self._undone))
+
+    def break_drag(self) -> None:
+        """Let the next change stand alone, as when the mouse is released."""
+        self._broken = True
+
+    def mark_saved(self) -> None:
+        """Remember that a file holds what is there now."""
+        self._saved = self.sketch
+        self._broken = True
+
+    def mark_unsaved(self) -> None:
+        """Remember that no file holds any of it, as when the file has changed or gone."""
+        self._saved = None
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something would be lost; undoing back to what was saved makes it false again."""
+        return self._saved is not self.sketch and self._saved != self.sketch
+
+    def _now(self, change: Change) -> Change:
+        self.sketch, self.selection = change.sketch, change.selection
+        self._broken = True
+        return change
+
+
+KIND = "robocov-draft"
+
+
+@dataclass(frozen=True)
+class Autosave:
+    """A map that an editor left behind."""
+
+    folder: Path  # where it lies
+    path: Path | None  # the file that it belongs to; None if it never had one
+    name: str  # the map's name
+    when: datetime  # when it was kept, in local time
+    obstacles: int
+    disk: OnDisk | None  # what the file was like when it was read or written last
+
+    def sketch(self) -> Sketch:
+        """Return the map; MapError when it cannot be read any more."""
+        return sketch_of(autosave.read_record(self.folder, KIND).content.get("sketch"), str(self.folder))
+
+    def words(self, now: datetime | None = None) -> str:
+        """Return what to offer: "“Office”, 12 obstacles, today 14:03, not saved to office.json"."""
+        now = now or datetime.now().astimezone()
+        days = (now.date() - self.when.date()).days
+        day = {0: "today", 1: "yesterday"}.get(days, f"{self.when:%Y-%m-%d}")
+        where = "never saved" if self.path is None else f"not saved to {self.path.name}"
+        what = f"“{one_line(self.name)}”, {counted(self.obstacles, 'obstacle')}"
+        return f"{what}, {day} {self.when:%H:%M}, {where}"
+
+
+def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
+    """Return what is kept of a map."""
+    file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
+    return {"disk": file, "sketch": draft_document(sketch)}
+
+
+def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
+    """Return the maps that editors left behind which live no more, the newest first."""
+    return autosave.recoverable(folder, KIND, _autosave)
+
+
+def opened_elsewhere(folder: Path | None, path: Path) -> bool:
+    """Return whether another editor has this file open."""
+    return autosave.opened_elsewhere(folder, KIND, path)
+
+
+def _autosave(record: autosave.Record) -> Autosave | None:
+    """Return the map of a record; None if there is none, or its file holds it already."""
+    kept, path, disk = record.content.get("sketch"), record.path, record.content.get("disk")
+    if kept is None:
+        return None
+    sketch = sketch_of(kept, str(record.folder))
+    with suppress(MapError):
+        if path is not None and read_bytes(path) == sketch_text(sketch).encode():
+            return None
+    try:
+        size, changed = disk["stamp"] if disk is not None else (0, 0)
+        known = OnDisk(path, str(disk["digest"]), (int(size), int(changed))) if disk and path else None
+    except (TypeError, ValueError, KeyError) as error:
+        raise MapError(f"{record.folder}: is no whole {KIND}: {error}") from None
+    return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
+
+
+State: TypeAlias = Literal["same", "changed", "gone"]
+
+
+class ChangedError(OutputError):
+    """A file is not as it was when it was read or written last, or there is one that was not known of."""
+
+
+@dataclass(frozen=True)
+class OnDisk:
+    """A file as it was when it was read or written."""
+
+    path: Path  # absolute
+    digest: str  # SHA-256 of its content
+    stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
+
+
+def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
+    """Return the sketch in a map file, which may be a draft, and what the file was like."""
+    path = path.absolute()
+    # the stamp of before: what changes while it is read is noticed at the next look
+    stamp = _stamp(path)
+    content = read_bytes(path)
+    return parse_sketch(content, str(path), path.parent), OnDisk(path, _digest(content), stamp or (-1, 0))
+
+
+def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
+    """Write a file whole or not at all; ChangedError, unless `over`, when it is not as it was `before`."""
+    path = path.absolute()
+    text = sketch_text(sketch).encode()
+    writable(path)
+    if not over and (before is None or before.path != path) and _stamp(path) is not None:
+        raise ChangedError(f"{one_line(path)}: there is such a file already")
+    if not over and before is not None and before.path == path and state_of(before) == "changed":
+        what = "has been changed by something else since it was opened or saved here"
+        raise ChangedError(f"{one_line(path)}: {what}")
+    with written(path) as part:
+        part.write_bytes(text)
+    return OnDisk(path, _digest(text), _stamp(path) or (-1, 0))
+
+
+def state_of(before: OnDisk) -> State:
+    """Return whether a file is still as it was, quickly; one that was merely touched is the same."""
+    stamp = _stamp(before.path)
+    if stamp is None:
+        return "gone"
+    if stamp == before.stamp:
+        return "same"
+    try:
+        content = read_bytes(before.path)
+    except MapError:
+        return "changed" if _stamp(before.path) else "gone"
+    return "same" if _digest(content) == before.digest else "changed"
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_size, status.st_mtime_ns
+
+
+def _digest(content: bytes) -> str:
+    return sha256(content).hexdigest()
+
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
 SUFFIX = ".json"
@@ -22,10 +254,7 @@ _LOOKED_AGAIN = 1.0  # seconds between two looks at the file
 
 
 class Document:
-    """A sketch with its history, its file, and the autosave that survives whatever happens.
-
-    Kept aside below `drafts` (None: nowhere) or in the `resumed` folder; `stem` names what has no `path` yet.
-    """
+    """A sketch with its history and file, kept aside below `drafts` or in the `resumed` folder."""
 
     def __init__(
         self,
@@ -55,7 +284,7 @@ class Document:
     @classmethod
     def opened(cls, path: Path, drafts: Path | None) -> Document:
         """Return the map in a file; one that comes with robocov as a copy, which has no file yet."""
-        sketch, disk = file.opened(path)
+        sketch, disk = read_sketch(path)
         if is_bundled(path):
             return cls(sketch, drafts, stem=path.stem)
         return cls(sketch, drafts, path.resolve(), disk)
@@ -106,7 +335,7 @@ class Document:
             raise MapError(f"{path.name} comes with robocov and stays as it is: another name was wanted")
         named = self.history.sketch.named(path.stem)
         before = self.disk if path == self.path else None
-        self.disk = file.saved(named, path, before, over=over or (self._over and path == self.path))
+        self.disk = write_sketch(named, path, before, over=over or (self._over and path == self.path))
         if named is not self.history.sketch:
             self.history.replace_all(lambda sketch: sketch.named(path.stem))
         self.path, self.state, self._over = path, "same", False
@@ -134,7 +363,7 @@ class Document:
         if self.disk is None or now - self._looked < _LOOKED_AGAIN:
             return "same"
         self._looked = now
-        state = file.state_of(self.disk)
+        state = state_of(self.disk)
         news, self.state = state != self.state, state
         if news and state != "same":
             self.history.mark_unsaved()
@@ -144,7 +373,7 @@ class Document:
     def reload(self) -> None:
         """Take the document as its file is now; that is an edit, which can be undone."""
         assert self.path is not None
-        sketch, self.disk = file.opened(self.path)
+        sketch, self.disk = read_sketch(self.path)
         self.state, self._over = "same", False
         self.history.do(Change(sketch, Selection(), "read again from the file"))
         self._settle()

@@ -1,7 +1,7 @@
 """Points, angles and outlines of the plane: to the tenth of a millimetre, within reach."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import FARTHEST, SMALLEST
 
+ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
 DECIMALS = 4  # digits after the decimal point of what the editor writes: a tenth of a millimetre
 
 
@@ -103,10 +104,7 @@ def rectangle(a: Point, b: Point) -> tuple[Point, Point, Point, Point]:
 
 
 def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
-    """Return the polygons of a valid geometry, the largest first, snapped to tenths of a millimetre.
-
-    Vertices in line with their neighbours go, and so do parts and holes smaller than a millimetre either way.
-    """
+    """Return the polygons of a geometry, to tenths of a millimetre, the largest first, without crumbs."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
     parts.sort(key=lambda part: (-part.area, part.bounds))
@@ -121,3 +119,59 @@ def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonOb
 def _is_crumb(part: BaseGeometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
     return not min(high_x - low_x, high_y - low_y) >= SMALLEST  # of what is empty these are no numbers
+
+
+def at_round_angle(origin: Point, point: Point) -> Point:
+    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another.
+
+    >>> at_round_angle((0.0, 0.0), (3.0, 0.1))
+    (3.0, 0.0)
+    """
+    dx, dy = point[0] - origin[0], point[1] - origin[1]
+    step = np.radians(ANGLE)
+    angle = step * np.round(np.arctan2(dy, dx) / step)
+    along = dx * np.cos(angle) + dy * np.sin(angle)
+    x, y = origin[0] + along * np.cos(angle), origin[1] + along * np.sin(angle)
+    return round(float(x), 9) + 0.0, round(float(y), 9) + 0.0
+
+
+def ring_area(points: Sequence[Point]) -> float:
+    """Return the area of a ring, m².
+
+    >>> ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
+    2.0
+    """
+    x, y = np.asarray(points).T
+    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
+
+
+def bearing_words(a: Point, b: Point) -> str:
+    """Return length and direction from one point to another, in words.
+
+    >>> bearing_words((0.0, 0.0), (0.0, 2.4))
+    '2.40 m  ∠ 90°'
+    """
+    angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    shown = 0.0 if abs(angle) < 0.05 else angle
+    return f"{length_words(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
+
+
+def length_words(metres: float) -> str:
+    """Return a length as it stands beside the cursor.
+
+    >>> length_words(0.0234), length_words(12.3456), length_words(1234.5)
+    ('2.3 cm', '12.35 m', '1234.5 m')
+    """
+    if metres < 0.1:
+        return f"{100 * metres:.1f} cm"
+    return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
+
+
+def point_words(point: Point) -> str:
+    """Return a place in words.
+
+    >>> point_words((1.0, -0.001))
+    '(1.00, 0.00) m'
+    """
+    x, y = (round(value, 2) + 0.0 for value in point)
+    return f"({x:.2f}, {y:.2f}) m"

@@ -1,4 +1,4 @@
-"""What lies under the cursor or in a box; what is locked or hidden is not there for the mouse."""
+"""Hit testing under the cursor and in a box; locked and hidden things are skipped."""
 
 import math
 from collections.abc import Iterable
@@ -15,10 +15,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
 def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
-    """Return all that a click could mean within `reach` metres, what it means first.
-
-    Places, centres and rims of starts, covering obstacles from the top, discs, near obstacles, the boundary.
-    """
+    """Return what a click may mean within `reach` m: starts, what covers the point, what is near."""
     found: list[Owner] = []
     discs: list[Owner] = []
     for name, spec in reversed(sketch.starts):

@@ -1,4 +1,4 @@
-"""What a sketch is like: free area, parts, narrowest gap, and where robots cannot pass."""
+"""Measurements of a sketch: free area, parts, narrowest gap, and where robots cannot pass."""
 
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ _MOST_GAPS = 20  # gaps that are told of one by one
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a sketch is like, for robots of some radius."""
+    """Measurements of a sketch for robots of some radius."""
 
     free_area: float  # m²
     components: tuple[float, ...]  # m²; areas of the connected parts of the free space, the largest first
@@ -158,7 +158,7 @@ def _polygons(geometry: BaseGeometry) -> list[Polygon]:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is a sketch like?"""
+    """Request to measure a sketch."""
 
     rest: Sketch  # without its obstacles
     order: tuple[int, ...]  # the keys of its obstacles

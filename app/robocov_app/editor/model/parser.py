@@ -1,7 +1,4 @@
-"""Sketches read from documents: what a map may not be is kept, what is no map at all is refused.
-
-Sizes may be 0 or less, rings short or empty, names empty: such a draft can be edited, and tells its faults.
-"""
+"""Sketches read from documents: what a map may not be is kept, what is no map at all is refused."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -9,40 +6,28 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from robocov.environment import (
-    REPEATS,
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    ObstaclePath,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Repeat,
-    Ring,
-    UniformStart,
-    WallObstacle,
-)
+from robocov import environment as env
+from robocov.environment import Obstacle, Point, Ring
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
 from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of
 from robocov.mapfile.models import FORMAT, VERSION
-from robocov_app.editor.model.annotations import taken_apart
+from robocov_app.editor.model.background import taken_apart
 from robocov_app.editor.model.sketch import Item, Sketch
 
 _MAP = (
     *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
     *("density", "extra"),
 )
-_OBSTACLES = {"polygon": PolygonObstacle, "circle": CircleObstacle, "wall": WallObstacle}
-_STARTS = {"disc": DiscStart, "uniform": UniformStart, "points": PointsStart}
+_OBSTACLES = {"polygon": env.PolygonObstacle, "circle": env.CircleObstacle, "wall": env.WallObstacle}
+_STARTS = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
 _READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
-"""Which method reads each key."""
+"""Parser method of each key."""
 
 _UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""What a raster of a map without a boundary covers, m, unless it says so itself."""
+"""Extent of a raster on a map without a boundary, m, unless it states its own."""
 
 _Read = TypeVar("_Read")
 
@@ -57,10 +42,7 @@ def parse_sketch(text: str | bytes, where: str, folder: Path | None = None) -> S
 
 
 def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> Sketch:
-    """Return the sketch in a parsed map document; what breaks the rules of maps is kept as it is.
-
-    MapError, with the place, where it is not made as maps are. `folder` holds the picture of a density.
-    """
+    """Return the sketch in a parsed document, whatever rule it breaks; MapError where it is no map at all."""
     where = one_line(where)
     require_json(document, where)
     check_header(document, where, FORMAT, VERSION)
@@ -141,14 +123,14 @@ class _Reader:
     def rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
         return tuple([self.ring(ring, (*path, k)) for k, ring in enumerate(self.items(value, path, "rings"))])
 
-    def repeat(self, value: Any, path: JsonPath) -> Repeat:
-        if value not in REPEATS:
-            self.refuse(path, f"{shown_json(value)}, but one of {', '.join(REPEATS)} was wanted")
-        found: Repeat = value
+    def repeat(self, value: Any, path: JsonPath) -> env.Repeat:
+        if value not in env.REPEATS:
+            self.refuse(path, f"{shown_json(value)}, but one of {', '.join(env.REPEATS)} was wanted")
+        found: env.Repeat = value
         return found
 
-    def way(self, value: Any, path: JsonPath) -> ObstaclePath:
-        return self.built(ObstaclePath, value, path)
+    def way(self, value: Any, path: JsonPath) -> env.ObstaclePath:
+        return self.built(env.ObstaclePath, value, path)
 
     def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
         """Return what an object says, of the class of its kind."""

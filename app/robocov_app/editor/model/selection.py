@@ -1,20 +1,12 @@
-"""What is selected, the vertices of things, and the change that an edit makes."""
+"""The selection, the vertices of things, and the change that an edit makes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    StartSpec,
-    WallObstacle,
-)
+from robocov import environment as env
+from robocov.environment import Obstacle, Point, StartSpec
 from robocov.errors import MapError, counted, one_line
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_and_name
 
@@ -42,7 +34,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Selection:
-    """What is selected: obstacles, single vertices, starts, the boundary."""
+    """Selected things: obstacles, single vertices, starts, the boundary."""
 
     items: frozenset[int] = frozenset()
     vertices: frozenset[Vertex] = frozenset()
@@ -115,7 +107,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Change:
-    """What an edit makes; the words are in the past, as status line and undo say it: "3 obstacles moved"."""
+    """Change that an edit makes; the words are in the past, as undo says them: "3 obstacles moved"."""
 
     sketch: Sketch
     selection: Selection
@@ -146,13 +138,13 @@ def ring_points(sketch: Sketch, owner: Owner) -> tuple[tuple[Point, ...], ...]:
         thing = dict(sketch.starts).get(owner)
     else:
         thing = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(thing, PolygonObstacle):
+    if isinstance(thing, env.PolygonObstacle):
         return (thing.vertices, *thing.holes)
-    if isinstance(thing, WallObstacle):
+    if isinstance(thing, env.WallObstacle):
         return (thing.points,)
-    if isinstance(thing, PointsStart):
+    if isinstance(thing, env.PointsStart):
         return (thing.positions,)
-    if isinstance(thing, CircleObstacle | DiscStart):
+    if isinstance(thing, env.CircleObstacle | env.DiscStart):
         (x, y), r = thing.center, thing.radius
         return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
     return ()
@@ -162,13 +154,13 @@ def with_rings(sketch: Sketch, owner: Owner, rings: Sequence[Sequence[Point]]) -
     """Return the sketch with other vertices for something that `ring_points` has rings of, not circles."""
     lines = [tuple(ring) for ring in rings]
     if isinstance(owner, str):
-        return sketch.with_start(owner, PointsStart(lines[0]))
+        return sketch.with_start(owner, env.PointsStart(lines[0]))
     if owner == BOUNDARY:
         return replace(sketch, boundary=lines[0])
     shape = sketch.item(owner).shape
-    if isinstance(shape, WallObstacle):
+    if isinstance(shape, env.WallObstacle):
         return sketch.with_shapes({owner: replace(shape, points=lines[0])})
-    assert isinstance(shape, PolygonObstacle)
+    assert isinstance(shape, env.PolygonObstacle)
     return sketch.with_shapes({owner: replace(shape, vertices=lines[0], holes=tuple(lines[1:]))})
 
 
@@ -215,7 +207,7 @@ def rings_of(sketch: Sketch, owner: Owner) -> tuple[tuple[int, tuple[Point, ...]
     if isinstance(owner, str):
         return ()
     shape = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(shape, CircleObstacle):
+    if isinstance(shape, env.CircleObstacle):
         return ()
-    closed = not isinstance(shape, WallObstacle)
+    closed = not isinstance(shape, env.WallObstacle)
     return tuple((k, points, closed) for k, points in enumerate(ring_points(sketch, owner)))

@@ -12,27 +12,17 @@ import shapely
 from shapely import GeometryCollection, LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from robocov import environment as env
 from robocov.density import Density
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Environment,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    StartSpec,
-    WallObstacle,
-)
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
-from robocov_app.editor.model.annotations import MARKS, annotated, taken_apart
-from robocov_app.editor.model.background import Background
+from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
 
+KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
 Owner: TypeAlias = int | str
-"""What vertices belong to: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+"""Owner of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +39,12 @@ class Item:
 
     @cached_property
     def geometry(self) -> BaseGeometry:
-        """What it covers, as a valid shapely geometry, m: a line or a point where it covers nothing."""
+        """Covered area as a valid shapely geometry, m: a line or a point where it covers nothing."""
         return geometry_of(self.shape)
 
     @property
     def marks(self) -> dict[str, Any]:
-        """What the editor keeps about it besides its shape."""
+        """Attributes that the editor keeps besides the shape."""
         return {name: value for name in MARKS if (value := getattr(self, name))}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -82,7 +72,7 @@ class Sketch:
         return hash((self.name, self.boundary, self.obstacles))
 
     @classmethod
-    def from_environment(cls, environment: Environment) -> Sketch:
+    def from_environment(cls, environment: env.Environment) -> Sketch:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
         names = [shape.name for shape in environment.obstacles]
         marks, background, extra = taken_apart(to_json(environment).get("extra", {}), names)
@@ -98,14 +88,14 @@ class Sketch:
             density=environment.density,
         )
 
-    def environment(self, where: str = "map") -> Environment:
+    def environment(self, where: str = "map") -> env.Environment:
         """Return the map that can be simulated; MapError when it breaks a rule, as of the saved file."""
         return from_json(draft_document(self), where)
 
-    def unchecked(self) -> Environment:
+    def unchecked(self) -> env.Environment:
         """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
         marks = {place: item.marks for place, item in enumerate(self.obstacles) if item.marks}
-        return Environment(
+        return env.Environment(
             name=self.name,
             boundary=self.boundary or (),
             obstacles=tuple(item.shape for item in self.obstacles),
@@ -126,12 +116,12 @@ class Sketch:
 
     @cached_property
     def places(self) -> Mapping[int, int]:
-        """Where in `obstacles` each key is."""
+        """Index in `obstacles` of each key."""
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
     def geometries(self) -> Any:
-        """What the obstacles cover, in their order: an array of shapely geometries."""
+        """Geometries of the obstacles in their order, an array of shapely geometries."""
         geometries = np.empty(len(self.obstacles), dtype=object)
         geometries[:] = [item.geometry for item in self.obstacles]
         return geometries
@@ -179,9 +169,9 @@ class Sketch:
         if self.background is not None and self.background.shown:
             points += self.background.corners
         for _, spec in self.starts:
-            if isinstance(spec, PointsStart):
+            if isinstance(spec, env.PointsStart):
                 points += spec.positions
-            elif isinstance(spec, DiscStart):
+            elif isinstance(spec, env.DiscStart):
                 (x, y), r = spec.center, abs(spec.radius)
                 points += [(x - r, y - r), (x + r, y + r)]
         boxes = shapely.bounds(self.geometries).reshape(-1, 4)
@@ -208,21 +198,21 @@ def sketch_text(sketch: Sketch) -> str:
 
 def kind_and_name(shape: Obstacle) -> str:
     """Return what people call an obstacle: "wall", "polygon “desk”"."""
-    kind = {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(shape)]
+    kind = KINDS[type(shape)]
     return f"{kind} “{shape.name}”" if shape.name else kind
 
 
 def geometry_of(shape: Obstacle) -> BaseGeometry:
     """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
-    if isinstance(shape, CircleObstacle):
+    if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):
             return GeometryCollection()
         return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
-    points = shape.points if isinstance(shape, WallObstacle) else shape.vertices
+    points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
     if not _is_near(points) or not points:
         return GeometryCollection()
     line = LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
-    if isinstance(shape, WallObstacle):
+    if isinstance(shape, env.WallObstacle):
         return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
     if len(points) < 3:
         return line

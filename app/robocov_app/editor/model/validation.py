@@ -1,7 +1,4 @@
-"""What is wrong with a sketch, where, in words: for maps, and for drafts that are far from being one.
-
-The rules are those of `robocov.mapfile`; here every fault has its place on the map, and all are found.
-"""
+"""All that is wrong with a sketch by the rules of `robocov.mapfile`, in words, with its place on the map."""
 
 import math
 import re
@@ -14,20 +11,9 @@ import shapely
 from shapely import LineString, MultiPoint, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from robocov import environment as env
 from robocov.arrays import Array
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    Start,
-    StartSpec,
-    in_the_way,
-    swept_area,
-)
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
@@ -39,7 +25,7 @@ Kind: TypeAlias = Literal[
     "other", "no boundary", "crossing", "spot", "no room", "outside", "twice", "double", "sealed", "narrow",
     "cut off",
 ]  # fmt: skip
-"""What a problem is of, for those that mend it: see `robocov_app.editor.edits.fixes`."""
+"""Kind of a problem, by which fixes are found: see `robocov_app.editor.edits.fixes`."""
 
 _FLAT = 1e-9  # an outline whose area is below this part of its width or height squared is a line
 _LONGEST_NAME = 100
@@ -64,7 +50,7 @@ class Problem:
 
 
 class _Fault(NamedTuple):
-    """What is wrong with a part: words that follow its name and a colon, and the place."""
+    """Fault of a part: words that follow its name and a colon, and the place."""
 
     words: str
     where: BaseGeometry | None
@@ -73,7 +59,7 @@ class _Fault(NamedTuple):
 
 def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiPolygon]:
     """Return all that is wrong for robots of a radius, m, the grave first, and the free space."""
-    found = [*_map_faults(sketch), *_part_faults(sketch)]
+    found = list(_faults(sketch))
     if found:
         free = _rough_free(sketch)
         found += _space_faults(sketch, free, {problem.of for problem in found})
@@ -131,7 +117,7 @@ def place_words(x: float, y: float) -> str:
 # the map as a whole, and its parts one by one
 
 
-def _map_faults(sketch: Sketch) -> Iterator[Problem]:
+def _faults(sketch: Sketch) -> Iterator[Problem]:
     for words in _label_faults(sketch.name):
         yield Problem(f"the map {words}", None, None, True)
     if len(sketch.description) > _LONGEST_TEXT:
@@ -139,9 +125,6 @@ def _map_faults(sketch: Sketch) -> Iterator[Problem]:
     if sketch.boundary is None:
         words = "there is no boundary: draw one round all that is free"
         yield Problem(words, None, BOUNDARY, True, "no boundary")
-
-
-def _part_faults(sketch: Sketch) -> Iterator[Problem]:
     faults: list[tuple[Owner, _Fault]] = []
     if sketch.boundary is not None:
         faults += [(BOUNDARY, fault) for fault in _ring_faults(sketch.boundary, "it")]
@@ -167,9 +150,9 @@ def _label_faults(name: str) -> Iterator[str]:
 def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
     if shape.name is not None:
         yield from (_Fault(words, None) for words in _label_faults(shape.name))
-    if isinstance(shape, PolygonObstacle):
+    if isinstance(shape, env.PolygonObstacle):
         yield from _polygon_faults(shape)
-    elif isinstance(shape, CircleObstacle):
+    elif isinstance(shape, env.CircleObstacle):
         yield from _size_faults("radius", shape.radius, shape.center)
         yield from _far_faults((shape.center,))
     else:
@@ -186,10 +169,10 @@ def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
 
 
 def _start_faults(spec: StartSpec) -> Iterator[_Fault]:
-    if isinstance(spec, DiscStart):
+    if isinstance(spec, env.DiscStart):
         yield from _size_faults("radius", spec.radius, spec.center)
         yield from _far_faults((spec.center,))
-    elif isinstance(spec, PointsStart):
+    elif isinstance(spec, env.PointsStart):
         if not spec.positions:
             yield _Fault("has no places: it needs one a robot", None)
         yield from _far_faults(spec.positions)
@@ -228,7 +211,7 @@ def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[_Fault]:
         yield _Fault(words, MultiPoint(places[:_MOST_PLACES]), "crossing")
 
 
-def _polygon_faults(shape: PolygonObstacle) -> Iterator[_Fault]:
+def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[_Fault]:
     found = list(_ring_faults(shape.vertices))
     for hole in shape.holes:
         found += _ring_faults(hole, "a hole")
@@ -309,13 +292,13 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
             yield Problem("no free space is left inside the boundary", hull, BOUNDARY, True)
         return
     for name, spec in sketch.starts:
-        if isinstance(spec, PointsStart):
-            yield from _blocked_places(sketch, name, spec, free)
+        if isinstance(spec, env.PointsStart):
+            yield from _blocked(sketch, name, spec, free)
         elif name not in faulty:
             yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
 
 
-def _blocked_places(sketch: Sketch, name: str, spec: PointsStart, free: MultiPolygon) -> Iterator[Problem]:
+def _blocked(sketch: Sketch, name: str, spec: env.PointsStart, free: MultiPolygon) -> Iterator[Problem]:
     if not spec.positions:
         return
     points = shapely.points(np.array(spec.positions, dtype=float))
@@ -328,22 +311,22 @@ def _blocked_places(sketch: Sketch, name: str, spec: PointsStart, free: MultiPol
         yield Problem(words, points[k], name, True, "spot")
 
 
-def _spot(name: str, spec: PointsStart, k: int) -> str:
+def _spot(name: str, spec: env.PointsStart, k: int) -> str:
     return f"start “{one_line(name)}”: place {k + 1} at {place_words(*spec.positions[k])}"
 
 
 def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grave: bool) -> Iterator[Problem]:
     try:
-        Start(name, spec, free).sample(1, radius=radius)
+        env.Start(name, spec, free).sample(1, radius=radius)
     except StartError:
-        is_disc = isinstance(spec, DiscStart)
+        is_disc = isinstance(spec, env.DiscStart)
         what = "its disc" if is_disc else "the free space"
         words = f"start “{one_line(name)}”: {what} has no room for a robot of radius {radius:g} m"
-        where = shapely.Point(spec.center).buffer(spec.radius) if isinstance(spec, DiscStart) else None
+        where = shapely.Point(spec.center).buffer(spec.radius) if isinstance(spec, env.DiscStart) else None
         yield Problem(words, where, name, grave, "no room" if is_disc else "other")
 
 
-def _tight_places(name: str, spec: PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
+def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
     points = shapely.points(np.array(spec.positions, dtype=float))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():
@@ -362,22 +345,20 @@ def _tight_places(name: str, spec: PointsStart, free: MultiPolygon, radius: floa
 # warnings
 
 
-def _warnings(
-    sketch: Sketch, free: MultiPolygon, radius: float, faulty: set[Owner | None]
-) -> Iterator[Problem]:
+def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner | None]) -> Iterator[Problem]:
     """Yield what may be a mistake, but not of what is at fault already."""
-    if BOUNDARY not in faulty:
+    if BOUNDARY not in bad:
         yield from _outside(sketch)
     yield from _twice(sketch)
     yield from _double_vertices(sketch)
-    yield from _paths(sketch, faulty)
+    yield from _paths(sketch, bad)
     if free.is_empty:
         return
     yield from _sealed_rooms(free, radius)
     for name, spec in sketch.starts:
-        if name in faulty:
+        if name in bad:
             continue
-        if isinstance(spec, PointsStart):
+        if isinstance(spec, env.PointsStart):
             yield from _tight_places(name, spec, free, radius)
         elif radius > DEFAULT_RADIUS:
             yield from _no_room(name, spec, free, radius, grave=False)
@@ -395,15 +376,14 @@ def _outside(sketch: Sketch) -> Iterator[Problem]:
 
 
 def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
-    """Warn of obstacles that move through what stands, or through the outer wall."""
     sound = [item for item in sketch.obstacles if item.key not in faulty and not item.geometry.is_empty]
     standing = {item.key: item.geometry for item in sound if item.shape.path is None}
     inside = None if BOUNDARY in faulty else Polygon(sketch.boundary)
     for item in sound:
         if item.shape.path is None:
             continue
-        area = swept_area(item.shape.polygon, item.shape.path)
-        met, beyond = in_the_way(area, standing, inside)
+        area = env.swept_area(item.shape.polygon, item.shape.path)
+        met, beyond = env.in_the_way(area, standing, inside)
         names, places = [numbered_name(sketch, key) for key in met], list(met.values())
         if beyond is not None:
             names, places = [*names, "the boundary"], [*places, beyond]
@@ -413,7 +393,6 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:
-    """Warn of obstacles that lie twice in the same place, as after pasting twice."""
     below: set[object] = set()
     for item in sketch.obstacles:
         form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))

@@ -1,1 +1,1 @@
-"""What the mouse does on the sheet. Knows no pygame."""
+"""Mouse tools of the editor. Knows no pygame."""

@@ -6,22 +6,10 @@ import shapely
 from robocov.arrays import Array
 from robocov.density import Gaussian, WeightedArea, WeightedPolygons
 from robocov.environment import Point, Ring
-from robocov_app.editor.edits.density import (
-    Feature,
-    area_added,
-    corner_moved,
-    features_of,
-    moved,
-    peak_added,
-    peak_sized,
-    removed,
-    spread_of,
-    weighed,
-    weight_of,
-)
-from robocov_app.editor.model.geometry import distance, rectangle
+from robocov_app.editor.edits import density
+from robocov_app.editor.model.geometry import distance, length_words, rectangle
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
 
 FIRST_WEIGHT = 4.0  # weight of a new feature, until another weight is typed
 _CORNERS = 64
@@ -48,18 +36,18 @@ class DensityTool(Tool):
     def busy(self) -> bool:
         return self._from is not None or self.chosen is not None
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         self._from, self._at, self.change = event.point, event.point, None
-        self._taken, self._corner = _under(features_of(context.sketch), event)
+        self._taken, self._corner = _under(density.features_of(context.sketch), event)
         if self._taken is not None and self._corner is None:
             self.chosen = self._taken
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         self._at = event.point
         if self._from is not None and distance(self._from, event.raw) >= 0.25 * event.reach:
             self.change = self._wanted(context, event.point)
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Make what was dragged; a click on a middle chooses it, elsewhere nothing is chosen."""
         begun, change, self._from, self.change = self._from, self.change, None, None
         if begun is None:
@@ -70,42 +58,42 @@ class DensityTool(Tool):
                 context.say("type what it weighs, then Enter; Backspace takes it away")
             return
         context.change(change)
-        self.chosen = self._taken if self._taken is not None else len(features_of(context.sketch)) - 1
+        self.chosen = self._taken if self._taken is not None else len(density.features_of(context.sketch)) - 1
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         self.press(context, event)
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         had, self.chosen = self.chosen is not None, None
         return had
 
-    def back(self, context: ToolContext) -> bool:
+    def back(self, context: Workspace) -> bool:
         chosen, self.chosen = self.chosen, None
-        if chosen is None or chosen >= len(features_of(context.sketch)):
+        if chosen is None or chosen >= len(density.features_of(context.sketch)):
             return False
-        context.change(removed(context.sketch, chosen))
+        context.change(density.removed(context.sketch, chosen))
         return True
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         had = self.busy
         self._from = self.change = self.chosen = None
         return had
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        weight = weight_of(text)
+    def enter(self, context: Workspace, text: str) -> None:
+        weight = density.weight_of(text)
         if self.chosen is not None:
-            context.change(weighed(context.sketch, self.chosen, weight))
+            context.change(density.weighed(context.sketch, self.chosen, weight))
         self.weight = weight
 
-    def preview(self, context: ToolContext) -> Preview | None:
-        features = features_of(self.change.sketch if self.change is not None else context.sketch)
+    def preview(self, context: Workspace) -> Preview | None:
+        features = density.features_of(self.change.sketch if self.change is not None else context.sketch)
         dots = tuple(map(_middle, features))
         dots += tuple(p for each in features if isinstance(each, WeightedArea) for p in each.vertices)
         words = ""
         shown = self._taken if self._taken is not None else len(features) - 1
         if self._from is not None and self.change is not None and 0 <= shown < len(features):
             feature = features[shown]
-            size = f"σ {length_words(spread_of(feature))}, " if isinstance(feature, Gaussian) else ""
+            size = f"σ {length_words(density.spread_of(feature))}, " if isinstance(feature, Gaussian) else ""
             words = f"{size}weight {feature.weight:g}"
         elif self.chosen is not None and self.chosen < len(features):
             words = f"weight {features[self.chosen].weight:g}"
@@ -113,29 +101,29 @@ class DensityTool(Tool):
             return None
         return Preview(words=words, rings=tuple(map(_outline, features)), dots=dots, chosen=self.chosen)
 
-    def shape_of_cursor(self, context: ToolContext) -> str:
+    def shape_of_cursor(self, context: Workspace) -> str:
         return "move" if self._taken is not None and self._from is not None else "cross"
 
-    def _wanted(self, context: ToolContext, to: Point) -> Change | None:
+    def _wanted(self, context: Workspace, to: Point) -> Change | None:
         assert self._from is not None
         sketch, begun, number = context.sketch, self._from, self._taken
         if number is None and isinstance(sketch.density, WeightedPolygons):
-            return area_added(sketch, rectangle(begun, to), self.weight)
+            return density.area_added(sketch, rectangle(begun, to), self.weight)
         if number is None:
-            return peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
-        if number >= len(features_of(sketch)):
+            return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
+        if number >= len(density.features_of(sketch)):
             return None
-        feature = features_of(sketch)[number]
+        feature = density.features_of(sketch)[number]
         if isinstance(feature, Gaussian):
             if self._corner is not None:
-                return peak_sized(sketch, number, distance(feature.center, to))
+                return density.peak_sized(sketch, number, distance(feature.center, to))
             begun = feature.center
         elif self._corner is not None:
-            return corner_moved(sketch, number, self._corner, to)
-        return moved(sketch, number, to[0] - begun[0], to[1] - begun[1])
+            return density.corner_moved(sketch, number, self._corner, to)
+        return density.moved(sketch, number, to[0] - begun[0], to[1] - begun[1])
 
 
-def _under(features: tuple[Feature, ...], event: PointerEvent) -> tuple[int | None, int | None]:
+def _under(features: tuple[density.Feature, ...], event: PointerEvent) -> tuple[int | None, int | None]:
     """Return the feature under the cursor, and its rim or corner if that is; middles come first."""
     middles = [(distance(_middle(each), event.raw), k) for k, each in enumerate(features)]
     if middles and min(middles)[0] < event.reach:
@@ -153,14 +141,14 @@ def _under(features: tuple[Feature, ...], event: PointerEvent) -> tuple[int | No
     return (inside[-1] if inside else None), None
 
 
-def _middle(feature: Feature) -> Point:
+def _middle(feature: density.Feature) -> Point:
     if isinstance(feature, Gaussian):
         return feature.center
     inside = feature.polygon.representative_point()
     return float(inside.x), float(inside.y)
 
 
-def _outline(feature: Feature) -> Ring:
+def _outline(feature: density.Feature) -> Ring:
     """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
     if isinstance(feature, WeightedArea):
         return feature.vertices

@@ -5,30 +5,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import copysign
 
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Obstacle,
-    Point,
-    PointsStart,
-    PolygonObstacle,
-    WallObstacle,
-)
+from robocov import environment as env
+from robocov.environment import Obstacle, Point
 from robocov.errors import MapError, counted
-from robocov_app.editor.edits import create, doors
+from robocov_app.editor.edits import create
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
-from robocov_app.editor.model.geometry import distance, rectangle
+from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import (
-    PointerEvent,
-    Preview,
-    Tool,
-    ToolContext,
-    bearing_words,
-    constrained_point,
-    length_words,
-    ring_area,
-)
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
 from robocov_app.toolkit.draw_tools import SAME, Outline
 
 
@@ -44,17 +28,16 @@ class DrawTool(Tool, ABC):
         super().__init__()
         self.outline = Outline(self.least, self.most, self.closes, self.drags)
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change | None:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change | None:
         return None
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
         closed = self.closes and len(points) > 2
         words = bearing_words(points[-2], points[-1]) + (f"   {ring_area(points):.2f} m²" if closed else "")
         return Preview(points, closed, True, words=words)
 
     def dragged(self, a: Point, b: Point) -> list[Point]:
-        """Return the points of a drag from one place to another."""
         return [a, b]
 
     def placed(self, event: PointerEvent) -> Point:
@@ -80,24 +63,24 @@ class DrawTool(Tool, ABC):
     def drawn(self) -> tuple[Point, ...]:
         return tuple(self.points if self.most == 2 else self.points[:-1])
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         if self.outline.press(self.placed(event), event.raw, 0.7 * event.reach):
             self.finish(context)
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         if self.most == 2:
             self.press(context, event)
         else:  # the first click of the two has put its point
             self.finish(context)
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         self.outline.at = self.placed(event)
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         if self.outline.release(self.placed(event), event.raw, event.reach, clicked=clicked):
             self._finish_drag(context, self.outline.at)
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         points = self.outline.take()
         if not points:
             return False
@@ -108,13 +91,13 @@ class DrawTool(Tool, ABC):
             context.change(change)
         return True
 
-    def back(self, context: ToolContext) -> bool:
+    def back(self, context: Workspace) -> bool:
         return bool(self.points and self.points.pop())
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         return self.outline.cancel()
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         outline = self.outline
         end = self.end_for(text) if len(self.points) == 1 else None
         if end is not None:
@@ -124,10 +107,10 @@ class DrawTool(Tool, ABC):
             outline.points.append(outline.at)
             outline.dragging = False
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         return self.shown(context, (*self.points, self.outline.at)) if self.points else None
 
-    def _finish_drag(self, context: ToolContext, end: Point) -> None:
+    def _finish_drag(self, context: Workspace, end: Point) -> None:
         self.outline.points = self.dragged(self.points[0], end)
         self.finish(context)
 
@@ -146,7 +129,7 @@ class PolygonTool(DrawTool):
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     least, closes = 3, True
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.polygon_drawn(context.sketch, points)
 
 
@@ -158,12 +141,12 @@ class WallTool(DrawTool):
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
     drags = True
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.wall_drawn(context.sketch, points, context.wall_width)
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
-        shapes: tuple[Obstacle, ...] = (WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
+        shapes: tuple[Obstacle, ...] = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         words = f"{bearing_words(points[-2], points[-1])}   {length_words(context.wall_width)} wide"
         return Preview(points, False, True, shapes, words=words)
 
@@ -184,20 +167,20 @@ class MeasureTool(DrawTool):
     def measured(self) -> tuple[Point, ...]:
         return tuple(self.points) or self._kept
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         self._kept = ()
         super().press(context, event)
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         points = self.outline.take()
         self._kept = tuple(points) or self._kept
         return bool(points)
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         had, self._kept = bool(self._kept), ()
         return super().cancel(context) or had
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         points = (*self.points, self.outline.at) if self.points else self._kept
         if len(points) < 2:
             return None
@@ -217,12 +200,12 @@ class PlacesTool(DrawTool):
     hint = "click a place for each robot; Enter ends it"
     least = 1
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.points_start_drawn(context.sketch, points)
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         words = f"{counted(len(points) - 1, 'robot')}; Enter ends it"
-        return Preview(start=PointsStart(points[:-1]), words=words)
+        return Preview(start=env.PointsStart(points[:-1]), words=words)
 
 
 class BoundaryTool(DrawTool):
@@ -233,7 +216,7 @@ class BoundaryTool(DrawTool):
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     least, closes, drags = 3, True, True
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.boundary_drawn(context.sketch, points)
 
     def dragged(self, a: Point, b: Point) -> list[Point]:
@@ -245,7 +228,7 @@ class BoundaryTool(DrawTool):
     def end_for(self, text: str) -> Point | None:
         return self._far_corner(text) if any(sign in text for sign in "x×*") else None
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         if not self.outline.dragging:
             return super().shown(context, points)
         (ax, ay), (bx, by) = points
@@ -261,7 +244,7 @@ class RectangleTool(DrawTool):
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.rectangle_drawn(context.sketch, *points)
 
     def placed(self, event: PointerEvent) -> Point:
@@ -275,11 +258,11 @@ class RectangleTool(DrawTool):
     def end_for(self, text: str) -> Point:
         return self._far_corner(text)
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
         wide, high = abs(bx - ax), abs(by - ay)
         ring = rectangle(*points)
-        shapes: tuple[Obstacle, ...] = (PolygonObstacle(ring),) if min(wide, high) > SAME else ()
+        shapes: tuple[Obstacle, ...] = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
         words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
         return Preview(ring, True, shapes=shapes, words=words)
 
@@ -292,7 +275,7 @@ class CircleTool(DrawTool):
     hint = "drag from the middle to the rim, or click both; type the radius for metres"
     most, drags = 2, True
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.circle_drawn(context.sketch, points[0], distance(*points))
 
     def placed(self, event: PointerEvent) -> Point:
@@ -301,9 +284,9 @@ class CircleTool(DrawTool):
     def end_for(self, text: str) -> Point:
         return self.points[0][0] + length_of(text), self.points[0][1]
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        shapes: tuple[Obstacle, ...] = (CircleObstacle(points[0], radius),) if radius > SAME else ()
+        shapes: tuple[Obstacle, ...] = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
         return Preview(points, shapes=shapes, words=f"radius {length_words(radius)}")
 
 
@@ -314,12 +297,12 @@ class DiscTool(CircleTool):
     title = "Start disc"
     hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for metres"
 
-    def made(self, context: ToolContext, points: Sequence[Point]) -> Change:
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.disc_start_drawn(context.sketch, points[0], distance(*points))
 
-    def shown(self, context: ToolContext, points: tuple[Point, ...]) -> Preview:
+    def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        start = DiscStart(points[0], radius) if radius > SAME else None
+        start = env.DiscStart(points[0], radius) if radius > SAME else None
         return Preview(points, start=start, words=f"radius {length_words(radius)}")
 
 
@@ -338,41 +321,41 @@ class DoorTool(Tool):
         self._at: Point = (0.0, 0.0)
         self._wall: int | None = None  # over which the cursor is, or that was pressed
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         self._from = self._at = event.point
-        self._wall = doors.wall_at(context.sketch, event.raw, 0.6 * event.reach)
+        self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
         if self._wall is None:
             raise MapError("click a wall: doors are opened in walls")
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         self.press(context, event)
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         self._at = event.point
         if self._from is None:
-            self._wall = doors.wall_at(context.sketch, event.raw, 0.6 * event.reach)
+            self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         begun, self._from, wall, self._wall = self._from, None, self._wall, None
         if begun is None or wall is None:
             return
         if clicked:
-            context.change(doors.door_opened(context.sketch, wall, event.point, self.width))
+            context.change(create.door_opened(context.sketch, wall, event.point, self.width))
         else:
-            context.change(doors.wall_opened(context.sketch, wall, begun, event.point))
+            context.change(create.wall_opened(context.sketch, wall, begun, event.point))
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         had, self._from = self._from is not None, None
         return had
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        self.width = doors.door_width(length_of(text))
+    def enter(self, context: Workspace, text: str) -> None:
+        self.width = create.door_width(length_of(text))
         context.say(f"doors are {length_words(self.width)} wide")
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         if self._wall is None or self._wall not in context.sketch.places:
             return None
-        a, b = doors.door_at(context.sketch, self._wall, self._at, self.width)
+        a, b = create.door_at(context.sketch, self._wall, self._at, self.width)
         if self._from is not None and distance(self._from, self._at) > 0.1 * self.width:
-            a, b = (doors.on_wall(context.sketch, self._wall, place) for place in (self._from, self._at))
+            a, b = (create.on_wall(context.sketch, self._wall, place) for place in (self._from, self._at))
         return Preview((a, b), words=f"door, {length_words(distance(a, b))}")

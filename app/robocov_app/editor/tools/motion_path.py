@@ -1,29 +1,11 @@
 """The tool for the paths of obstacles that move: way points by clicking and dragging, speeds by typing."""
 
 from robocov.environment import ObstaclePath, Point
-from robocov_app.editor.edits.motion_path import (
-    FIRST_SPEED,
-    leg_at,
-    path_of,
-    path_paced,
-    path_words,
-    speed_of,
-    way_point_added,
-    way_point_at,
-    way_point_moved,
-    way_point_removed,
-)
-from robocov_app.editor.model.geometry import distance
+from robocov_app.editor.edits import paths
+from robocov_app.editor.model.geometry import bearing_words, distance
 from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.tools.tool import (
-    PointerEvent,
-    Preview,
-    Tool,
-    ToolContext,
-    bearing_words,
-    constrained_point,
-)
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
 
 NEAR = 0.75  # part of a finger's width within which a way point is taken hold of
 
@@ -37,7 +19,7 @@ class MotionPathTool(Tool):
 
     def __init__(self) -> None:
         super().__init__()
-        self.speed = FIRST_SPEED
+        self.speed = paths.FIRST_SPEED
         self.chosen: int | None = None
         self.change: Change | None = None  # what letting go of the mouse would make
         self._held: int | None = None
@@ -53,11 +35,11 @@ class MotionPathTool(Tool):
     def origin(self) -> Point | None:
         return self._last
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         subject, path = _led(context)
         self._held = self.change = None
         if path is not None:
-            self._held = way_point_at(path, event.raw, NEAR * event.reach)
+            self._held = paths.way_point_at(path, event.raw, NEAR * event.reach)
             if self._held is not None:
                 self.chosen = self._held
                 return
@@ -71,17 +53,17 @@ class MotionPathTool(Tool):
         elif path is None and subject in over:
             context.say("now click where it goes")
         else:
-            at = None if path is None else leg_at(path, event.raw, 0.5 * event.reach)
+            at = None if path is None else paths.leg_at(path, event.raw, 0.5 * event.reach)
             point = event.point if at is not None else constrained_point(event, self._last)
-            context.change(way_point_added(context.sketch, subject, point, at, self.speed))
+            context.change(paths.way_point_added(context.sketch, subject, point, at, self.speed))
             count = len(path.points) if path is not None else 1
             self.chosen = self._held = count if at is None else at
         self._note(context)
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         self.finish(context)
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         self._at = event.point
         self._note(context)
         subject, path = _led(context)
@@ -92,73 +74,73 @@ class MotionPathTool(Tool):
         elif self.change is not None or distance(path.points[self._held], event.raw) >= 0.25 * event.reach:
             before = path.points[self._held - 1] if self._held else None
             to = constrained_point(event, before)
-            self.change = way_point_moved(context.sketch, subject, self._held, to)
+            self.change = paths.way_point_moved(context.sketch, subject, self._held, to)
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         change, self._held, self.change = self.change, None, None
         if change is not None and not clicked:
             context.change(change)
         self._note(context)
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         had = _led(context)[0] is not None
         if had:
             context.select(Selection())
         self.cancel(context)
         return had
 
-    def back(self, context: ToolContext) -> bool:
+    def back(self, context: Workspace) -> bool:
         subject, path = _led(context)
         if subject is None or path is None:
             return False
         last = len(path.points) - 1
         chosen = last if self.chosen is None else min(self.chosen, last)
-        context.change(way_point_removed(context.sketch, subject, chosen))
+        context.change(paths.way_point_removed(context.sketch, subject, chosen))
         self.chosen = max(chosen - 1, 0) if len(path.points) > 2 else None
         self._note(context)
         return True
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         had = self._held is not None
         self._held = self.change = self.chosen = self._last = None
         self._leads = False
         return had
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        speed = speed_of(text)
+    def enter(self, context: Workspace, text: str) -> None:
+        speed = paths.speed_of(text)
         subject, path = _led(context)
         if subject is not None and path is not None:
-            context.change(path_paced(context.sketch, Selection.of(subject), speed))
+            context.change(paths.path_paced(context.sketch, Selection.of(subject), speed))
         self.speed = speed
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         subject, path = _led(context)
         if subject is None:
             return None
         if self.change is not None:
-            path = path_of(self.change.sketch, subject)
+            path = paths.path_of(self.change.sketch, subject)
         if path is None:
             return Preview(words=f"where it goes, {self.speed:g} m/s")
-        words = path_words(path)
+        words = paths.path_words(path)
         if self._held:
             words = f"{bearing_words(path.points[self._held - 1], path.points[self._held])}; {words}"
         return Preview(words=words, dots=path.points, chosen=self.chosen)
 
-    def shape_of_cursor(self, context: ToolContext) -> str:
+    def shape_of_cursor(self, context: Workspace) -> str:
         path = _led(context)[1]
-        over = path is not None and way_point_at(path, self._at, 8.0 * context.pixel) is not None
+        over = path is not None and paths.way_point_at(path, self._at, 8.0 * context.pixel) is not None
         return "move" if over or self._held is not None else "cross"
 
-    def _note(self, context: ToolContext) -> None:
+    def _note(self, context: Workspace) -> None:
         subject, path = _led(context)
         self._leads = subject is not None
         self._last = None if path is None else path.points[-1]
 
 
-def _led(context: ToolContext) -> tuple[int | None, ObstaclePath | None]:
+def _led(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
     """Return the obstacle that is led, the one that is selected, and its path."""
     chosen = context.selection.within(context.sketch)
     if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
         return None, None
     (key,) = chosen.items
-    return key, path_of(context.sketch, key)
+    return key, paths.path_of(context.sketch, key)

@@ -7,8 +7,8 @@ from robocov.errors import MapError
 from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.model.background import Background, levelled, to_scale
 from robocov_app.editor.model.coordinates import length_of
-from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, ToolContext, length_words
+from robocov_app.editor.model.geometry import distance, length_words
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
 
 
 class ReferenceImageTool(Tool):
@@ -30,12 +30,12 @@ class ReferenceImageTool(Tool):
     def busy(self) -> bool:
         return bool(self._points)
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         if context.sketch.background is None:
             raise MapError("there is no picture under the map: Ctrl B takes one")
         self._from = event.raw
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         self._at = event.raw
         background = context.sketch.background
         if self._from is None or background is None or distance(self._from, event.raw) < 0.25 * event.reach:
@@ -43,7 +43,7 @@ class ReferenceImageTool(Tool):
         dx, dy = event.raw[0] - self._from[0], event.raw[1] - self._from[1]
         self.moved = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         begun, moved = self._from, self.moved
         self._from = self.moved = None
         if begun is None:
@@ -56,10 +56,10 @@ class ReferenceImageTool(Tool):
         if len(self._points) == 2:
             context.say("type how many metres apart the points are; Enter alone makes their line level")
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         """Take no notice: two points in one place mean nothing."""
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         """Turn the picture so that the line through the two points is level or upright."""
         if len(self._points) != 2 or context.sketch.background is None:
             return False
@@ -67,7 +67,7 @@ class ReferenceImageTool(Tool):
         context.change(underlaid(context.sketch, levelled(context.sketch.background, a, b)))
         return True
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         if len(self._points) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
         a, b = self._points
@@ -75,15 +75,15 @@ class ReferenceImageTool(Tool):
         self._points = []
         context.change(underlaid(context.sketch, laid))
 
-    def back(self, context: ToolContext) -> bool:
+    def back(self, context: Workspace) -> bool:
         return bool(self._points and self._points.pop())
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         had = bool(self._points or self._from)
         self._points, self._from, self.moved = [], None, None
         return had
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         if not self._points:
             return None
         line = (*self._points, self._at)[:2]

@@ -6,24 +6,13 @@ from robocov.environment import CircleObstacle, Point
 from robocov.errors import MapError
 from robocov_app.editor.edits import transform, vertices
 from robocov_app.editor.edits.transform import bounds_of
+from robocov_app.editor.model import geometry
 from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of
-from robocov_app.editor.model.geometry import distance
 from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of, rings_of
 from robocov_app.editor.model.sketch import Owner
-from robocov_app.editor.tools.handles import Handle, handle_at
 from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
-from robocov_app.editor.tools.tool import (
-    ANGLE,
-    PointerEvent,
-    Preview,
-    Tool,
-    ToolContext,
-    at_round_angle,
-    bearing_words,
-    length_words,
-    place_words,
-)
+from robocov_app.editor.tools.tool import Handle, PointerEvent, Preview, Tool, Workspace, handle_at
 
 MANY_POINTS = 1000  # points of what is moved from which on it is moved as a picture
 SAME = 1e-9  # metres below which nothing has moved
@@ -37,7 +26,7 @@ _CURSORS = {
     **dict.fromkeys(((-1, -1), (1, 1)), "rising"),
     **dict.fromkeys(((-1, 1), (1, -1)), "falling"),
 }
-"""What the cursor looks like over handles that scale, by their sides."""
+"""Cursors over scale handles, by their sides."""
 
 
 class Drag:
@@ -48,23 +37,22 @@ class Drag:
         self.guides: tuple[Guide, ...] = ()
         self.words = ""  # beside the cursor
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse."""
 
-    def enter(self, context: ToolContext, text: str) -> None:
-        """Take what was typed instead; MapError when it means nothing."""
+    def enter(self, context: Workspace, text: str) -> None:
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self) -> Preview:
         return Preview(words=self.words)
 
-    def ended(self, context: ToolContext) -> None:
+    def ended(self, context: Workspace) -> None:
         if self.change is not None:
             context.change(self.change)
 
     def snapped_to(
         self,
-        context: ToolContext,
+        context: Workspace,
         event: PointerEvent,
         to: Point,
         dragged: Selection,
@@ -83,7 +71,7 @@ class Drag:
 class Moving(Drag):
     """Moves whole things, or copies them; by an `offset`, m, where a change in each frame took too long."""
 
-    def __init__(self, context: ToolContext, selection: Selection, begun: Point) -> None:
+    def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
         super().__init__()
         self.moving, self._begun, self._at = selection, begun, begun
         points = [at for owner in selection.owners for _, at in points_of(context.sketch, owner)]
@@ -91,10 +79,10 @@ class Moving(Drag):
         self.offset = (0.0, 0.0) if len(points) > MANY_POINTS else None
         self.copies = False
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Alt copies move, with Shift at round angles, with Ctrl freely."""
         self.copies = event.alt
-        to = at_round_angle(self._begun, event.raw) if event.shift else event.raw
+        to = geometry.at_round_angle(self._begun, event.raw) if event.shift else event.raw
         dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
         self.guides = ()
         if not event.ctrl and not event.shift:
@@ -105,7 +93,7 @@ class Moving(Drag):
                 dx, dy = self._on_grid(context, (dx, dy), snap.point)
         self._move(context, dx, dy)
 
-    def _on_grid(self, context: ToolContext, free: Point, snapped_to: Point) -> Point:
+    def _on_grid(self, context: Workspace, free: Point, snapped_to: Point) -> Point:
         """Return the move, with the grid along an axis that nothing else counts for."""
         by = list(snapped_to)
         for axis in (0, 1):
@@ -114,25 +102,26 @@ class Moving(Drag):
                 by[axis] = context.grid * round((first + by[axis]) / context.grid) - first
         return by[0], by[1]
 
-    def _move(self, context: ToolContext, dx: float, dy: float) -> None:
+    def _move(self, context: Workspace, dx: float, dy: float) -> None:
         self._at = self._begun[0] + dx, self._begun[1] + dy
         if self.offset is None:
             self.change = self._made(context, dx, dy)
         else:
             self.offset = (dx, dy)
-        self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {length_words(float(np.hypot(dx, dy)))}"
+        far = geometry.length_words(float(np.hypot(dx, dy)))
+        self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {far}"
 
-    def _made(self, context: ToolContext, dx: float, dy: float) -> Change | None:
+    def _made(self, context: Workspace, dx: float, dy: float) -> Change | None:
         act = transform.duplicated if self.copies else transform.moved
         still = dx == 0.0 and dy == 0.0
         return None if still else act(context.sketch, self.moving, dx, dy)
 
-    def ended(self, context: ToolContext) -> None:
+    def ended(self, context: Workspace) -> None:
         if self.offset is not None:
             self.change = self._made(context, *self.offset)
         super().ended(context)
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         """Move by a length towards the cursor, or by what was typed: ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         two = len(text.split()) > 1 or "<" in text or ";" in text
@@ -145,34 +134,34 @@ class Moving(Drag):
 class MovingVertices(Drag):
     """Moves single vertices: the one that was taken, and those that are selected with it."""
 
-    def __init__(self, context: ToolContext, taken: Vertex, selection: Selection) -> None:
+    def __init__(self, context: Workspace, taken: Vertex, selection: Selection) -> None:
         super().__init__()
         self._selection = Selection(vertices=selection.vertices | {taken})
         self._begun = self._at = place_of(context.sketch, taken)
         self._origin = _neighbour(context, taken)
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
         self.guides = ()
         if event.shift and self._origin is not None:
-            self._put(context, at_round_angle(self._origin, event.raw))
+            self._put(context, geometry.at_round_angle(self._origin, event.raw))
         else:
             self._put(context, self.snapped_to(context, event, event.raw, self._selection, self._origin))
 
-    def _put(self, context: ToolContext, to: Point) -> None:
+    def _put(self, context: Workspace, to: Point) -> None:
         self._at = to
         dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
         still = dx == 0.0 and dy == 0.0
         self.change = None if still else vertices.moved(context.sketch, self._selection, dx, dy)
-        self.words = place_words(to)
+        self.words = geometry.point_words(to)
         if self._origin is not None:
-            self.words += f"   {bearing_words(self._origin, to)}"
+            self.words += f"   {geometry.bearing_words(self._origin, to)}"
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         self._put(context, next_point_of(text, self._origin or self._begun, self._at))
 
 
-def _neighbour(context: ToolContext, vertex: Vertex) -> Point | None:
+def _neighbour(context: Workspace, vertex: Vertex) -> Point | None:
     """Return the vertex before one on its ring, or after a wall's first; None of circles and starts."""
     for ring, points, closed in rings_of(context.sketch, vertex.of):
         if ring == vertex.ring:
@@ -184,7 +173,7 @@ def _neighbour(context: ToolContext, vertex: Vertex) -> Point | None:
 class Turning(Drag):
     """Turns whole things about the middle of their box."""
 
-    def __init__(self, context: ToolContext, selection: Selection, begun: Point) -> None:
+    def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
         super().__init__()
         low_x, low_y, high_x, high_y = bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
         self.about = (low_x + high_x) / 2, (low_y + high_y) / 2
@@ -193,28 +182,28 @@ class Turning(Drag):
     def _angle(self, point: Point) -> float:
         return float(np.degrees(np.arctan2(point[1] - self.about[1], point[0] - self.about[0])))
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in steps, with Ctrl freely."""
         degrees = (self._angle(event.raw) - self._from + 180.0) % 360.0 - 180.0
         if event.shift:
-            degrees = ANGLE * round(degrees / ANGLE)
+            degrees = geometry.ANGLE * round(degrees / geometry.ANGLE)
         elif not event.ctrl:
             degrees = snapped_angle(degrees, context.snap_angle)
         self._turn(context, degrees)
 
-    def _turn(self, context: ToolContext, degrees: float) -> None:
+    def _turn(self, context: Workspace, degrees: float) -> None:
         self.words = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
         turned = transform.rotated(context.sketch, self._selection, degrees, self.about) if degrees else None
         self.change = turned
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         self._turn(context, angle_of(text))
 
 
 class Scaling(Drag):
     """Scales whole things by a corner or a side of their box; the opposite one stays."""
 
-    def __init__(self, context: ToolContext, selection: Selection, handle: Handle) -> None:
+    def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
         super().__init__()
         self._selection, self._side = selection, handle.side
         self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
@@ -231,7 +220,7 @@ class Scaling(Drag):
         low_x, low_y, high_x, high_y = self._bounds
         return (low_x + high_x + x * (high_x - low_x)) / 2, (low_y + high_y + y * (high_y - low_y)) / 2
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
         self.guides = ()
         to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
@@ -250,7 +239,7 @@ class Scaling(Drag):
             fx = fy = max(whole, key=lambda f: abs(f - 1.0))
         self._scale(context, fx, fy, about)
 
-    def _scale(self, context: ToolContext, fx: float, fy: float, about: Point) -> None:
+    def _scale(self, context: Workspace, fx: float, fy: float, about: Point) -> None:
         wide, high = self._bounds[2] - self._bounds[0], self._bounds[3] - self._bounds[1]
         fx, fy = (
             f if abs(f) * max(size, 1e-3) >= 1e-3 else 1e-3 / max(size, 1e-3)
@@ -259,9 +248,10 @@ class Scaling(Drag):
         same = abs(fx - 1.0) < 1e-12 and abs(fy - 1.0) < 1e-12
         self.change = None if same else transform.scaled(context.sketch, self._selection, fx, fy, about)
         factor = f"{100 * fx:.0f} %" if abs(fx - fy) < 1e-9 else f"{100 * fx:.0f} % x {100 * fy:.0f} %"
-        self.words = f"{length_words(abs(wide * fx))} x {length_words(abs(high * fy))}   {factor}"
+        sides = [geometry.length_words(abs(side)) for side in (wide * fx, high * fy)]
+        self.words = f"{sides[0]} x {sides[1]}   {factor}"
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         axis = 0 if self._side[0] else 1
         now = self._bounds[2 + axis] - self._bounds[axis]
         factor = length_of(text, now=now) / now
@@ -275,16 +265,16 @@ class Scaling(Drag):
 class Box(Drag):
     """Selects what lies in a box; drawn to the left also what it touches."""
 
-    def __init__(self, context: ToolContext, begun: Point, *, adds: bool) -> None:
+    def __init__(self, context: Workspace, begun: Point, *, adds: bool) -> None:
         super().__init__()
         self._begun = self._at = begun
         self._before = context.selection if adds else Selection()
         self._adds = adds
 
-    def to(self, context: ToolContext, event: PointerEvent) -> None:
+    def to(self, context: Workspace, event: PointerEvent) -> None:
         self._at = event.raw
 
-    def found(self, context: ToolContext) -> Selection:
+    def found(self, context: Workspace) -> Selection:
         """Return what is in the box: whole things, or vertices where it holds some that are shown."""
         sketch, shown = context.sketch, context.handled
         inside = in_box(sketch, self._begun, self._at, touched=self._leftwards).with_groups(sketch)
@@ -298,8 +288,8 @@ class Box(Drag):
     def _leftwards(self) -> bool:
         return self._at[0] < self._begun[0]
 
-    def ended(self, context: ToolContext) -> None:
-        if distance(self._begun, self._at) > 0.0:
+    def ended(self, context: Workspace) -> None:
+        if geometry.distance(self._begun, self._at) > 0.0:
             context.select(self._before.plus(self.found(context)))
 
     def preview(self) -> Preview:
@@ -328,11 +318,17 @@ class SelectTool(Tool):
     def busy(self) -> bool:
         return self.drag is not None
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         self._pressed, self.drag, self._narrows, self._gone = event, None, False, False
         self._handle = handle_at(context.handles, event.raw, NEAR * event.reach)
-        if self._handle is not None:
-            self._take(context, self._handle, event)
+        vertex = self._handle.vertex if self._handle is not None else None
+        if vertex is not None:
+            own = Selection(vertices=frozenset({vertex}))
+            if event.shift:
+                context.select(Selection(vertices=context.selection.vertices).toggled(own))
+            elif vertex not in context.selection.vertices:
+                context.select(own)
+        if self._handle is not None:  # those of the box wait to be dragged
             return
         found = owners_at(context.sketch, event.raw, 0.5 * event.reach)
         if not found:
@@ -348,17 +344,7 @@ class SelectTool(Tool):
         else:
             self._narrows = True
 
-    def _take(self, context: ToolContext, handle: Handle, event: PointerEvent) -> None:
-        """Select the vertex that was pressed; the box's handles wait to be dragged."""
-        if handle.vertex is None:
-            return
-        own = Selection(vertices=frozenset({handle.vertex}))
-        if event.shift:
-            context.select(Selection(vertices=context.selection.vertices).toggled(own))
-        elif handle.vertex not in context.selection.vertices:
-            context.select(own)
-
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         if self._pressed is None:
             self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
             found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
@@ -366,13 +352,13 @@ class SelectTool(Tool):
             return
         if self._gone:
             return
-        if self.drag is None and distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
+        if self.drag is None and geometry.distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
             self.drag = self._begun(context, self._pressed)
         if self.drag is not None:
             self.drag.to(context, event)
             self.guides = self.drag.guides
 
-    def _begun(self, context: ToolContext, pressed: PointerEvent) -> Drag:
+    def _begun(self, context: Workspace, pressed: PointerEvent) -> Drag:
         handle, whole = self._handle, context.selection.without_vertices()
         if handle is not None and handle.vertex is not None:
             return MovingVertices(context, handle.vertex, context.selection)
@@ -385,8 +371,8 @@ class SelectTool(Tool):
             return Moving(context, whole, pressed.raw)
         return Box(context, pressed.raw, adds=pressed.shift)
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
-        """Do what was dragged; a click selects what it is on, and again what lies below."""
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+        """Do what was dragged; a click selects one of what is selected, and again what lies below."""
         pressed, drag, gone = self._pressed, self.drag, self._gone
         self._pressed, self.drag, self.guides = None, None, ()
         if gone or pressed is None:
@@ -398,19 +384,13 @@ class SelectTool(Tool):
             found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
             if not found:
                 context.select(Selection())
-            elif self._narrows:
-                self._narrow(context, found)
+            elif self._narrows and len(chosen := context.selection.owners) > 1:
+                context.select(Selection.of(next(each for each in found if each in chosen)))
+            elif self._narrows and len(found) > 1:
+                (one,) = chosen
+                context.select(Selection.of(found[(found.index(one) + 1) % len(found)]))
 
-    def _narrow(self, context: ToolContext, found: tuple[Owner, ...]) -> None:
-        """Select only one of what is selected; of one, what lies below it."""
-        chosen = context.selection.owners
-        if len(chosen) > 1:
-            context.select(Selection.of(next(each for each in found if each in chosen)))
-        elif len(found) > 1:
-            (one,) = chosen
-            context.select(Selection.of(found[(found.index(one) + 1) % len(found)]))
-
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         """Insert a vertex where the edge of something was clicked twice; elsewhere it is one more press."""
         owners = context.handled or owners_at(context.sketch, event.raw, 0.5 * event.reach)[:1]
         edge = edge_at(context.sketch, event.raw, NEAR * event.reach, owners)
@@ -424,7 +404,7 @@ class SelectTool(Tool):
             edge = edge_at(context.sketch, to, ON_EDGE, [edge.of]) or edge
         context.change(vertices.inserted(context.sketch, edge))
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         drag = self.drag
         if drag is None:
             super().enter(context, text)
@@ -433,7 +413,7 @@ class SelectTool(Tool):
         self.drag, self._gone, self.guides = None, True, ()
         drag.ended(context)
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         """Give up what is dragged; then select nothing."""
         had = bool(self.drag or context.selection)
         if self.drag is not None:
@@ -442,10 +422,10 @@ class SelectTool(Tool):
             context.select(Selection.of(*{vertex.of for vertex in context.selection.vertices}))
         return had
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         return self.drag.preview() if self.drag is not None else None
 
-    def shape_of_cursor(self, context: ToolContext) -> str:
+    def shape_of_cursor(self, context: Workspace) -> str:
         handle = self._handle if self.drag is not None else self.near
         if isinstance(self.drag, Moving):
             return "move"
@@ -465,5 +445,5 @@ class PanTool(Tool):
     snaps = False
     takes_numbers = False
 
-    def shape_of_cursor(self, context: ToolContext) -> str:
+    def shape_of_cursor(self, context: Workspace) -> str:
         return "move"

@@ -1,26 +1,89 @@
-"""The base of the editor's tools: what the mouse does on the map. Coordinates are metres."""
+"""The base of the tools, the workspace that they know, and handles of what is selected; all in metres."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Protocol
-
-import numpy as np
+from typing import Literal, TypeAlias
 
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
-from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Owner, Sketch
-from robocov_app.editor.tools.handles import Handle
-from robocov_app.editor.tools.snap_targets import Snapper
-from robocov_app.editor.tools.snapping import Guide, Snap, Snapping
+from robocov_app.editor.edits.transform import bounds_of, box_of
+from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.geometry import at_round_angle, distance
+from robocov_app.editor.model.selection import Change, Selection, Vertex, points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.editor.tools.snapping import SNAPS, Guide, Snap, Snapper, Snapping, snapped
+from robocov_app.render.surface_cache import Latest
 
-ANGLE = 15.0  # degrees: with Shift, lines are drawn at multiples of this
+Kind: TypeAlias = Literal["vertex", "scale", "turn"]
+
+BESIDE = 11.0  # pixels at scale 1 between what is selected and the box around it
+KNOB = 24.0  # pixels at scale 1 that the knob is above the box
+SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
+ROOMY = 34.0  # pixels at scale 1 that a side of the box has at least when there is a handle in its middle
+SMALL = 26.0
+"""Pixels at scale 1 of a thing below which its vertices are no handles: it could not be dragged itself."""
+
+MOST_VERTICES = 4000  # vertices that are shown at most: more could not be told apart
+
+
+@dataclass(frozen=True)
+class Handle:
+    """Something that can be taken hold of."""
+
+    kind: Kind  # ``vertex``, ``scale`` or ``turn``
+    at: Point  # m; where it is shown
+    vertex: Vertex | None = None
+    side: tuple[int, int] = (0, 0)  # (x, y); of a handle that scales: -1, 0 or 1 along each axis
+
+
+def handled(selection: Selection) -> tuple[Owner, ...]:
+    """Return whose vertices are shown: of the one thing that is selected, or of selected vertices."""
+    of_vertices = {vertex.of for vertex in selection.vertices}
+    owners = selection.owners
+    if of_vertices:
+        return tuple(sorted(of_vertices | owners, key=str))
+    return tuple(owners) if len(owners) == 1 else ()
+
+
+def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
+    """Return the box that is shown around whole things, m; `pixel` is how many metres one is at scale 1."""
+    bounds = None if selection.vertices else bounds_of(sketch, selection)
+    if bounds is None:
+        return None
+    far = BESIDE * pixel
+    return bounds[0] - far, bounds[1] - far, bounds[2] + far, bounds[3] + far
+
+
+def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
+    """Return all handles, those that are taken first last."""
+    found: list[Handle] = []
+    frame = frame_of(sketch, selection, pixel)
+    if frame is not None:
+        low_x, low_y, high_x, high_y = frame
+        xs = {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x}
+        ys = {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y}
+        columns = (-1, 0, 1) if high_x - low_x > ROOMY * pixel else (-1, 1)
+        rows = (-1, 0, 1) if high_y - low_y > ROOMY * pixel else (-1, 1)
+        sides = [(x, y) for x in columns for y in rows if x or y]
+        found += [Handle("scale", (xs[x], ys[y]), side=(x, y)) for x, y in sides]
+        found.append(Handle("turn", (xs[0], high_y + KNOB * pixel)))
+    for owner in handled(selection):
+        box = None if owner == BOUNDARY or selection.vertices else box_of(sketch, owner)
+        if box is None or max(box[2] - box[0], box[3] - box[1]) >= SMALL * pixel:
+            points = points_of(sketch, owner)
+            found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
+    return tuple(found)
+
+
+def handle_at(found: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
+    """Return the handle within `reach` metres of a point: the nearest, a vertex before others."""
+    near = [handle for handle in found if distance(handle.at, point) <= reach]
+    return min(near, key=lambda each: (each.kind != "vertex", distance(each.at, point)), default=None)
 
 
 @dataclass(frozen=True)
 class PointerEvent:
-    """Where the mouse points, and what is held down with it."""
+    """Pointer position, and the modifier keys held with it."""
 
     point: Point  # m; after snapping
     raw: Point  # m
@@ -32,7 +95,7 @@ class PointerEvent:
 
 @dataclass(frozen=True)
 class Preview:
-    """What a tool shows of what it is about to do."""
+    """Preview of a tool's next action."""
 
     line: tuple[Point, ...] = ()  # m, points; drawn as a line with a mark at each point
     closed: bool = False  # whether it goes back to its first point
@@ -47,39 +110,73 @@ class Preview:
     chosen: int | None = None  # which of these stands out
 
 
-class ToolContext(Protocol):
-    """What tools ask of the editor that they work in, and what they tell it."""
+class Workspace:
+    """The map that is open, what is selected of it, and what it snaps to: what tools know of the editor."""
 
-    grid: float
-    snap_angle: float
-    snaps: set[str]
-    snapper: Snapper
-    pixel: float
-    wall_width: float
-
-    @property
-    def sketch(self) -> Sketch: ...
-
-    @property
-    def selection(self) -> Selection: ...
-
-    @property
-    def handles(self) -> tuple[Handle, ...]: ...
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.version = 0  # grows whenever panel and sheet have to look again at what there is
+        self.snaps = set(SNAPS)
+        self.grid, self.snap_angle = 0.1, 15.0
+        self.wall_width = 0.1
+        self.pixel = 0.01  # m; what a pixel at scale 1 is on the sheet
+        self.snapper = Snapper()
+        self.message = ""  # what was said last, empty when it is old
+        self.trouble = False
+        self.now = 0.0
+        self.said = 0.0
+        self._handles: Latest[tuple[Handle, ...]] = Latest()
 
     @property
-    def handled(self) -> tuple[Owner, ...]: ...
+    def sketch(self) -> Sketch:
+        """The map as it is now."""
+        return self.document.history.sketch
 
-    def snapping(self, reach: float) -> Snapping: ...
+    @property
+    def selection(self) -> Selection:
+        """The current selection."""
+        return self.document.history.selection
 
-    def snapped(
-        self, raw: Point, reach: float, origin: Point | None = None, more: tuple[Point, ...] = ()
-    ) -> Snap: ...
+    @property
+    def handled(self) -> tuple[Owner, ...]:
+        """Owners whose vertices are shown."""
+        return handled(self.selection)
 
-    def change(self, change: Change) -> None: ...
+    @property
+    def handles(self) -> tuple[Handle, ...]:
+        """Handles of the selection."""
+        sketch, look = self.sketch, (self.selection, self.pixel)
+        return self._handles.of(sketch, look, lambda: handles(sketch, *look))
 
-    def select(self, selection: Selection) -> None: ...
+    def snapping(self, reach: float) -> Snapping:
+        """Return what to snap to, for a finger that is so many metres wide."""
+        kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name][1])
+        return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
 
-    def say(self, words: str) -> None: ...
+    def snapped(self, raw: Point, reach: float, origin: Point | None = None, more: Ring = ()) -> Snap:
+        """Return where a place means, whatever tool is chosen."""
+        targets = self.snapper.targets(self.sketch, (), more)
+        return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
+
+    def change(self, change: Change, *, drag: Hashable | None = None) -> None:
+        """Make a change, and tell what it was."""
+        if self.document.history.do(change, drag=drag):
+            self.say(change.words)
+        self._changed()
+
+    def _changed(self) -> None:
+        self.version += 1
+
+    def select(self, selection: Selection) -> None:
+        """Select something else."""
+        if selection != self.selection:
+            self.document.history.selection = selection
+            self.version += 1
+
+    def say(self, words: str, *, trouble: bool = False) -> None:
+        """Tell something for a while."""
+        if words:
+            self.message, self.trouble, self.said = words, trouble, self.now
 
 
 class Tool:
@@ -102,64 +199,50 @@ class Tool:
 
     @property
     def origin(self) -> Point | None:
-        """Where the line that is drawn comes from."""
+        """Origin of the line that is drawn."""
         return None
 
     @property
     def drawn(self) -> tuple[Point, ...]:
-        """What has been drawn so far, to snap to."""
+        """Points drawn so far, to snap to."""
         return ()
 
-    def press(self, context: ToolContext, event: PointerEvent) -> None:
+    def press(self, context: Workspace, event: PointerEvent) -> None:
         """Take a press of the left button."""
 
-    def twice(self, context: ToolContext, event: PointerEvent) -> None:
+    def twice(self, context: Workspace, event: PointerEvent) -> None:
         """Take the second press of a double click; by default it finishes."""
         self.finish(context)
 
-    def move(self, context: ToolContext, event: PointerEvent) -> None:
+    def move(self, context: Workspace, event: PointerEvent) -> None:
         """Take a move of the mouse, pressed or not."""
 
-    def release(self, context: ToolContext, event: PointerEvent, *, clicked: bool) -> None:
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Take the button's release; `clicked` if it has not moved since it was pressed."""
 
-    def finish(self, context: ToolContext) -> bool:
+    def finish(self, context: Workspace) -> bool:
         """Take Enter; return whether there was something to finish."""
         return False
 
-    def back(self, context: ToolContext) -> bool:
+    def back(self, context: Workspace) -> bool:
         """Take Backspace: the last point goes; return whether there was one."""
         return False
 
-    def cancel(self, context: ToolContext) -> bool:
+    def cancel(self, context: Workspace) -> bool:
         """Take Escape; return whether there was something to give up."""
         return False
 
-    def enter(self, context: ToolContext, text: str) -> None:
+    def enter(self, context: Workspace, text: str) -> None:
         """Take what was typed; MapError when it means nothing."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
-    def preview(self, context: ToolContext) -> Preview | None:
+    def preview(self, context: Workspace) -> Preview | None:
         """Return what to show."""
         return None
 
-    def shape_of_cursor(self, context: ToolContext) -> str:
+    def shape_of_cursor(self, context: Workspace) -> str:
         """Return what the cursor looks like over the map: arrow, cross, hand, move, ..."""
         return "cross"
-
-
-def at_round_angle(origin: Point, point: Point) -> Point:
-    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another.
-
-    >>> at_round_angle((0.0, 0.0), (3.0, 0.1))
-    (3.0, 0.0)
-    """
-    dx, dy = point[0] - origin[0], point[1] - origin[1]
-    step = np.radians(ANGLE)
-    angle = step * np.round(np.arctan2(dy, dx) / step)
-    along = dx * np.cos(angle) + dy * np.sin(angle)
-    x, y = origin[0] + along * np.cos(angle), origin[1] + along * np.sin(angle)
-    return round(float(x), 9) + 0.0, round(float(y), 9) + 0.0
 
 
 def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
@@ -167,45 +250,3 @@ def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
     if event.shift and origin is not None:
         return at_round_angle(origin, event.raw)
     return event.point
-
-
-def ring_area(points: Sequence[Point]) -> float:
-    """Return the area of a ring, m².
-
-    >>> ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
-    2.0
-    """
-    x, y = np.asarray(points).T
-    return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
-
-
-def bearing_words(a: Point, b: Point) -> str:
-    """Return length and direction from one point to another, in words.
-
-    >>> bearing_words((0.0, 0.0), (0.0, 2.4))
-    '2.40 m  ∠ 90°'
-    """
-    angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
-    shown = 0.0 if abs(angle) < 0.05 else angle
-    return f"{length_words(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
-
-
-def length_words(metres: float) -> str:
-    """Return a length as it stands beside the cursor.
-
-    >>> length_words(0.0234), length_words(12.3456), length_words(1234.5)
-    ('2.3 cm', '12.35 m', '1234.5 m')
-    """
-    if metres < 0.1:
-        return f"{100 * metres:.1f} cm"
-    return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"
-
-
-def place_words(point: Point) -> str:
-    """Return a place in words.
-
-    >>> place_words((1.0, -0.001))
-    '(1.00, 0.00) m'
-    """
-    x, y = (round(value, 2) + 0.0 for value in point)
-    return f"({x:.2f}, {y:.2f}) m"

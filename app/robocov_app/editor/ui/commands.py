@@ -2,30 +2,22 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
-from robocov_app.editor.edits import (
-    boolean,
-    create,
-    density,
-    fixes,
-    motion_path,
-    properties,
-    simplify,
-    transform,
-    vertices,
-)
+from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
+from robocov_app.editor.edits.create import anywhere_added
+from robocov_app.editor.edits.fixes import fixed, unreachable_filled
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.coordinates import angle_of, length_of, point_of, size_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner
 from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.draw import MeasureTool
-from robocov_app.editor.ui.editor import Editor
-from robocov_app.editor.ui.settings import SHOWN, SNAPS
+from robocov_app.editor.tools.snapping import SNAPS
+from robocov_app.editor.ui.editor import SHOWN, Editor
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Takes
 
@@ -40,15 +32,6 @@ Edit = Callable[..., Change]
 Run = Callable[[Editor], object]
 RunWith = Callable[[Editor, str], object]
 _Number = TypeVar("_Number", int, float)
-
-
-class Row(NamedTuple):
-    """A command of a group: keys separated by commas; `run` is None where the window does it."""
-
-    name: str
-    title: str
-    keys: str = ""
-    run: Run | None = None
 
 
 # what commands do
@@ -66,14 +49,10 @@ def edited(edit: Edit, *rest: object) -> Run:
     return lambda editor: editor.change(edit(editor.sketch, selected(editor), *rest))
 
 
-def aligned(side: transform.Side) -> Run:
-    """Return what aligns the selected vertices, or else the selected things."""
-
-    def run(editor: Editor) -> None:
-        selection = editor.selection if editor.selection.vertices else selected(editor)
-        editor.change(transform.aligned(editor.sketch, selection, side))
-
-    return run
+def align(editor: Editor, side: transform.Side) -> None:
+    """Align the selected vertices, or else the selected things."""
+    selection = editor.selection if editor.selection.vertices else selected(editor)
+    editor.change(transform.aligned(editor.sketch, selection, side))
 
 
 def of_map(edit: Edit, *rest: object) -> Run:
@@ -96,7 +75,7 @@ def play(editor: Editor) -> str:
     if editor.moves_since is not None:
         editor.moves_since = None
         return "obstacles stand as they are at time zero"
-    if not motion_path.moving(editor.sketch):
+    if not paths.moving(editor.sketch):
         raise MapError("no obstacle moves: the tool Path gives one a path")
     editor.moves_since = editor.now
     return "obstacles move as they will; L ends it"
@@ -200,7 +179,7 @@ def one_vertex(editor: Editor) -> Vertex:
     return vertex
 
 
-def corners(editor: Editor, edit: Edit, length: float | None = None) -> None:
+def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
     """Cut the selected corners off, or round them, by twice the grid unless a length is given, m."""
     if not editor.selection.vertices:
         raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
@@ -267,7 +246,7 @@ def make_areas(editor: Editor) -> None:
 def fix_problem(editor: Editor) -> None:
     """Mend the problem that is shown, or the first that can be."""
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
-        change = fixes.fixed(editor.sketch, problem, editor.radius)
+        change = fixed(editor.sketch, problem, editor.radius)
         if change is not None:
             editor.change(change)
             return
@@ -305,17 +284,12 @@ def _set_angle(editor: Editor, text: str) -> None:
     editor.say(f"angles snap to multiples of {angle:g}°")
 
 
-def _set_seed(editor: Editor, text: str) -> None:
-    editor.seed = max(_number("seed", text, int), 0)
-
-
 def _set_length(name: str) -> RunWith:
     """Return what takes a length for the editor, which may be told by how it is now."""
     return lambda editor, text: editor.set_length(name, length_of(text, now=getattr(editor, name)))
 
 
 def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
-    """Return what makes an edit of the selected things to a typed value."""
     return lambda editor, text: editor.change(edit(editor.sketch, selected(editor), read(text)))
 
 
@@ -354,7 +328,6 @@ def _name(editor: Editor, text: str) -> None:
 
 
 def _signed(text: str) -> float:
-    """Return a length that may be negative, m."""
     sign = -1.0 if text.strip().startswith("-") else 1.0
     return sign * length_of(text.strip().lstrip("+-"))
 
@@ -391,155 +364,142 @@ _REPEATED = (
     *("pan:left", "pan:right", "pan:up", "pan:down"),
 )
 
-_ROWS: dict[str, tuple[Row, ...]] = {
+# keys are separated by commas; what the window does has no function here
+_ROWS: dict[str, tuple[tuple[str, str, str, Run | None], ...]] = {
     "File": (
-        Row("new", "New map", "ctrl+n"),
-        Row("open", "Open a map", "ctrl+o"),
-        Row("recent", "Open a recent or bundled map", "ctrl+shift+o"),
-        Row("save", "Save", "ctrl+s"),
-        Row("save:as", "Save as", "ctrl+shift+s"),
-        Row("export", "Export to another format", "ctrl+e"),
-        Row("background", "Picture under the map", "ctrl+b"),
-        Row("background:none", "Take the picture under the map away", "", of_map(properties.underlaid, None)),
-        Row("reload", "Read the file again", "ctrl+r"),
-        Row("try", "Try it in the demo, and back", "f5"),
-        Row("screenshot", "Screenshot", "f12"),
-        Row("quit", "Quit", "ctrl+q"),
+        ("new", "New map", "ctrl+n", None),
+        ("open", "Open a map", "ctrl+o", None),
+        ("recent", "Open a recent or bundled map", "ctrl+shift+o", None),
+        ("save", "Save", "ctrl+s", None),
+        ("save:as", "Save as", "ctrl+shift+s", None),
+        ("export", "Export to another format", "ctrl+e", None),
+        ("background", "Picture under the map", "ctrl+b", None),
+        ("background:none", "Take the picture under the map away", "", of_map(properties.underlaid, None)),
+        ("reload", "Read the file again", "ctrl+r", None),
+        ("try", "Try it in the demo, and back", "f5", None),
+        ("screenshot", "Screenshot", "f12", None),
+        ("quit", "Quit", "ctrl+q", None),
     ),
     "Edit": (
-        Row("undo", "Undo", "ctrl+z", Editor.undo),
-        Row("redo", "Redo", "ctrl+y, ctrl+shift+z", Editor.redo),
-        Row("cut", "Cut", "ctrl+x", cut),
-        Row("copy", "Copy", "ctrl+c", copy),
-        Row("paste", "Paste at the cursor", "ctrl+v", lambda editor: paste(editor, editor.cursor)),
-        Row("paste:there", "Paste in the same place", "ctrl+shift+v", lambda editor: paste(editor, None)),
-        Row("duplicate", "Duplicate", "ctrl+d", duplicate),
-        Row("delete", "Delete", "delete, x", delete),
-        Row("select:all", "Select all", "ctrl+a", lambda editor: editor.select(Selection.all(editor.sketch))),
-        Row("select:next", "Select the next obstacle", "tab", partial(select_next, by=1)),
-        Row("select:previous", "Select the previous obstacle", "shift+tab", partial(select_next, by=-1)),
-        Row("name", "Name what is selected", "f2"),
-        Row("left", "Nudge by the grid (all arrows)", "left", nudge(-1, 0)),
-        Row("right", "", "right", nudge(1, 0)),
-        Row("up", "", "up", nudge(0, 1)),
-        Row("down", "", "down", nudge(0, -1)),
-        Row("left:far", "Nudge ten times as far (all arrows)", "shift+left", nudge(-FAR, 0)),
-        Row("right:far", "", "shift+right", nudge(FAR, 0)),
-        Row("up:far", "", "shift+up", nudge(0, FAR)),
-        Row("down:far", "", "shift+down", nudge(0, -FAR)),
-        Row(
-            "finish", "Finish what is being drawn", "return, enter", lambda editor: editor.tool.finish(editor)
-        ),
-        Row("back", "Take the last point back, or delete", "backspace", back),
-        Row("cancel", "Give up; select nothing; close", "escape", cancel),
-        Row("menu", "What can be done here (right click)", "menu, shift+f10"),
+        ("undo", "Undo", "ctrl+z", Editor.undo),
+        ("redo", "Redo", "ctrl+y, ctrl+shift+z", Editor.redo),
+        ("cut", "Cut", "ctrl+x", cut),
+        ("copy", "Copy", "ctrl+c", copy),
+        ("paste", "Paste at the cursor", "ctrl+v", lambda editor: paste(editor, editor.cursor)),
+        ("paste:there", "Paste in the same place", "ctrl+shift+v", lambda editor: paste(editor, None)),
+        ("duplicate", "Duplicate", "ctrl+d", duplicate),
+        ("delete", "Delete", "delete, x", delete),
+        ("select:all", "Select all", "ctrl+a", lambda editor: editor.select(Selection.all(editor.sketch))),
+        ("select:next", "Select the next obstacle", "tab", partial(select_next, by=1)),
+        ("select:previous", "Select the previous obstacle", "shift+tab", partial(select_next, by=-1)),
+        ("name", "Name what is selected", "f2", None),
+        ("left", "Nudge by the grid (all arrows)", "left", nudge(-1, 0)),
+        ("right", "", "right", nudge(1, 0)),
+        ("up", "", "up", nudge(0, 1)),
+        ("down", "", "down", nudge(0, -1)),
+        ("left:far", "Nudge ten times as far (all arrows)", "shift+left", nudge(-FAR, 0)),
+        ("right:far", "", "shift+right", nudge(FAR, 0)),
+        ("up:far", "", "shift+up", nudge(0, FAR)),
+        ("down:far", "", "shift+down", nudge(0, -FAR)),
+        ("finish", "Finish what is being drawn", "return, enter", lambda editor: editor.tool.finish(editor)),
+        ("back", "Take the last point back, or delete", "backspace", back),
+        ("cancel", "Give up; select nothing; close", "escape", cancel),
+        ("menu", "What can be done here (right click)", "menu, shift+f10", None),
     ),
     "Arrange": (
-        Row("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0)),
-        Row("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0)),
-        Row("level", "Level: turn the map so that the measured line is level or upright", "", level),
-        Row("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
-        Row("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
-        Row("align:left", "Align left sides", "alt+left", aligned("left")),
-        Row("align:right", "Align right sides", "alt+right", aligned("right")),
-        Row("align:top", "Align tops", "alt+up", aligned("top")),
-        Row("align:bottom", "Align bottoms", "alt+down", aligned("bottom")),
-        Row("align:centre", "Align middles across", "alt+c", aligned("centre")),
-        Row("align:middle", "Align middles in height", "alt+m", aligned("middle")),
-        Row("distribute:x", "Equal gaps across", "alt+x", edited(transform.distributed, "x")),
-        Row("distribute:y", "Equal gaps in height", "alt+y", edited(transform.distributed, "y")),
-        Row("raise", "To the top", "page up", edited(properties.raised, "top")),
-        Row("lower", "To the bottom", "page down", edited(properties.raised, "bottom")),
-        Row("group", "Group: a click selects all of it", "ctrl+g", edited(properties.grouped)),
-        Row("ungroup", "Take out of its group", "ctrl+shift+g", edited(properties.ungrouped)),
-        Row("lock", "Lock: the mouse takes it no more", "ctrl+l", edited(properties.locked)),
-        Row("hide", "Hide in the editor", "ctrl+h", edited(properties.hidden)),
-        Row("release", "Unlock and show all", "ctrl+shift+l", of_map(properties.released)),
+        ("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0)),
+        ("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0)),
+        ("level", "Level: turn the map so that the measured line is level or upright", "", level),
+        ("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
+        ("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
+        ("align:left", "Align left sides", "alt+left", partial(align, side="left")),
+        ("align:right", "Align right sides", "alt+right", partial(align, side="right")),
+        ("align:top", "Align tops", "alt+up", partial(align, side="top")),
+        ("align:bottom", "Align bottoms", "alt+down", partial(align, side="bottom")),
+        ("align:centre", "Align middles across", "alt+c", partial(align, side="centre")),
+        ("align:middle", "Align middles in height", "alt+m", partial(align, side="middle")),
+        ("distribute:x", "Equal gaps across", "alt+x", edited(transform.distributed, "x")),
+        ("distribute:y", "Equal gaps in height", "alt+y", edited(transform.distributed, "y")),
+        ("raise", "To the top", "page up", edited(properties.raised, "top")),
+        ("lower", "To the bottom", "page down", edited(properties.raised, "bottom")),
+        ("group", "Group: a click selects all of it", "ctrl+g", edited(properties.grouped)),
+        ("ungroup", "Take out of its group", "ctrl+shift+g", edited(properties.ungrouped)),
+        ("lock", "Lock: the mouse takes it no more", "ctrl+l", edited(properties.locked)),
+        ("hide", "Hide in the editor", "ctrl+h", edited(properties.hidden)),
+        ("release", "Unlock and show all", "ctrl+shift+l", of_map(properties.released)),
     ),
     "Combine": (
-        Row("unite", "Unite", "alt+u", edited(boolean.united)),
-        Row("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
-        Row("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
-        Row("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
-        Row(
+        ("unite", "Unite", "alt+u", edited(boolean.united)),
+        ("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
+        ("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
+        ("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
+        (
             "clip",
             "Cut off outside the boundary",
             "alt+b",
             lambda editor: editor.change(boolean.clipped(editor.sketch, editor.selection.without_vertices())),
         ),
-        Row("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
-        Row("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
-        Row("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
-        Row("repair", "Repair crossing outlines", "alt+r", edited(boolean.repaired)),
-        Row("density:area", "Make it an area that counts more", "", make_areas),
-        Row(
+        ("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
+        ("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
+        ("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
+        ("repair", "Repair crossing outlines", "alt+r", edited(boolean.repaired)),
+        ("density:area", "Make it an area that counts more", "", make_areas),
+        (
             "fill:unreachable",
             "Fill all that robots cannot reach",
             "",
-            lambda editor: editor.change(fixes.unreachable_filled(editor.sketch, editor.radius)),
+            lambda editor: editor.change(unreachable_filled(editor.sketch, editor.radius)),
         ),
     ),
     "Vertices": (
-        Row("bevel", "Cut corners off", "shift+b", lambda editor: corners(editor, vertices.bevelled)),
-        Row("round", "Round corners", "shift+r", lambda editor: corners(editor, vertices.rounded_off)),
-        Row(
+        ("bevel", "Cut corners off", "shift+b", lambda editor: trim(editor, vertices.bevelled)),
+        ("round", "Round corners", "shift+r", lambda editor: trim(editor, vertices.rounded_off)),
+        (
             "split",
             "Cut a wall in two here",
             "shift+c",
             lambda editor: editor.change(vertices.split(editor.sketch, one_vertex(editor))),
         ),
-        Row("extend", "Go on with the wall from here", "shift+w", extend),
-        Row("fill", "Fill the hole", "shift+f", fill),
-        Row("simplify", "Leave needless vertices out", "shift+p", edited(simplify.simplified, TOLERANCE)),
-        Row("straighten", "Make edges straight that nearly are", "shift+l", edited(simplify.straightened)),
-        Row(
-            "path:repeat",
-            "Obstacle goes in a loop, or back and forth",
-            "shift+o",
-            edited(motion_path.path_turned),
-        ),
-        Row("path:none", "Take an obstacle's path away", "alt+o", edited(motion_path.path_removed)),
-        Row("wider", "Wider walls", "]", lambda editor: widen(editor, WIDER)),
-        Row("narrower", "Narrower walls", "[", lambda editor: widen(editor, 1.0 / WIDER)),
+        ("extend", "Go on with the wall from here", "shift+w", extend),
+        ("fill", "Fill the hole", "shift+f", fill),
+        ("simplify", "Leave needless vertices out", "shift+p", edited(vertices.simplified, TOLERANCE)),
+        ("straighten", "Make edges straight that nearly are", "shift+l", edited(vertices.straightened)),
+        ("path:repeat", "Obstacle goes in a loop, or back and forth", "shift+o", edited(paths.path_turned)),
+        ("path:none", "Take an obstacle's path away", "alt+o", edited(paths.path_removed)),
+        ("wider", "Wider walls", "]", lambda editor: widen(editor, WIDER)),
+        ("narrower", "Narrower walls", "[", lambda editor: widen(editor, 1.0 / WIDER)),
     ),
     "Snap": (
-        Row("grid:finer", "Finer grid", "-", lambda editor: editor.change_grid(-1)),
-        Row("grid:coarser", "Coarser grid", "=, +", lambda editor: editor.change_grid(1)),
-        Row(
-            "snap:all", "Snap to everything, or to nothing", "0", lambda editor: editor.switch("snap", "all")
-        ),
+        ("grid:finer", "Finer grid", "-", lambda editor: editor.change_grid(-1)),
+        ("grid:coarser", "Coarser grid", "=, +", lambda editor: editor.change_grid(1)),
+        ("snap:all", "Snap to everything, or to nothing", "0", lambda editor: editor.switch("snap", "all")),
     ),
     "View": (
-        Row("fit", "Show the whole map", "f"),
-        Row("fit:selection", "Show what is selected", "z"),
-        Row("zoom:in", "Zoom in", "ctrl+=, ctrl++"),
-        Row("zoom:out", "Zoom out", "ctrl+-"),
-        Row("pan:left", "Pan (all arrows)", "ctrl+left"),
-        Row("pan:right", "", "ctrl+right"),
-        Row("pan:up", "", "ctrl+up"),
-        Row("pan:down", "", "ctrl+down"),
-        Row("pan:hold", "Pan while it is held down", "space"),
-        Row("theme", "Light or dark", "t"),
-        Row("panel", "Hide or show the panel", "h"),
-        Row("tab", "Next page of the panel", "ctrl+tab"),
-        Row("fullscreen", "Full screen", "f11"),
-        Row("path:play", "Let obstacles move, or stand again", "l", play),
-        Row("problem:next", "Go to the next problem", "f8, n", next_problem),
-        Row("problem:fix", "Mend the problem that is shown", "shift+f8", fix_problem),
+        ("fit", "Show the whole map", "f", None),
+        ("fit:selection", "Show what is selected", "z", None),
+        ("zoom:in", "Zoom in", "ctrl+=, ctrl++", None),
+        ("zoom:out", "Zoom out", "ctrl+-", None),
+        ("pan:left", "Pan (all arrows)", "ctrl+left", None),
+        ("pan:right", "", "ctrl+right", None),
+        ("pan:up", "", "ctrl+up", None),
+        ("pan:down", "", "ctrl+down", None),
+        ("pan:hold", "Pan while it is held down", "space", None),
+        ("theme", "Light or dark", "t", None),
+        ("panel", "Hide or show the panel", "h", None),
+        ("tab", "Next page of the panel", "ctrl+tab", None),
+        ("fullscreen", "Full screen", "f11", None),
+        ("path:play", "Let obstacles move, or stand again", "l", play),
+        ("problem:next", "Go to the next problem", "f8, n", next_problem),
+        ("problem:fix", "Mend the problem that is shown", "shift+f8", fix_problem),
     ),
     "Robots": (
-        Row(
-            "start:uniform",
-            "A start anywhere in the free space",
-            "shift+u",
-            of_map(create.uniform_start_added),
-        ),
-        Row("start:next", "Next start of the map", "shift+n", next_start),
-        Row("start:default", "Make it the default start", "shift+d", make_default),
-        Row("more", "One robot more", "shift+=, shift++", lambda editor: editor.add_robots(1)),
-        Row("fewer", "One robot fewer", "shift+-", lambda editor: editor.add_robots(-1)),
+        ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(anywhere_added)),
+        ("start:next", "Next start of the map", "shift+n", next_start),
+        ("start:default", "Make it the default start", "shift+d", make_default),
+        ("more", "One robot more", "shift+=, shift++", lambda editor: editor.add_robots(1)),
+        ("fewer", "One robot fewer", "shift+-", lambda editor: editor.add_robots(-1)),
     ),
-    "Help": (Row("help", "Keys", "f1, shift+/"), Row("palette", "Commands by name", "ctrl+k, /")),
+    "Help": (("help", "Keys", "f1, shift+/", None), ("palette", "Commands by name", "ctrl+k, /", None)),
 }
 
 
@@ -569,7 +529,10 @@ TYPED: dict[str, tuple[str, RunWith]] = {
     "angle": ("15: lines snap to multiples of it", _set_angle),
     "radius": ("0.2: of a robot", _set_length("radius")),
     "robots": ("8: of the team", lambda editor, text: editor.set_robots(_number("robots", text, int))),
-    "seed": ("3: of the team's places", _set_seed),
+    "seed": (
+        "3: of the team's places",
+        lambda editor, text: setattr(editor, "seed", max(_number("seed", text, int), 0)),
+    ),
     "wall": ("0.1: width of walls that are drawn", _set_length("wall_width")),
     "move": ("1 0.5: what is selected", _move),
     "place": ("2 3: lower left corner", _place),
@@ -578,32 +541,23 @@ TYPED: dict[str, tuple[str, RunWith]] = {
     "size": ("3 x 2: width and height", _size),
     "width": ("0.2: of walls", _edit_to(properties.widened, length_of)),
     "circle": ("0.5: radius of circles", _edit_to(properties.sized, length_of)),
-    "bevel": (
-        "0.3: cut corners off",
-        lambda editor, text: corners(editor, vertices.bevelled, length_of(text)),
-    ),
-    "round": (
-        "0.3: round corners",
-        lambda editor, text: corners(editor, vertices.rounded_off, length_of(text)),
-    ),
-    "simplify": ("0.05: leave vertices out, to a tolerance", _edit_to(simplify.simplified, length_of)),
+    "bevel": ("0.3: cut corners off", lambda editor, text: trim(editor, vertices.bevelled, length_of(text))),
+    "round": ("0.3: round corners", lambda editor, text: trim(editor, vertices.rounded_off, length_of(text))),
+    "simplify": ("0.05: leave vertices out, to a tolerance", _edit_to(vertices.simplified, length_of)),
     "floor": (
         "0.1: density away from hot spots",
         lambda editor, text: editor.change(density.floor_set(editor.sketch, _number("floor", text, float))),
     ),
     "weight": ("2: of a hot spot", lambda editor, text: editor.tools["density"].enter(editor, text)),
     "density": ("none: takes it away", _set_density),
-    "speed": ("0.5: along a path, m/s", _edit_to(motion_path.path_paced, motion_path.speed_of)),
+    "speed": ("0.5: along a path, m/s", _edit_to(paths.path_paced, paths.speed_of)),
     "offset": ("0.2: grow, or shrink with -", _edit_to(boolean.offset, _signed)),
     "array": ("3 x 2 1.5 1.5: columns, rows, distances", _array),
     "name": ("pillar: of what is selected", _name),
     "note": ("words: on what is selected", _edit_to(properties.noted, str)),
-    "title": (
-        "Hall: of the map",
-        lambda editor, text: editor.change(properties.titled(editor.sketch, name=text)),
-    ),
+    "title": ("Hall: of the map", lambda editor, text: editor.change(properties.titled(editor.sketch, text))),
 }
-"""What can be typed with a value after it: an example of one with what it is, and what it does."""
+"""Commands that are typed with a value: an example of one with its meaning, and the action."""
 
 
 def typed_commands(editor: Editor) -> list[Command]:

@@ -1,8 +1,11 @@
-"""The editor: what is open, selected and shown, and how every change is made. Knows no pygame."""
+"""The editor: what is open, selected, shown and remembered, and how every change is made. No pygame."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.environment import Point
 from robocov.errors import MapError, RobocovError
@@ -11,68 +14,85 @@ from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import Owner, Sketch
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, in_words
-from robocov_app.editor.tools.handles import Handle, handled, handles
-from robocov_app.editor.tools.select import SelectTool
-from robocov_app.editor.tools.snap_targets import Snapper, vertex_count
-from robocov_app.editor.tools.snapping import Snap, Snapping, snapped
-from robocov_app.editor.tools.tool import Tool
-from robocov_app.editor.tools.toolbox import toolbox
-from robocov_app.editor.ui.settings import SHOWN, SNAPS
-from robocov_app.toolkit.cache import Latest
+from robocov_app.editor.tools import draw
+from robocov_app.editor.tools.density import DensityTool
+from robocov_app.editor.tools.motion_path import MotionPathTool
+from robocov_app.editor.tools.reference_image import ReferenceImageTool
+from robocov_app.editor.tools.select import PanTool, SelectTool
+from robocov_app.editor.tools.snapping import SNAPS, vertex_count
+from robocov_app.editor.tools.tool import Tool, Workspace
 from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
 from robocov_app.toolkit.worker import Worker
 
+FILE = "editor.json"
+
+SHOWN = {"grid": "Grid", "names": "Names", "impassable": "Too narrow", "problems": "Problems"}
+SHOWN |= {"robots": "Robots at start", "picture": "Picture", "legend": "Legend", "handles": "Handles"}
+"""Layers that can be shown or hidden, with their titles."""
+
+# settings that are as an attribute of the editor, with its name
+KEPT = {"grid": "grid", "angle": "snap_angle", "radius": "radius", "robots": "robots", "wall": "wall_width"}
+
+MOST_RECENT = 10
+
+
+class EditorSettings(BaseModel):
+    """Appearance and snapping of the editor, and its recent maps."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    theme: Literal["light", "dark"] = "light"
+    scale: float | None = Field(default=None, ge=0.5, le=4.0)
+    width: int = Field(default=1280, ge=900, le=7680)
+    height: int = Field(default=720, ge=600, le=4320)
+    tab: str = "map"
+    grid: float = Field(default=0.1, ge=0.001, le=100.0)
+    angle: float = Field(default=15.0, gt=0.0, le=90.0)
+    snaps: tuple[str, ...] = tuple(SNAPS)
+    shown: tuple[str, ...] = tuple(name for name in SHOWN if name != "robots")
+    radius: float = Field(default=DEFAULT_RADIUS, ge=0.001, le=10.0)
+    robots: int = Field(default=6, ge=1, le=1000)
+    wall: float = Field(default=0.1, ge=0.001, le=100.0)
+    recent: tuple[str, ...] = ()
+
+
+TOOLS: tuple[type[Tool], ...] = (
+    *(SelectTool, PanTool, draw.PolygonTool, draw.RectangleTool, draw.CircleTool, draw.WallTool),
+    *(draw.DoorTool, draw.BoundaryTool, draw.MeasureTool, draw.DiscTool, draw.PlacesTool),
+    *(DensityTool, MotionPathTool, ReferenceImageTool),
+)
+"""All tools, in the order in which they are shown."""
+
 SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong
-SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
 FEW = 1500  # vertices up to which a map is measured while something is dragged
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spacings to choose from
 
 
-class Editor:
-    """What the user does, and what of it is shown."""
+class Editor(Workspace):
+    """Editor state and the user's actions on it."""
 
     def __init__(self, document: Document, readings: Worker[Measurement], folder: Path) -> None:
-        self.document, self.readings, self.folder = document, readings, folder
-        self.tools = toolbox()
+        super().__init__(document)
+        self.readings, self.folder = readings, folder
+        self.tools: dict[str, Tool] = {kind.name: kind() for kind in TOOLS}
         self.tool: Tool = self.tools["select"]
-        self.version = 0  # grows whenever panel and sheet have to look again at what there is
         self.theme = "light"
         self.panel = True
         self.shown = {name for name in SHOWN if name != "robots"}
-        self.snaps = set(SNAPS)
-        self.grid, self.snap_angle = 0.1, 15.0
-        self.wall_width = 0.1
         self.radius, self.robots, self.seed = DEFAULT_RADIUS, 6, 0
         self.start: str | None = None
         self.recent: list[str] = []
         self.measurement: Measurement | None = None
         self.problem: Problem | None = None  # the one that is shown with its words
         self.dialogs = Dialogs()  # with what waits for an answer
-        self.message = ""  # what was said last, empty when it is old
-        self.trouble = False
-        self.pixel = 0.01  # m; what a pixel at scale 1 is on the sheet
         self.cursor: Point | None = None  # where the mouse is, m
         self.typed = ""
-        self.now = 0.0
         self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
-        self._said = 0.0
-        self.snapper = Snapper()
-        self._handles: Latest[tuple[Handle, ...]] = Latest()
         self._about: tuple[object, float] | None = None
 
     # what there is
-
-    @property
-    def sketch(self) -> Sketch:
-        """The map as it is now."""
-        return self.document.history.sketch
-
-    @property
-    def selection(self) -> Selection:
-        """What is selected."""
-        return self.document.history.selection
 
     @property
     def selector(self) -> SelectTool:
@@ -81,7 +101,7 @@ class Editor:
 
     @property
     def pending(self) -> Change | None:
-        """What letting go of the mouse would make."""
+        """Change that letting go of the mouse would make."""
         drag = self.selector.drag
         return drag.change if drag is not None else None
 
@@ -92,19 +112,8 @@ class Editor:
         return (self.sketch, self.selection) if pending is None else (pending.sketch, pending.selection)
 
     @property
-    def handled(self) -> tuple[Owner, ...]:
-        """Whose vertices are shown."""
-        return handled(self.selection)
-
-    @property
-    def handles(self) -> tuple[Handle, ...]:
-        """What of the selection can be taken hold of."""
-        sketch, look = self.sketch, (self.selection, self.pixel)
-        return self._handles.of(sketch, look, lambda: handles(sketch, *look))
-
-    @property
     def problems(self) -> tuple[Problem, ...]:
-        """What is wrong, as far as is known."""
+        """Problems found so far."""
         return self.measurement.problems if self.measurement is not None else ()
 
     @property
@@ -119,37 +128,10 @@ class Editor:
         wanted = (*sorted(self.selection.starts), self.start, *names)
         return next((name for name in wanted if name in names), None)
 
-    # snapping
-
-    def snapping(self, reach: float) -> Snapping:
-        """Return what to snap to, for a finger that is so many metres wide."""
-        kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name][1])
-        return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
-
-    def snap(self, raw: Point, reach: float) -> Snap:
-        """Return where a place means for the tool that is chosen."""
-        tool = self.tool
-        if not tool.snaps or not self.snaps:
-            return Snap(raw)
-        return self.snapped(raw, reach, tool.origin, tool.drawn)
-
-    def snapped(
-        self, raw: Point, reach: float, origin: Point | None = None, more: tuple[Point, ...] = ()
-    ) -> Snap:
-        """Return where a place means, whatever tool is chosen."""
-        targets = self.snapper.targets(self.sketch, (), more)
-        return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
-
     # changing
 
-    def change(self, change: Change, *, drag: Hashable | None = None) -> None:
-        """Make a change, and tell what it was."""
-        if self.document.history.do(change, drag=drag):
-            self.say(change.words)
-        self._changed()
-
     def _changed(self) -> None:
-        self.version += 1
+        super()._changed()
         self.problem = None
         self.document.keep()
         self.ask_readings()
@@ -163,12 +145,6 @@ class Editor:
         if about is None or about[0] is not sketch or about[1] != self.radius:
             self._about = sketch, self.radius
             self.readings.put(self._about)
-
-    def select(self, selection: Selection) -> None:
-        """Select something else."""
-        if selection != self.selection:
-            self.document.history.selection = selection
-            self.version += 1
 
     def undo(self) -> None:
         """Take the newest change back."""
@@ -208,11 +184,6 @@ class Editor:
 
     # messages
 
-    def say(self, words: str, *, trouble: bool = False) -> None:
-        """Tell something for a while."""
-        if words:
-            self.message, self.trouble, self._said = words, trouble, self.now
-
     def attempt(self, action: Callable[[], object]) -> None:
         """Do something; what cannot be done is told, in a sentence."""
         try:
@@ -243,7 +214,7 @@ class Editor:
     def pass_time(self, seconds: float) -> None:
         """Let the clock go on: old messages go, answers come."""
         self.now += seconds
-        if self.message and self.now - self._said > (TROUBLE_FOR if self.trouble else SAID_FOR):
+        if self.message and self.now - self.said > (TROUBLE_FOR if self.trouble else SAID_FOR):
             self.message = ""
         answer = self.readings.poll()
         if answer is not None:

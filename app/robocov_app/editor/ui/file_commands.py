@@ -4,35 +4,34 @@ import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
 from robocov_app.editor.edits.properties import underlaid
-from robocov_app.editor.model.autosave import Autosave, opened_elsewhere
 from robocov_app.editor.model.background import picture_laid
-from robocov_app.editor.model.document import SUFFIX, Document
-from robocov_app.editor.model.file import ChangedError
+from robocov_app.editor.model.document import SUFFIX, Autosave, ChangedError, Document, opened_elsewhere
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.editor import MOST_RECENT, Editor
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.importing import Imported, Importing
-from robocov_app.editor.ui.settings import MOST_RECENT
 from robocov_app.formats import EXPORTERS, IMPORTERS, Importer, detect, export_map
 from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
+Act: TypeAlias = Callable[[], object]
+
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
 
+_OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
 
 class FileCommands:
-    """What can be done with whole documents."""
+    """Commands on whole documents."""
 
-    def __init__(
-        self, editor: Editor, drafts: Path | None, fit: Callable[[], object], *, patient: bool = False
-    ) -> None:
+    def __init__(self, editor: Editor, drafts: Path | None, fit: Act, *, patient: bool = False) -> None:
         self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
         self.leaving = False
 
@@ -41,11 +40,11 @@ class FileCommands:
         if isinstance(self.editor.asked, ImportDialog):
             self.editor.dialogs.close()
 
-    def commands(self) -> dict[str, Callable[[], object]]:
+    def commands(self) -> dict[str, Act]:
         """Return what the commands do, by their names."""
         return {
             "new": lambda: self.leave(self.new),
-            "open": self.ask_file,
+            "open": lambda: self._ask_path("Open a map", self.open, _OPENED),
             "recent": self.ask_recent,
             "save": self.save,
             "save:as": self.ask_name,
@@ -57,7 +56,7 @@ class FileCommands:
 
     # leaving what is open
 
-    def leave(self, then: Callable[[], object]) -> None:
+    def leave(self, then: Act) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
         document = self.editor.document
 
@@ -86,11 +85,6 @@ class FileCommands:
         """Put an empty sheet in the editor."""
         self._put(Document.new(self.drafts))
         return "a new map: 10 x 10 m; B draws another boundary"
-
-    def ask_file(self) -> None:
-        """Ask which file to open."""
-        foreign = [suffix for importer in IMPORTERS.values() for suffix in importer.suffixes]
-        self._ask_path("Open a map", self.open, [SUFFIX, *foreign])
 
     def _ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
@@ -152,23 +146,21 @@ class FileCommands:
 
     # saving
 
-    def save(self, then: Callable[[], object] | None = None) -> str | None:
+    def save(self, then: Act | None = None) -> str | None:
         """Save to the document's file; ask for one if it has none."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
-    def ask_name(self, then: Callable[[], object] | None = None) -> None:
+    def ask_name(self, then: Act | None = None) -> None:
         """Ask where to save."""
         folder = self.editor.folder
         suggested = self.editor.document.suggested(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
         self._ask_path("Save as", lambda path: self._save(path, then), [SUFFIX], text)
 
-    def _save(
-        self, path: Path, then: Callable[[], object] | None, *, over: bool = False, spoil: bool = False
-    ) -> str | None:
+    def _save(self, path: Path, then: Act | None, *, over: bool = False, spoil: bool = False) -> str | None:
         editor = self.editor
         if not (over or spoil) and editor.document.spoils(path):
             words = f"{path.name} holds a valid map; this one cannot run yet."
@@ -189,9 +181,7 @@ class FileCommands:
             then()
         return words
 
-    def _ask_over(
-        self, title: str, words: str, then: Callable[[], object] | None, go_on: Callable[[], object]
-    ) -> None:
+    def _ask_over(self, title: str, words: str, then: Act | None, go_on: Act) -> None:
         answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
         self.editor.ask(title, words, *answers)
 

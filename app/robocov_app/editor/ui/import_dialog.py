@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 import pygame
 import shapely
+from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
 from robocov_app.editor.ui.importing import Continuation, Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
-from robocov_app.formats.foreign import square_metres
+from robocov_app.formats.base import square_metres
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme
-from robocov_app.toolkit.cache import Latest
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
@@ -52,7 +53,7 @@ class ImportDialog(Dialog):
         self._seen: Ui | None = None
         self._worker = worker
         self._mistake = ""
-        self._picture: Latest[pygame.Surface] = Latest()
+        self._picture: Latest[Surface] = Latest()
         self._ask()
 
     # what is set
@@ -142,8 +143,11 @@ class ImportDialog(Dialog):
             maps = self._place(rect, self.imported, ui.scale)
             if ui.surface is not None:
                 self._draw_maps(ui.surface, self.imported, ui.scale, ui.theme)
-            if clicked:
-                self._click(ui.at)
+            for camera in self.cameras:
+                if clicked and Rect(camera.view).collidepoint(ui.at):
+                    x, y = camera.to_world(np.array(ui.at, dtype=float)).tolist()
+                    digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
+                    self.keep_inside((round(x, digits), round(y, digits)))
             ui.y = top + maps / ui.scale + 14
         else:
             ui.end_row()
@@ -207,14 +211,7 @@ class ImportDialog(Dialog):
 
     # the maps
 
-    def _click(self, pixel: tuple[int, int]) -> None:
-        for camera in self.cameras:
-            if pygame.Rect(camera.view).collidepoint(pixel):
-                x, y = camera.to_world(np.array(pixel, dtype=float)).tolist()
-                digits = max(0, math.ceil(math.log10(camera.zoom)))  # no finer than a pixel
-                self.keep_inside((round(x, digits), round(y, digits)))
-
-    def _place(self, box: pygame.Rect, imported: Imported, scale: float) -> float:
+    def _place(self, box: Rect, imported: Imported, scale: float) -> float:
         """Place the two maps at the top of a box; return the height that they take, px."""
         low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
         aspect, above, gap = (high_x - low_x) / (high_y - low_y), round(_ABOVE * scale), round(20 * scale)
@@ -228,7 +225,7 @@ class ImportDialog(Dialog):
         self.cameras, self._wide = [Camera.fit(bounds, view, 2 * scale) for view in views], wide
         return corners[1][1] + above + high - box.top
 
-    def _draw_maps(self, screen: pygame.Surface, imported: Imported, scale: float, theme: Theme) -> None:
+    def _draw_maps(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
         size, look = screen.get_size(), (*(camera.view for camera in self.cameras), scale, theme)
         maps = self._picture.of(imported, look, lambda: _maps(size, imported, self.cameras, scale, theme))
         screen.blit(maps, (0, 0))
@@ -242,11 +239,11 @@ class ImportDialog(Dialog):
                     pygame.draw.line(screen, ink, (x - arm, y), (x + arm, y), round(width * scale))
                     pygame.draw.line(screen, ink, (x, y - arm), (x, y + arm), round(width * scale))
         for camera in self.cameras if self.trouble else ():  # of settings that are no more
-            veil = pygame.Surface(camera.view[2:], pygame.SRCALPHA)
+            veil = Surface(camera.view[2:], pygame.SRCALPHA)
             veil.fill((*theme.panel, 140))
             screen.blit(veil, camera.view[:2])
 
-    def _draw_captions(self, screen: pygame.Surface, imported: Imported, scale: float, theme: Theme) -> None:
+    def _draw_captions(self, screen: Surface, imported: Imported, scale: float, theme: Theme) -> None:
         compared, report = imported.comparison, imported.report
         size, small = round(13 * scale), round(SMALL * scale)
         lost = "" if compared.lost.is_empty else f"{square_metres(compared.lost.area, 3)} left out"
@@ -261,7 +258,7 @@ class ImportDialog(Dialog):
             screen.blit(label(name, size, theme.ink, True), (x, y))
             left = x + text_width(name, size, True) + round(10 * scale)
             if mark:
-                square = pygame.Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
+                square = Rect(left, y + round(4 * scale), round(9 * scale), round(9 * scale))
                 pygame.draw.rect(screen, colour, square)
                 screen.blit(label(mark, small, theme.ink), (left + round(14 * scale), y + round(2 * scale)))
             facts = shortened(f"{vertices} vertices, {square_metres(area)} free{more}", small, self._wide)
@@ -270,10 +267,10 @@ class ImportDialog(Dialog):
 
 def _maps(
     size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
-) -> pygame.Surface:
+) -> Surface:
     """Return a picture, else transparent, of the map as it was read and as it became."""
     compared = imported.comparison
-    picture = pygame.Surface(size, pygame.SRCALPHA)
+    picture = Surface(size, pygame.SRCALPHA)
     before = (compared.before, compared.lost, theme.trajectory)
     after = (compared.after, compared.opened, theme.start)
     for camera, (free, marked, colour) in zip(cameras, (before, after), strict=True):
@@ -282,7 +279,7 @@ def _maps(
         for ring in shapely.get_rings(shapely.get_parts(free)):
             points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
             pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
-        marks = pygame.Surface(size, pygame.SRCALPHA)
+        marks = Surface(size, pygame.SRCALPHA)
         _fill(marks, camera, marked, (*colour, _MARK), (0, 0, 0, 0))
         picture.blit(marks, (0, 0))
     if compared.gap is not None:
@@ -295,7 +292,7 @@ def _maps(
 
 
 def _fill(
-    surface: pygame.Surface,
+    surface: Surface,
     camera: Camera,
     area: BaseGeometry,
     inside: Colour | tuple[int, int, int, int],

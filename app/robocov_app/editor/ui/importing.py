@@ -53,7 +53,9 @@ def options_of(importer: Importer) -> tuple[Option, ...]:
 
 
 def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
-    hints, helps = get_type_hints(settings), _helps(settings)
+    hints = get_type_hints(settings)
+    docstrings = re.findall(r'^    (\w+): [^\n]*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
+    helps = {name: " ".join(words.split()) for name, words in docstrings}
     for field in fields(settings):
         hint = hints[field.name]
         plain = next((each for each in get_args(hint) if each is not type(None)), hint)
@@ -70,12 +72,6 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
         elif get_origin(hint) is tuple:
             kind = "words" if ... in get_args(hint) else "place"
         yield Option(field.name, kind, choices, default, helps.get(field.name, ""))
-
-
-def _helps(settings: type) -> dict[str, str]:
-    """Return the docstrings of the fields of a class, a line each."""
-    entries = re.findall(r'^    (\w+): [^\n]*\n    """(.*?)"""', inspect.getsource(settings), re.M | re.S)
-    return {name: " ".join(words.split()) for name, words in entries}
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robocov.errors import InputError
-from robocov_app.editor.model.autosave import Autosave, opened_elsewhere, recoverable
-from robocov_app.editor.model.document import Document
+from robocov_app.editor.model.document import Autosave, Document, opened_elsewhere, recoverable
 from robocov_app.editor.model.measurement import measurement_worker
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.tools.snapping import SNAPS
+from robocov_app.editor.ui.editor import FILE, KEPT, SHOWN, Editor, EditorSettings
 from robocov_app.editor.ui.file_commands import heading, lay_under, opened
-from robocov_app.editor.ui.settings import ATTRIBUTES, FILE, SHOWN, SNAPS, EditorSettings
 from robocov_app.editor.ui.window import EditorWindow
 from robocov_app.toolkit.autosave import autosave_folder, discard
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
@@ -32,10 +31,15 @@ def editor_window(
     size: tuple[int, int] | None = None,
     scale: float | None = None,
     headless: bool = False,
+    served: bool = False,
 ) -> Iterator[EditorWindow]:
-    """Open the editor; settings are read before and kept afterwards."""
-    drafts = None if headless else autosave_folder()
-    if path is not None and not headless and opened_elsewhere(drafts, path):
+    """Open the editor; settings are read before and kept afterwards.
+
+    `headless`: draw without a display. `served`: that too, but live; nothing is remembered either.
+    """
+    alone = headless or served
+    drafts = None if alone else autosave_folder()
+    if path is not None and not alone and opened_elsewhere(drafts, path):
         raise InputError(f"{path}: another editor has it open; close that one, or open a copy")
     # what is wrong with the file is told before a window flashes up
     found = Document.new(drafts) if path is None else opened(path, drafts)
@@ -43,11 +47,11 @@ def editor_window(
     ended = False
     readings = measurement_worker(direct=headless)
     try:
-        with display(headless=headless, otherwise=NO_DISPLAY):
-            file = None if headless else settings_file(FILE)
+        with display(headless=alone, otherwise=NO_DISPLAY):
+            file = None if alone else settings_file(FILE)
             settings, trouble = loaded(EditorSettings, file)
             editor = Editor(document, readings, folder)
-            for name, attribute in ATTRIBUTES.items():
+            for name, attribute in KEPT.items():
                 setattr(editor, attribute, getattr(settings, name))
             editor.theme, editor.recent = theme or settings.theme, list(settings.recent)
             editor.shown = set(settings.shown) & set(SHOWN)
@@ -56,14 +60,14 @@ def editor_window(
                 lay_under(editor, background)
                 editor.choose("picture", tell=False)
             wanted = size or (settings.width, settings.height)
-            wanted = wanted if size or headless else fitting(wanted)
-            scale = scale or settings.scale or (1.0 if headless else screen_scale())
+            wanted = wanted if size or alone else fitting(wanted)
+            scale = scale or settings.scale or (1.0 if alone else screen_scale())
             window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
             window.panel.show_tab(settings.tab)
             editor.say(trouble or (heading(document) if path is not None and document is found else ""))
             if document.path is not None:
                 window.documents.remember(document.path)
-            if not headless:
+            if not alone:
                 offer(window, recoverable(drafts))
             if path is not None and not isinstance(found, Document):
                 window.documents.ask_import(path, found)
@@ -110,7 +114,7 @@ def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
     editor = window.editor
     width, height = window.windowed or window.screen.get_size()
     changes = {
-        **{name: getattr(editor, attribute) for name, attribute in ATTRIBUTES.items()},
+        **{name: getattr(editor, attribute) for name, attribute in KEPT.items()},
         "theme": editor.theme,
         "tab": window.panel.tab,
         "snaps": tuple(name for name in SNAPS if name in editor.snaps),

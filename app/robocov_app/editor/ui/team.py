@@ -1,4 +1,4 @@
-"""How a team would stand at a start: drawn in a thread, so that the window does not wait. Knows no pygame."""
+"""Preview of a team at a start: drawn in a thread, so that the window does not wait. Knows no pygame."""
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass

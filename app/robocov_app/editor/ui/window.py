@@ -1,31 +1,189 @@
-"""The editor's window: events in, frames out. What happens between is the editor's."""
+"""The editor's window and its mouse: events in, frames out. What happens between is the editor's."""
 
 from collections.abc import Callable
+from math import dist
 from pathlib import Path
 
 import pygame
 
 from robocov_app.editor.canvas.canvas import EditorCanvas
+from robocov_app.editor.model.geometry import point_words
 from robocov_app.editor.model.hit_test import owners_at
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.tools.snapping import Snap
+from robocov_app.editor.tools.tool import PointerEvent
 from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
 from robocov_app.editor.ui.editor import Editor
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
-from robocov_app.editor.ui.pointer import Pointer
-from robocov_app.editor.ui.status import HINT, facts
-from robocov_app.editor.ui.team import TeamThread
+from robocov_app.editor.ui.team import Team, TeamThread
 from robocov_app.render.theme import theme_named
-from robocov_app.toolkit.command import Commands
-from robocov_app.toolkit.command_palette import palette
-from robocov_app.toolkit.help import draw_keys
-from robocov_app.toolkit.input import OF_THE_MOUSE, key_of
-from robocov_app.toolkit.layout import laid_out
-from robocov_app.toolkit.menu import Menu
+from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
+from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, WHEEL, key_of, show_cursor, wheel_notches
+from robocov_app.toolkit.layout import inside, laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import BaseWindow
+
+SLIP = 4.0  # pixels at scale 1 that a click may move
+
+_SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
+_SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
+_SHAPES |= {"sideways": pygame.SYSTEM_CURSOR_SIZEWE, "updown": pygame.SYSTEM_CURSOR_SIZENS}
+_SHAPES |= {"rising": pygame.SYSTEM_CURSOR_SIZENESW, "falling": pygame.SYSTEM_CURSOR_SIZENWSE}
+
+
+class Pointer:
+    """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
+
+    def __init__(
+        self, editor: Editor, canvas: EditorCanvas, panel: Panel, menu: Callable[[tuple[int, int]], object]
+    ) -> None:
+        self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
+        self.at = (0, 0)
+        self.held = False  # whether the left button pans, for as long as a key is held
+        self._drag = ""
+        self._button = 0
+        self._pressed_at = (0, 0)
+        self._last_click = -1.0, (0, 0)
+        self._moved_off = False
+        self._shape = -1
+
+    @property
+    def dragging(self) -> bool:
+        """Whether a button is held down on something."""
+        return bool(self._drag)
+
+    def take(self, event: pygame.event.Event, now: float) -> None:
+        """Take an event of the mouse at a time in seconds."""
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        taken = not self._drag and self._panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self._editor.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.ui.stop_typing()
+            self._pressed(event, now)
+        elif self._canvas.over(self.at):
+            self._canvas.zoom(WHEEL ** wheel_notches(event), self.at)
+
+    def aim(self, pixel: tuple[int, int]) -> PointerEvent:
+        """Return where a pixel means, with what is held down on the keyboard."""
+        raw, reach = self._canvas.to_world(pixel), self._canvas.reach
+        editor, tool, held, point = self._editor, self._editor.tool, pygame.key.get_mods(), raw
+        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        if tool.snaps:
+            free = ctrl or not editor.snaps
+            snap = Snap(raw) if free else editor.snapped(raw, reach, tool.origin, tool.drawn)
+            point, tool.guides = snap.point, snap.guides
+        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
+        return PointerEvent(point, raw, reach, shift, alt, ctrl)
+
+    def leave(self) -> None:
+        """The mouse is not in the window any more."""
+        self._editor.cursor = self._canvas.at = self._canvas.hovered = None
+
+    def _pressed(self, event: pygame.event.Event, now: float) -> None:
+        editor = self._editor
+        if self._drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
+            return
+        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
+        if event.button != 1 or editor.tool.name == "pan" or self.held:
+            self._drag = "pan"
+            return
+        problem = self._canvas.problem_at(event.pos)
+        if problem is not None and not editor.tool.busy:
+            editor.problem = None if editor.problem is problem else problem
+            editor.say(problem.words, trouble=problem.grave)
+            editor.version += 1
+            return
+        then, where = self._last_click
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self._canvas.layout.scale
+        self._last_click = (-1.0 if double else now), event.pos
+        self._drag = "tool"
+        aim = self.aim(event.pos)
+        act = editor.tool.twice if double else editor.tool.press
+        editor.attempt(lambda: act(editor, aim))
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        editor, canvas = self._editor, self._canvas
+        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
+        aimed = over or self._drag == "tool"
+        editor.cursor = canvas.to_world(event.pos) if aimed else None
+        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
+        canvas.hovered = canvas.problem_at(event.pos) if over and not self._drag else None
+        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
+        self._moved_off = self._moved_off or (bool(self._drag) and far)
+        if self._drag == "pan":
+            if self._moved_off:
+                canvas.pan(*event.rel)
+        elif aimed:
+            aim, version = self.aim(event.pos), editor.version
+            editor.attempt(lambda: editor.tool.move(editor, aim))
+            editor.version = version  # the panel need not look again at every move of the mouse
+        else:
+            editor.tool.guides = ()
+
+    def _released(self, event: pygame.event.Event) -> None:
+        editor, drag = self._editor, self._drag
+        if event.button != self._button or not drag:
+            return
+        self._drag, self._button = "", 0
+        if drag == "tool":
+            aim = self.aim(event.pos)
+            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
+            editor.document.history.break_drag()
+        elif event.button == 3 and not self._moved_off:
+            if editor.tool.busy:
+                editor.attempt(lambda: editor.tool.finish(editor))
+            else:
+                self._menu(event.pos)
+
+    def show(self) -> None:
+        """Let the cursor tell what a press would do."""
+        canvas, editor = self._canvas, self._editor
+        if inside(canvas.layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = "arrow"
+        if canvas.over(self.at):
+            panned = self._drag == "pan" or self.held
+            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
+        if _SHAPES[shape] != self._shape:
+            self._shape = _SHAPES[shape]
+            show_cursor(self._shape)
+
+
+_STATUS_HINT = "F5 try it · F1 keys"
+
+
+def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
+    """Return what the line says, the most important first."""
+    said = [f"{editor.tool.title}: {editor.tool.hint}" if editor.tool is not editor.selector else ""]
+    if editor.cursor is not None:
+        said.insert(0, point_words(editor.cursor))
+    owner = editor.selector.hovered
+    if editor.tool is editor.selector and isinstance(owner, int) and owner in editor.sketch.places:
+        item = editor.sketch.item(owner)
+        said.append(f"{item.shape.name or 'note'}: {item.note}" if item.note else "")
+    if editor.selection and editor.tool is editor.selector:
+        said.append(editor.selection.words(editor.sketch))
+    if "robots" in editor.shown and team is not None:
+        said.append(team.words or f"{len(team.places)} robots at {team.start or 'anywhere'}")
+    if editor.tool is editor.selector and not editor.selection:
+        said.append(editor.tool.hint)
+    grid = f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"
+    said.append(grid if editor.snaps else "no snapping")
+    if editor.readings.busy:
+        said.append("measuring …")
+    said.append(f"{frames:.0f} fps")
+    return [each for each in said if each]
+
 
 _PAN = 60  # pixels that a key pans
 _CAPTION = "robocov edit"
@@ -95,6 +253,14 @@ class EditorWindow(BaseWindow):
             *(self._arranged, self._caption),
         )
 
+    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
+        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
+        editor, self.scale = self.editor, scale
+        editor.theme, editor.panel = theme, editor.panel if panel is None else panel
+        editor.version += 1
+        if self.trial is not None:
+            self.trial.suit(scale, theme, panel=panel)
+
     def update(self, seconds: float) -> None:
         """Let so many seconds pass."""
         if self.trial is not None:
@@ -104,7 +270,11 @@ class EditorWindow(BaseWindow):
         editor.pass_time(seconds)
         if not self.pointer.dragging:
             self.documents.look()
-            self._ask_team()
+            if "robots" in editor.shown:
+                self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
+                if (team := self.team.poll()) is not None:
+                    self.canvas.team = team
+                    editor.say(team.words, trouble=True)
         if not (self.pointer.dragging and editor.readings.busy):
             editor.ask_readings()
         if editor.document.trouble:
@@ -121,18 +291,7 @@ class EditorWindow(BaseWindow):
             self._caption = caption
             pygame.display.set_caption(caption)
 
-    def _ask_team(self) -> None:
-        editor = self.editor
-        if "robots" in editor.shown:
-            self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
-            answer = self.team.poll()
-            if answer is not None:
-                self.canvas.team = answer
-                if answer.words:
-                    editor.say(answer.words, trouble=True)
-
     def _arrange(self) -> None:
-        """Lay the window out anew when its size or look is another."""
         editor = self.editor
         key = (self.screen.get_size(), self.scale, editor.panel, editor.theme)
         if key == self._arranged:
@@ -151,7 +310,7 @@ class EditorWindow(BaseWindow):
         layout, theme, editor = self.layout, self.theme, self.editor
         self.canvas.draw(self.screen)
         told = facts(editor, self.rate, self.canvas.team)
-        draw_status(self.screen, layout.status, theme, layout.scale, told, HINT)
+        draw_status(self.screen, layout.status, theme, layout.scale, told, _STATUS_HINT)
         if layout.panel[2]:
             self.panel.draw(self.screen)
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, editor.trouble)
