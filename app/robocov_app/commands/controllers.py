@@ -57,7 +57,9 @@ def command(options: Arguments) -> None:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"
             table.add_row("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
         out.print(table)
-    out.print("A law of your own: robocov run rooms --controller mine.py:MyController (see the README).")
+    out.print(
+        "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
+    )
 
 
 def _told(gain: Gain | Option) -> dict[str, Any]:

@@ -91,9 +91,8 @@ def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:
     if not given:
         return None
     if len(given) not in (1, robots):
-        raise ParameterError(
-            f"--speeds: {len(given)} numbers, but one, or one for each of {robots} robots, was wanted"
-        )
+        wanted = f"one, or one for each of {robots} robots, was wanted"
+        raise ParameterError(f"--speeds: {len(given)} numbers, but {wanted}")
     for speed in given:
         if not 0.0 < speed < np.inf:
             raise ParameterError(f"--speeds: {speed!r} m/s, but a number above 0 was wanted")
@@ -113,7 +112,6 @@ def read_positions(path: Path) -> Array:
     for k, pair in enumerate(content):
         fits = isinstance(pair, list) and len(pair) == 2
         if not fits or not all(is_number(value) and abs(value) < 1e300 for value in pair):
-            raise InputError(
-                f"{path}: [{k}]: {shown(pair)}, but [x, y], two finite numbers in metres, was wanted"
-            )
+            wanted = "[x, y], two finite numbers in metres, was wanted"
+            raise InputError(f"{path}: [{k}]: {shown(pair)}, but {wanted}")
     return np.array(content, dtype=float)

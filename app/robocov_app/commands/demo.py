@@ -68,6 +68,8 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
             raise ParameterError("--frames: --out DIR or --video FILE was wanted beside it")
         if self.video is not None and self.frames is None and not self.tour:
             raise ParameterError("--video: --frames N or --tour was wanted beside it")
+        if self.serve and (self.frames is not None or self.video is not None):
+            raise ParameterError("--serve: neither --frames nor --video was wanted beside it")
         if self.video is not None and self.video.suffix.lower() != ".mp4":
             raise ParameterError(f"--video: {str(self.video)!r}, but a name ending in .mp4 was wanted")
 
@@ -80,15 +82,21 @@ def command(options: Arguments) -> int:
     from robocov_app.viewer.launch import Launcher
     from robocov_app.viewer.session.file import SUFFIX, load_session
     from robocov_app.viewer.session.session import Session
+    from robocov_app.web import serve_each, show, web_display
 
+    if options.each:
+        return serve_each(command, options)
     headless = options.frames is not None or options.video is not None
-    if not headless:
+    serving = web_display(options.serve, options.host, options.port, options.folder)
+    if not headless and serving is None:
         on_compile.append(lambda _: show_compiling(window_size(options.size) or (900, 600)))
     file, name, laws = None, options.map, (*controller_kinds(), *options.controllers)
     if options.map.endswith(SUFFIX):
         file = Path(options.map)
         saved = load_session(file, laws)
         session, name = Session.opened(saved), str(saved.view.get("map") or "")
+        if serving is not None and not file.resolve().is_relative_to(options.folder.resolve()):
+            file = None  # it is saved to a file of its own, where it may be
     else:
         session = session_of(options)
     also, without = options.layers()
@@ -102,6 +110,7 @@ def command(options: Arguments) -> int:
         also=also,
         without=without,
         headless=headless,
+        served=serving is not None,
         laws=laws,
         lattice=options.lattice,
         file=file,
@@ -111,7 +120,7 @@ def command(options: Arguments) -> int:
         return rendered(opening, options)
     with opening.window() as window:
         _begin_lesson(window, options)
-        window.run()
+        show(window, serving)
     return 0
 
 
@@ -147,12 +156,13 @@ def rendered(opening: Launcher, options: Arguments) -> int:
     """Render frames of the window without a display."""
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
-    from robocov_app.runs.recording import save_moving_picture
+    from robocov_app.runs.recording import encoder, save_moving_picture
     from robocov_app.viewer.film import pixels
     from robocov_app.viewer.launch import HEADLESS_FPS
 
     if options.video is not None:
         writable(options.video)
+        encoder()
     with ExitStack() as stack:
         out = None
         if options.out is not None:

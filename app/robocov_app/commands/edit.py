@@ -32,16 +32,21 @@ class Arguments(WindowOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.serve and self.screenshot is not None:
+            raise ParameterError("--serve: no --screenshot was wanted beside it")
         if self.screenshot is not None and self.screenshot.suffix.lower() != ".png":
-            raise ParameterError(
-                f"--screenshot: {str(self.screenshot)!r}, but a name ending in .png was wanted"
-            )
+            wanted = "a name ending in .png was wanted"
+            raise ParameterError(f"--screenshot: {str(self.screenshot)!r}, but {wanted}")
 
 
 def command(options: Arguments) -> int:
     """Open the editor, or save a picture of it."""
     from robocov_app.editor.ui.launch import editor_window
+    from robocov_app.web import serve_each, show, web_display
 
+    if options.each:
+        return serve_each(command, options)
+    serving = web_display(options.serve, options.host, options.port, options.folder)
     opening = editor_window(
         None if options.map is None else map_path(options.map),
         options.folder,
@@ -50,10 +55,11 @@ def command(options: Arguments) -> int:
         size=window_size(options.size),
         scale=options.scale,
         headless=options.screenshot is not None,
+        served=serving is not None,
     )
     with opening as window:
         if options.screenshot is None:
-            window.run()
+            show(window, serving)
             return 0
         from robocov.files.atomic import written
         from robocov_app.runs.recording import png_bytes

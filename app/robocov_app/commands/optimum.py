@@ -12,6 +12,7 @@ import tyro
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, checked, counted
 from robocov.files.atomic import written
+from robocov.lower_bound import FINEST, LowerBound, lower_bound
 from robocov.mapfile import load_map
 from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
 from robocov.robots import DEFAULT_RADIUS
@@ -31,13 +32,13 @@ class Arguments(PlotOptions):
     """The best positions for a team that knows the whole map: a reference for the coverage cost (22).
 
     The best of many restarts, each improved on a table of geodesic distances, then by descent of the
-    exact cost. How many restarts agree with the best says how far to trust it. --plot draws a map of the
-    distances.
+    exact cost. How many restarts agree with the best says how far to trust it; --bound proves how much better
+    any placement can be. --plot draws a map of the distances.
 
     Example: robocov optimum rooms --robots 6 --positions best.json --plot best.png
     """
 
-    map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="MAP")] = None
+    map: Annotated[tyro.conf.Positional[str | None], tyro.conf.arg(metavar="[MAP]")] = None
     """Path to a map JSON, or the name of a bundled map; not with --run."""
     robots: int | None = None
     """How many; 6 unless said otherwise, with --run as many as there."""
@@ -55,6 +56,10 @@ class Arguments(PlotOptions):
     """Save the positions there, as robocov cost --positions takes them."""
     overwrite: bool = False
     """Replace an earlier file of positions."""
+    bound: bool = False
+    """Prove a lower bound of the cost of all placements, by the dual; it takes about a minute."""
+    precision: float = 0.001
+    """With --bound: the part of the cost within which it is enough. Less takes longer."""
 
     def __post_init__(self) -> None:
         if (self.map is None) == (self.run is None):
@@ -65,6 +70,7 @@ class Arguments(PlotOptions):
         checked("--robots", _ROBOTS if self.robots is None else self.robots, 1, MOST_ROBOTS, whole=True)
         checked("--restarts", self.restarts, 1, MOST_RESTARTS, whole=True)
         checked("--lattice", self.lattice, 2, 2048, whole=True)
+        checked("--precision", self.precision, FINEST, 1.0)
         if self.seed < 0:
             raise ParameterError(f"--seed: {self.seed}, but a whole number of at least 0 was wanted")
         if self.positions is not None:
@@ -89,6 +95,11 @@ def command(options: Arguments) -> None:
     with late_progress("searching", quiet=options.json) as tell:
         best = optimum(environment, robots, radius=radius, progress=tell, **search)
     seconds = time.perf_counter() - began
+    bound: LowerBound | None = None
+    if options.bound:
+        with late_progress("proving the bound", quiet=options.json) as tell:
+            how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": tell}
+            bound = lower_bound(environment, best.positions, radius=radius, **how)
     gaps = gaps_of(saved, best, environment, options)
     if options.positions is not None:
         rows = ",\n ".join(json.dumps(place) for place in best.positions.tolist())
@@ -112,12 +123,19 @@ def command(options: Arguments) -> None:
             "restart_mean_distances_m": best.costs.tolist(),
             "undescended_mean_distances_m": best.undescended.tolist(),
             "runs": gaps,
+            "lower_bound": None
+            if bound is None
+            else {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap},
         }
         print(json.dumps(finite(answer)))
         return
     print(f"mean distance   {best.mean_distance:.4f} m")
     print(f"coverage cost   {best.value:.3f} m³")
     print(f"uncovered area  {best.uncovered_area:.3f} m²", *density_lines(environment), sep="\n")
+    if bound is not None:
+        print(
+            f"lower bound     {bound.mean_distance:.4f} m, no placement is more than {bound.gap:.2%} better"
+        )
     count = len(best.costs)
     print(f"{counted(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these")
     for within in _WITHIN:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from robocov.errors import InputError, ParameterError, listed
-from robocov_app.runs.options import FilmOptions, JsonOption
+from robocov_app.runs.options import FilmOptions, JsonOption, WebOptions
 from robocov_app.terminal import output
 from robocov_app.terminal.arguments import window_size
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Arguments(JsonOption):
+class Arguments(JsonOption, WebOptions):
     """A saved run or comparison again: in the window, or headlessly as frames and a film.
 
     In the window the run is the past: go back and forth in it, go on from any moment of it with other
@@ -43,6 +43,11 @@ class Arguments(JsonOption):
     film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.each:
+            raise ParameterError("--each: robocov demo with a session file was wanted for that")
+        if self.headless and self.serve:
+            raise ParameterError("--serve: neither --frames nor --video was wanted beside it")
         if self.headless and self.out is None:
             raise ParameterError("--out: a folder for frames and film was wanted")
         if self.headless and self.controller:
@@ -95,9 +100,8 @@ def play_runs(options: Arguments, saved: list[Saved]) -> int:
         kind = controller.rpartition(":")[2]
         if not any(each.record.controller.rpartition(":")[2] == kind for each in saved):
             names = listed([each.record.controller for each in saved])
-            raise ParameterError(
-                f"--controller: {controller}, but the controller of a run was wanted: {names}"
-            )
+            wanted = f"the controller of a run was wanted: {names}"
+            raise ParameterError(f"--controller: {controller}, but {wanted}")
     try:
         session = replayed_session(saved, options.controller)
     except InputError as error:
@@ -110,15 +114,26 @@ def open_window(options: Arguments, session: Session, file: Path | None = None) 
     """Open the window with a session, and the file that it is from."""
     from robocov.mapfile import bundled_maps, load_map
     from robocov_app.viewer.launch import Launcher
+    from robocov_app.web import show, web_display
 
+    serving = web_display(options.serve, options.host, options.port, Path())
     laws, same = options.controller, (key for key in bundled_maps() if load_map(key) == session.environment)
     name = next(same, session.environment.name)
     (also, without), theme, size = options.film.layers(), options.film.theme, window_size(options.film.size)
     opening = Launcher(
-        session, name, Path(), theme=theme, size=size, also=also, without=without, laws=laws, file=file
+        session,
+        name,
+        Path(),
+        theme=theme,
+        size=size,
+        also=also,
+        without=without,
+        laws=laws,
+        file=file,
+        served=serving is not None,
     )
     with opening.window() as window:
-        window.run()
+        show(window, serving)
     return 0
 
 

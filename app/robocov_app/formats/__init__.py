@@ -28,9 +28,16 @@ from robocov_app.formats import (
     tmx,
     wkt,
 )
-from robocov_app.formats.foreign import ForeignMap, ImportReport
+from robocov_app.formats.base import (
+    Exporter,
+    ExportReport,
+    ForeignMap,
+    Importer,
+    ImportReport,
+    ReadOptions,
+    WriteOptions,
+)
 from robocov_app.formats.geometry.conversion import Shaping, shaped
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.svg import drawing as svg
 from robocov_app.formats.unreadable import described, named_kind
 

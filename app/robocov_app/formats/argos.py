@@ -14,18 +14,12 @@ from shapely import MultiPolygon
 from robocov.arrays import Array
 from robocov.errors import one_line, shown
 from robocov.mapfile.models import LARGEST
-from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import foreign_map
-from robocov_app.formats.geometry.shapes import Shapes
-from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import Shapes, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
 _UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are tilted, in degrees
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return b"<argos-configuration" in head
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -112,6 +106,7 @@ def _lengths(element: Element, name: str, where: str, count: int = 3) -> Array:
 
 
 IMPORTER = Importer(
-    "argos", "ARGoS: the arena of an experiment (.argos)", (".argos",), _sniff, _read,
+    "argos", "ARGoS: the arena of an experiment (.argos)", (".argos",),
+    lambda path, head: b"<argos-configuration" in head, _read,
     options=frozenset({"only", "skip"}),
 )  # fmt: skip

@@ -16,11 +16,9 @@ from robocov.errors import MapError, RobocovError, one_line, shown
 from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
-from robocov_app.formats.geometry.enclosing import foreign_map
-from robocov_app.formats.geometry.shapes import Line, Shapes
-from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
@@ -32,7 +30,7 @@ UNITS = {
     10: ("yards", 0.9144), 13: ("micrometres", 1e-6), 14: ("decimetres", 0.1), 15: ("decametres", 10.0),
     16: ("hectometres", 100.0), 21: ("US survey feet", 1200 / 3937),
 }  # fmt: skip
-"""What the header's $INSUNITS stands for, with its metres."""
+"""Units of the header's $INSUNITS, with their metres."""
 
 _BINARY = b"AutoCAD Binary DXF"
 _TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
@@ -196,7 +194,7 @@ class DxfDrawing:
         elif kind in ("LWPOLYLINE", "POLYLINE"):
             self._polyline(kind, entity, labels, at)
         elif kind in ("SOLID", "TRACE"):
-            self._outline([self._metres(entity.wcs_vertices())], labels, at)
+            self.shapes.add_outline([self._metres(entity.wcs_vertices())], labels, rule="evenodd", at=at)
         elif kind == "HATCH" and self.shapes.options.hatches:
             self._hatch(entity, labels, at)
         elif kind == "HATCH":
@@ -215,10 +213,6 @@ class DxfDrawing:
         if not (np.abs(points) * self.scale <= FARTHEST).all():
             raise MapError(f"{self.where}: a curve beyond {FARTHEST:.0f} m, but a nearer one was wanted")
 
-    def _outline(self, rings: list[Array], labels: tuple[str, ...], at: str) -> None:
-        if not self.shapes.add_outline(rings, labels, rule="evenodd", at=at):
-            self.shapes.leave_out("outline", "without an area")
-
     def _curve(self, points: Array, labels: tuple[str, ...], at: str) -> None:
         self.curved = True
         self._require_near(points)
@@ -229,7 +223,7 @@ class DxfDrawing:
         near = bool((np.abs(points[0] - points[-1]) <= _CLOSED * np.abs(points).max()).all())
         closed = len(points) > 3 and near
         if closed and not width > 0.0:
-            self._outline([points[:-1]], labels, at)
+            self.shapes.add_outline([points[:-1]], labels, rule="evenodd", at=at)
             return
         if closed:
             points = np.concatenate([points[:-1], points[:1]])
@@ -283,7 +277,7 @@ class DxfDrawing:
         for path in from_hatch(entity):
             self._require_near(flat(path.control_vertices()))
             rings.append(self._metres(list(path.flattening(self.tolerance))))
-        self._outline(rings, labels, at)
+        self.shapes.add_outline(rings, labels, rule="evenodd", at=at)
 
 
 def _rows(entity: Any) -> Array:
@@ -297,16 +291,12 @@ def _rows(entity: Any) -> Array:
     return np.array(found, dtype=float).reshape(-1, 5)
 
 
-def _sniff(path: Path, head: bytes) -> bool:
-    return head.startswith(_BINARY) or _TEXT.match(head) is not None
-
-
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that the model space of a DXF file draws.
 
     Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
     the boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option
-    ``thickness``. Names are those of layers and blocks: see `enclosing.foreign_map`. Blocks are carried out
+    ``thickness``. Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out
     wherever they are inserted. Layers that are off or frozen, texts, dimensions and what has a third
     dimension are left out; so are hatches without the option ``hatches``. Curves become lines that stay
     within a millimetre. The option ``scale`` overrules the unit of the header; one of them is needed.
@@ -362,7 +352,8 @@ def _document(path: Path, where: str) -> Any:
 
 
 IMPORTER = Importer(
-    "dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",), _sniff, _read,
+    "dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
+    lambda path, head: head.startswith(_BINARY) or _TEXT.match(head) is not None, _read,
     options=frozenset(
         {"scale", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip", "hatches"}
     ),

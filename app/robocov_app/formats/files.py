@@ -29,15 +29,28 @@ MAX_DEPTH = 32  # deepest nesting of collections, groups, blocks, lists
 HEAD = 1 << 20  # so much of a file is looked at, in bytes, to know its format
 
 
-def head(path: Path) -> bytes:
-    """Return the first `HEAD` bytes of the file at `path`; a MapError where there is no ordinary one."""
-    return _read(path, HEAD)
+def head(path: Path, most: int = HEAD) -> bytes:
+    """Return the first bytes of the file at `path`; a MapError where there is no ordinary one."""
+    where = one_line(path)
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise MapError(f"{where}: is a folder, but a file was wanted")
+        if not stat.S_ISREG(mode):  # opening a pipe would wait for ever
+            raise MapError(f"{where}: is a pipe or a device, but a file was wanted")
+        with path.open("rb") as file:
+            return file.read(most)
+    except FileNotFoundError:
+        raise MapError(f"{where}: no such file") from None
+    except (OSError, ValueError) as error:
+        reason = one_line(getattr(error, "strerror", None) or error)
+        raise MapError(f"{where}: cannot be read: {reason}") from None
 
 
 def content(path: Path, most: int = MAX_BYTES) -> bytes:
     """Return the content of a file; a MapError where it is larger than `most` bytes, or as `head`."""
-    data = _read(path, most + 1) if _size(path) <= most else None
-    if data is None or len(data) > most:
+    head(path, 0)
+    if path.stat().st_size > most or len(data := head(path, most + 1)) > most:
         raise MapError(f"{one_line(path)}: larger than {most / 1e6:g} MB, but a smaller file was wanted")
     return data
 
@@ -75,34 +88,6 @@ def require_coordinate(value: float, where: str) -> None:
     if not abs(value) <= FARTHEST:
         wanted = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) was wanted"
         raise MapError(f"{where}: {shown(value)}, but {wanted}")
-
-
-def _size(path: Path) -> int:
-    where = one_line(path)
-    try:
-        found = path.stat()
-    except FileNotFoundError:
-        raise MapError(f"{where}: no such file") from None
-    except (OSError, ValueError) as error:
-        raise MapError(f"{where}: cannot be read: {_reason(error)}") from None
-    if stat.S_ISDIR(found.st_mode):
-        raise MapError(f"{where}: is a folder, but a file was wanted")
-    if not stat.S_ISREG(found.st_mode):  # opening a pipe would wait for ever
-        raise MapError(f"{where}: is a pipe or a device, but a file was wanted")
-    return found.st_size
-
-
-def _read(path: Path, most: int) -> bytes:
-    _size(path)
-    try:
-        with path.open("rb") as file:
-            return file.read(most)
-    except (OSError, ValueError) as error:
-        raise MapError(f"{one_line(path)}: cannot be read: {_reason(error)}") from None
-
-
-def _reason(error: Exception) -> str:
-    return one_line(error.strerror if isinstance(error, OSError) and error.strerror else error)
 
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))

@@ -17,14 +17,12 @@ from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, one_line, place, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.files import begins_with, is_number, located_errors, positions, read_json, refused
-from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.enclosing import BOUNDARY, foreign_map
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid, rings
-from robocov_app.formats.geometry.shapes import Figure, Kind, Shapes
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Kind, Shapes, foreign_map
 from robocov_app.formats.georeference import LocalPlane, in_metres
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
@@ -32,14 +30,10 @@ _TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".joi
 _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
 
 
-def _sniff(path: Path, head: bytes) -> bool:
-    return begins_with(head, b"{") and _TYPE.search(head) is not None
-
-
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that a FeatureCollection, a Feature or a geometry stands for.
 
-    What polygons and lines are is found out as in `enclosing.foreign_map`; the properties ``name``, ``kind``
+    What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind``
     and ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and
     are projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of
     the older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export`
@@ -180,7 +174,7 @@ def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:
 
 IMPORTER = Importer(
     "geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
-    _sniff, _read,
+    lambda path, head: begins_with(head, b"{") and _TYPE.search(head) is not None, _read,
     options=frozenset(
         {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
     ),

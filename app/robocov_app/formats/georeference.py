@@ -13,9 +13,9 @@ from robocov.arrays import Array
 from robocov.errors import MapError, RobocovError, shown
 from robocov.extras import extra
 from robocov.mapfile.models import LARGEST
+from robocov_app.formats.base import ReadOptions
 from robocov_app.formats.files import require_shapes
 from robocov_app.formats.geometry.shapes import Figure
-from robocov_app.formats.options import ReadOptions
 
 DEGREES = "OGC:CRS84"  # longitude and latitude on WGS 84, as of all GeoJSON (RFC 7946, section 4)
 _IN_DEGREES = (DEGREES, "EPSG:4326")
@@ -109,7 +109,11 @@ def _projected(
     figures: Sequence[Figure], name: str, where: str, origin: tuple[float, float] | None
 ) -> tuple[list[Figure], list[str]]:
     """Return figures in metres east and north of a place, by the azimuthal equidistant projection."""
-    pyproj = _pyproj(name, where)
+    try:
+        pyproj = extra("pyproj", "geo")
+    except RobocovError as error:
+        what = "degrees" if name == DEGREES else name
+        raise MapError(f"{where}: coordinates in {what}: {error} ({_AS_THEY_ARE})") from None
     points = _points(figures)
     if name not in _IN_DEGREES:
         try:
@@ -153,11 +157,3 @@ class LocalPlane:
     def degrees(self, metres: Array) -> Array:
         """Return longitudes, all within 180 degrees of the place's, and latitudes of (n, 2) m."""
         return _unwrapped(np.column_stack(self._project(*metres.T, inverse=True)), self._longitude)
-
-
-def _pyproj(name: str, where: str) -> Any:
-    try:
-        return extra("pyproj", "geo")
-    except RobocovError as error:
-        what = "degrees" if name == DEGREES else name
-        raise MapError(f"{where}: coordinates in {what}: {error} ({_AS_THEY_ARE})") from None

@@ -9,16 +9,11 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov.mapfile.models import FARTHEST
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.files import begins_with, located_errors, read_json, refused
-from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.polygons import Crossings, enclosed
-from robocov_app.formats.options import Importer, ReadOptions
 
 _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return begins_with(head, b"{") and b'"verts"' in head
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -83,5 +78,6 @@ def _without_small_holes(part: Polygon) -> Polygon:
 
 
 IMPORTER = Importer(
-    "houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",), _sniff, _read,
+    "houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",),
+    lambda path, head: begins_with(head, b"{") and b'"verts"' in head, _read,
 )  # fmt: skip

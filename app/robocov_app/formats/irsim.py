@@ -20,20 +20,14 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, counted, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes
-from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.picture import read_picture
 
 MOST_OBJECTS = 4_000  # robots and obstacles of a world
 _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -148,8 +142,8 @@ def _draw(shape: _Node, frame: Array, shapes: Shapes, labels: list[str]) -> None
             shape["vertices"].refuse("a list of points [x, y]")
         if name == "linestring":
             shapes.add_line(Line(placed(np.array(points)), shapes.thickness, tuple(labels)), at=at)
-        elif not shapes.add_outline([placed(np.array(points))], labels, at=at):
-            shapes.leave_out("polygon", "without an area")
+        else:
+            shapes.add_outline([placed(np.array(points))], labels, at=at, thing="polygon")
     elif name == "compound":
         for part in shape["parts"].items():
             _draw(part, frame @ _frame(*part["pose"].numbers([0.0, 0.0, 0.0])[:3]), shapes, labels)
@@ -222,6 +216,7 @@ class _Node:
 
 IMPORTER = Importer(
     # a .yaml is this by its content only
-    "irsim", "IR-SIM: YAML of a world, robots and obstacles", (), _sniff, _read,
+    "irsim", "IR-SIM: YAML of a world, robots and obstacles", (),
+    lambda path, head: path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None, _read,
     options=frozenset({"thickness", "anywhere", "only", "skip"}),
 )  # fmt: skip

@@ -16,10 +16,9 @@ from robocov.environment import Environment
 from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
 CELL = 1.0  # side of a cell in metres where none is given: the format has no unit
 _PASSABLE, _SOLID = b".GS", b"@O"

@@ -14,11 +14,9 @@ import shapely
 from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import BOUNDARY, foreign_map
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import DEGREES, in_metres
-from robocov_app.formats.options import Importer, ReadOptions
 
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
 _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail", "jersey_barrier"}
@@ -52,10 +50,6 @@ class _Thing:
         """Whether it is below the ground."""
         under = self.tags.get("location") == "underground" or self.tags.get("layer", "0").startswith("-")
         return under or self.tags.get("tunnel", "no") != "no"
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return _ROOT.match(head) is not None
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -205,6 +199,7 @@ def _degrees(given: dict[str, str], key: str, most: float) -> float:
 
 
 IMPORTER = Importer(
-    "osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",), _sniff, _read,
+    "osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",),
+    lambda path, head: _ROOT.match(head) is not None, _read,
     options=frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"}),
 )  # fmt: skip

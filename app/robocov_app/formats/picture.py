@@ -23,10 +23,9 @@ from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
 _PIECE = 1 << 20  # bytes that are unpacked at a time
 _STRIP = 512  # rows that are converted at a time, which bounds the memory
@@ -258,13 +257,11 @@ def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
 
 
 IMPORTER = Importer(
-    name="picture",
-    title="picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
-    suffixes=(".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
-    sniff=lambda path, head: is_picture(head),
-    read=_read,
+    "picture", "picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
+    (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
+    lambda path, head: is_picture(head), _read,
     options=frozenset({"cell", "unknown", "threshold", "invert"}),
-)
+)  # fmt: skip
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
@@ -281,9 +278,6 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
 
 
 EXPORTER = Exporter(
-    name="picture",
-    title="picture: PNG in black and white, with its scale and place",
-    suffixes=(".png",),
-    write=_write,
+    "picture", "picture: PNG in black and white, with its scale and place", (".png",), _write,
     options=frozenset({"cell"}),
-)
+)  # fmt: skip

@@ -17,7 +17,7 @@ from robocov.environment import Environment, Gap
 from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import check_figure_path, plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TITLE, Box, Page, tone
-from robocov_app.formats.foreign import ForeignMap, ImportReport
+from robocov_app.formats.base import ForeignMap, ImportReport
 from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
@@ -73,12 +73,8 @@ def plot_import(
             page.text(name, box[0], y, points=TITLE, bold=True)
             beside = _indent(page, name)
             page.text(facts, box[0] + beside, y, colour=theme.faint, room=slot - beside)
-        first, second = (page.axes(box) for box, _ in panels)
-        low_x, low_y, high_x, high_y = compared.bounds
-        for axes in (first, second):
-            axes.set_xlim(low_x, high_x)
-            axes.set_ylim(low_y, high_y)
-            axes.set_axis_off()
+        low_x, _, high_x, _ = compared.bounds
+        first, second = (page.map_axes(box, *compared.bounds) for box, _ in panels)
         outside = shapely.difference(compared.region, compared.before)
         _draw(first, outside, theme.obstacle, theme.obstacle_edge)
         _draw_edges(first, compared.before, theme)
@@ -87,9 +83,7 @@ def plot_import(
         draw_map(second, environment, theme)
         _draw(second, compared.opened, theme.start, theme.start, _MARK)
         _draw_gap(second, compared.gap, theme)
-        right = max(box[0] + box[2] for box, _ in panels)
-        bottom = max(box[1] + box[3] for box, _ in panels)
-        page.footer(handles, left, right, bottom, panels[0][0][2] / (high_x - low_x))
+        page.footer(handles, [box for box, _ in panels], panels[0][0][2] / (high_x - low_x))
         for k, line in enumerate(reversed(said)):
             y = page.size[1] - (_LINE * k + 16) * s
             page.text(line, left, y, points=SMALL, colour=theme.faint)

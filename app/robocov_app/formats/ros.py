@@ -31,10 +31,9 @@ from robocov.environment import Environment
 from robocov.errors import MapError, OutputError, ParameterError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import Grid, free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.picture import Brightness, read_picture
 
 _OCCUPIED, _FREE = 0.65, 0.196  # thresholds of a file that gives none, as map_server writes them
@@ -58,7 +57,10 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     cell = _number(given, "resolution", where)
     files.require_length(cell, f"{where}: resolution", smallest=1e-4, largest=1000.0)
     origin = _origin(given, where)
-    negate = _truth(given, where)
+    negated = _text(given, "negate", where, "0").lower()
+    if negated not in ("0", "1", "false", "true", "no", "yes", "off", "on"):
+        raise MapError(f"{where}: negate: {shown(negated)}, but 0 or 1 was wanted")
+    negate = negated in ("1", "true", "yes", "on")
     occupied = _number(given, "occupied_thresh", where, _OCCUPIED)
     free = _number(given, "free_thresh", where, _FREE)
     if not 0.0 <= free <= occupied <= 1.0:
@@ -153,13 +155,6 @@ def _origin(given: dict[str, files.Value], where: str) -> tuple[float, float, fl
     files.require_coordinate(x, f"{where}: origin[0]")
     files.require_coordinate(y, f"{where}: origin[1]")
     return x, y, math.remainder(yaw, 2 * math.pi)
-
-
-def _truth(given: dict[str, files.Value], where: str) -> bool:
-    text = _text(given, "negate", where, "0").lower()
-    if text not in ("0", "1", "false", "true", "no", "yes", "off", "on"):
-        raise MapError(f"{where}: negate: {shown(text)}, but 0 or 1 was wanted")
-    return text in ("1", "true", "yes", "on")
 
 
 def _text(given: dict[str, files.Value], key: str, where: str, default: str | None = None) -> str:

@@ -23,12 +23,10 @@ from robocov.arrays import Array
 from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import foreign_map, surrounding
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Outline, Shapes
-from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import Outline, Shapes, foreign_map, surrounding
 from robocov_app.formats.picture import read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, in bytes
@@ -89,10 +87,6 @@ class _Room:
     free: MultiPolygon
     labels: tuple[str, ...]
     cell: float | None = None
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return path.suffix.lower() == ".world" and _MODELS.search(head) is not None
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -301,8 +295,7 @@ class _World:
         elif not entity.number("noblocks", 0):
             rings = [np.asarray(box.exterior.coords)[:-1]]
         for ring in rings:
-            if not self.shapes.add_outline([ring], labels, at=entity.at):
-                self.shapes.leave_out("block", "without an area")
+            self.shapes.add_outline([ring], labels, at=entity.at, thing="block")
 
     def _bitmap(self, file: Path) -> tuple[MultiPolygon, int, int]:
         """Return what is light in the box around all dark pixels, of side 1, and its columns and rows."""
@@ -340,6 +333,7 @@ def _blocks(entity: _Entity) -> list[Array]:
 
 
 IMPORTER = Importer(
-    "stage", "Stage: .world with its includes and bitmaps", (".world",), _sniff, _read,
+    "stage", "Stage: .world with its includes and bitmaps", (".world",),
+    lambda path, head: path.suffix.lower() == ".world" and _MODELS.search(head) is not None, _read,
     options=frozenset({"anywhere", "around", "only", "skip"}),
 )  # fmt: skip

@@ -21,11 +21,9 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
 from robocov_app.formats import files
-from robocov_app.formats.foreign import ForeignMap
-from robocov_app.formats.geometry.enclosing import foreign_map
+from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes, folded
-from robocov_app.formats.options import Importer, ReadOptions
+from robocov_app.formats.geometry.shapes import Line, Shapes, folded, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
@@ -72,10 +70,6 @@ class _Layer:
     labels: tuple[str, ...]
     offset: Array
     wall: bool
-
-
-def _sniff(path: Path, head: bytes) -> bool:
-    return _ROOT.search(head) is not None and b"tilewidth" in head
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
@@ -330,7 +324,7 @@ class _Map:
             shapes.add_circle(points[0], float(np.hypot(*(points[1] - points[0]))), labels, at=at)
         elif kind == "point":
             shapes.add_point(points[0], at=at)
-        elif kind != "polygon" or not shapes.add_outline([points], labels, at=at):
+        elif kind != "polygon" or not shapes.add_outline([points], labels, at=at, thing=""):
             shapes.leave_out("object", "of text, a template or without an area")
 
 
@@ -403,6 +397,7 @@ def _whole(element: Element, name: str, where: str, least: int, default: str = "
 
 
 IMPORTER = Importer(
-    "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",), _sniff, _read,
+    "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",),
+    lambda path, head: _ROOT.search(head) is not None and b"tilewidth" in head, _read,
     options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
 )  # fmt: skip

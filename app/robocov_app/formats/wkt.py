@@ -16,14 +16,12 @@ from robocov.environment import Environment
 from robocov.errors import MapError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
-from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
-from robocov_app.formats.geometry.shapes import Figure, Shapes
+from robocov_app.formats.geometry.shapes import Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import in_metres
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
 
 KINDS = (
     "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING",
@@ -228,17 +226,13 @@ _BEGIN = re.compile(
 )
 
 
-def _sniff(path: Path, head: bytes) -> bool:
-    return _BEGIN.match(head) is not None
-
-
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that the geometries of a file stand for.
 
     Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
     Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
     it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-    `enclosing.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
+    `shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
     """
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
@@ -253,7 +247,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 IMPORTER = Importer(
     "wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
-    (".wkt", ".ewkt"), _sniff, _read,
+    (".wkt", ".ewkt"), lambda path, head: _BEGIN.match(head) is not None, _read,
     options=frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"}),
 )  # fmt: skip
 

@@ -75,11 +75,6 @@ class Element:
         raise MapError(f"{where}:{self.line}: {called}: {what}")
 
 
-def read_svg_tree(path: Path) -> tuple[Element, str]:
-    """Return the root of the SVG file at `path`, and what messages call the file."""
-    return read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
-
-
 def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> tuple[Element, str]:
     """Return the root of the XML file at `path`, and what messages call the file.
 

@@ -15,9 +15,9 @@ from robocov.arrays import Array, BoolArray, IntArray, ranges
 from robocov.environment import Environment
 from robocov.errors import ParameterError, counted
 from robocov.robots import DEFAULT_RADIUS
+from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
-from robocov_app.formats.options import ExportReport
 
 CELL = 0.05
 """Side of a cell in metres where none is given: what maps of robots mostly have."""

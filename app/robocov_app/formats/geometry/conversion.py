@@ -1,37 +1,39 @@
 """From what a reader found to an environment, and how the two compare."""
 
 import math
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import shapely
-from shapely import MultiPolygon, Polygon
+from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import (
     START_GAP,
+    CircleObstacle,
     DiscStart,
     Environment,
     Gap,
+    Obstacle,
     PointsStart,
     PolygonObstacle,
     Ring,
     StartSpec,
     UniformStart,
+    WallObstacle,
     narrowest_gap,
 )
 from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
-from robocov.mapfile.models import FARTHEST, SMALLEST
+from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.formats.foreign import ForeignMap, ImportReport, square_metres
+from robocov_app.formats.base import ForeignMap, ImportReport, Primitive, check_options, square_metres
 from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
 from robocov_app.formats.geometry.polygons import CRUMB, bounded, filled, made_valid, polygons_of, rounded
-from robocov_app.formats.geometry.primitives import with_primitives
 from robocov_app.formats.geometry.simplify import sharpened, simplified
-from robocov_app.formats.options import check_options
 
 DEFAULT_TOLERANCE = 0.02
 """By how much walls of vector formats may move, in metres."""
@@ -49,6 +51,10 @@ _SOON, _MOST_VERTICES = 10_000, 20_000
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
 """Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
 
+MOST_PRIMITIVES = 5_000
+"""Circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds."""
+
+_Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
 # width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost
@@ -57,7 +63,7 @@ _SLIVER = 2.0
 
 @dataclass(frozen=True)
 class Shaping:
-    """How a foreign map becomes an environment."""
+    """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
     """Walls may move by so many metres, and corners by twice as much, where that saves vertices; 0 keeps
@@ -422,6 +428,88 @@ def _ring(ring: BaseGeometry, digits: int) -> Ring:
         points = points[::-1]
     first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
     return tuple((float(x), float(y)) for x, y in np.roll(points, -first, axis=0))
+
+
+def with_primitives(
+    solid: Sequence[Polygon],
+    primitives: Iterable[Primitive],
+    boundary: Polygon,
+    tolerance: float,
+    digits: int,
+    places: int,
+    radius: float,
+) -> tuple[list[Primitive], list[Polygon]]:
+    """Return the primitives that make up polygons of `solid`, in their order, and the polygons that stay.
+
+    A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
+    twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
+    along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
+    where a robot of that radius would have more than so many `places`, apart from each other.
+
+    >>> wall = WallObstacle(((1.0, 2.0), (3.0, 2.0)), 0.2)
+    >>> desk, drawn = shapely.box(5, 1, 6, 2), shapely.box(1, 1.9, 3, 2.1)
+    >>> kept, rest = with_primitives([drawn, desk], [wall], shapely.box(0, 0, 8, 4), 0.02, 4, 1, 0.1)
+    >>> kept == [wall], rest == [desk]
+    (True, True)
+    """
+    rounded = {with_numbers(each, lambda value: round(value, digits) + 0.0): each for each in primitives}
+    usable = [primitive for primitive in rounded if _fits(primitive)]
+    if not usable or len(usable) > MOST_PRIMITIVES:
+        return [], list(solid)
+    # of another radius, however near, a circle may be drawn with another number of sides
+    covered = np.array([rounded[primitive].polygon for primitive in usable], dtype=object)
+    shapely.prepare(boundary)
+    outside = ~shapely.covers(boundary, covered)
+    covered[outside] = shapely.intersection(covered[outside], boundary)
+    piece, source = shapely.get_parts(covered, return_index=True)
+    tree = STRtree(piece)
+    hair = 10.0**-digits
+    made: list[set[int]] = []
+    for part in solid:
+        found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
+        own = set(source[found].tolist())
+        union = shapely.union_all(piece[found])
+        same = (
+            sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
+            and union.buffer(2 * (tolerance + hair)).covers(part)
+            and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
+        )
+        made.append(own if same else set())
+    # several may have a gap among them that was filled
+    for most in (len(usable), 1):
+        kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
+        rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
+        obstacles = [*rest, *(primitive.polygon for primitive in kept)]
+        if len(rooms(shapely.difference(boundary, shapely.union_all(obstacles)), radius)) <= places:
+            return kept, rest
+    return [], list(solid)
+
+
+def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obstacle:
+    """Return an obstacle with other numbers for all that it has."""
+
+    def ring(points: Ring) -> Ring:
+        return tuple((number(x), number(y)) for x, y in points)
+
+    if isinstance(obstacle, CircleObstacle):
+        return replace(obstacle, center=ring((obstacle.center,))[0], radius=number(obstacle.radius))
+    if isinstance(obstacle, WallObstacle):
+        return replace(obstacle, points=ring(obstacle.points), width=number(obstacle.width))
+    assert isinstance(obstacle, PolygonObstacle)
+    return replace(obstacle, vertices=ring(obstacle.vertices), holes=tuple(map(ring, obstacle.holes)))
+
+
+def _points(primitive: Primitive) -> np.ndarray:
+    return np.array([primitive.center] if isinstance(primitive, CircleObstacle) else primitive.points)
+
+
+def _fits(primitive: Primitive) -> bool:
+    points = _points(primitive)
+    if isinstance(primitive, CircleObstacle):
+        sizes = [primitive.radius]
+    else:
+        sizes = [primitive.width, np.ptp(points, axis=0).max()]
+    return bool(min(sizes) >= SMALLEST and max(sizes) <= LARGEST and np.abs(points).max() <= FARTHEST)
 
 
 @dataclass(frozen=True, eq=False)

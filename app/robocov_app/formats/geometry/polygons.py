@@ -1,4 +1,4 @@
-"""What rings enclose, by the rules of polygons with holes and of filled paths; and polygons' decimals."""
+"""Areas enclosed by rings, by the rules of polygons with holes and filled paths; polygons' decimals."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -17,8 +17,8 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array, BoolArray, IntArray, ranges
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov_app.formats.base import ForeignMap, square_metres
 from robocov_app.formats.files import require_coordinate, require_vertices
-from robocov_app.formats.foreign import ForeignMap, square_metres
 
 Cells: TypeAlias = NDArray[np.uint8]
 """`FREE`, `BLOCKED` or `UNKNOWN` for each cell, (rows, columns), the top row first as in pictures."""
@@ -29,7 +29,7 @@ RIM = 2
 """Around the known cells so many are solid where a map is cut to them."""
 
 NECK = 1 / 32
-"""Where obstacles touch at a corner, so much of each side of the two free cells is cut off, in cells."""
+"""Cut at corners where obstacles touch, off each side of the two free cells, in cells."""
 
 _STRIP = 512  # rows that are looked at together
 _TOUCHING = np.ones((3, 3), dtype=bool)  # known cells that touch at a corner belong together

@@ -59,46 +59,23 @@ class Simplified(NamedTuple):
     changed: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
 class Rings:
-    """The k vertices, (k, 2) m, of the rings of polygons, ring after ring, no first one repeated.
+    """The k vertices, `points` (k, 2) m, of the rings of polygons, ring after ring, no first one repeated.
 
-    `begin`, (r,): where each ring begins. `source`, (k,): the vertex of the outline that each one is; with a
-    half added, the middle of the side after it. Along a ring they grow, but for one step back to its lowest.
+    `begin`, `size`, (r,): where each ring begins, and its vertices; none is empty. `source`, (k,): the vertex
+    of the outline that each one is; with a half added, the middle of the side after it. Along a ring they
+    grow, but for one step back to its lowest. `vertex`, (k,): the same without the half. `ring`, `after`,
+    `before`, (k,): the ring of each, and the next and the previous one along it.
     """
 
-    points: Array
-    begin: IntArray
-    source: Array
-
-    @cached_property
-    def size(self) -> IntArray:
-        """Vertices of each ring, (r,); none is empty."""
-        return np.diff(self.begin, append=len(self.points))
-
-    @cached_property
-    def ring(self) -> IntArray:
-        """The ring of each vertex, (k,)."""
-        return np.arange(len(self.begin)).repeat(self.size)
-
-    @cached_property
-    def after(self) -> IntArray:
-        """The next vertex along its ring of each, (k,)."""
-        after = np.arange(1, len(self.points) + 1)
-        after[self.begin + self.size - 1] = self.begin
-        return after
-
-    @cached_property
-    def before(self) -> IntArray:
-        """The previous vertex along its ring of each, (k,)."""
-        before = np.empty_like(self.after)
-        before[self.after] = np.arange(len(self.points))
-        return before
-
-    @cached_property
-    def vertex(self) -> IntArray:
-        """The vertex of the outline that each one is, or begins the side of, (k,)."""
-        return self.source.astype(np.intp)
+    def __init__(self, points: Array, begin: IntArray, source: Array) -> None:
+        self.points, self.begin, self.source = points, begin, source
+        self.vertex = source.astype(np.intp)
+        self.size = np.diff(begin, append=len(points))
+        self.ring = np.arange(len(begin)).repeat(self.size)
+        self.after = np.arange(1, len(points) + 1)
+        self.after[begin + self.size - 1] = begin
+        self.before = np.argsort(self.after)
 
     @cached_property
     def areas(self) -> Array:
@@ -111,9 +88,8 @@ class Rings:
         return np.asarray((total[self.begin + self.size] - total[self.begin]) / 2)
 
 
-@dataclass(frozen=True, eq=False)
 class Outline(Rings):
-    """All vertices of polygons, and the polygon that each ring belongs to; its outer ring comes first.
+    """All vertices of polygons; `owner`: the polygon of each ring, whose outer one comes first.
 
     `neck`, (k,): where the vertex stands for a neck of `raster`. `cell`, m: the longer side of the cells
     that it is the outline of.
@@ -177,7 +153,7 @@ def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Check:
-    """What is wrong with a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
+    """Validity checks of a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
 
     `allowed`, (k,) m: the tolerance at each. `found` counts what is wrong where that is still the whole one.
     """
@@ -191,7 +167,7 @@ class _Check:
 
     @cached_property
     def side(self) -> IntArray:
-        """Which side of the drawing, by its first vertex, stands for each vertex of the outline, (k,)."""
+        """Side of the drawing, by its first vertex, that stands for each vertex of the outline, (k,)."""
         drawing, ring = self.drawing, self.outline.ring
         order = np.argsort(drawing.source, kind="stable")
         place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
@@ -292,7 +268,9 @@ def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
         keep = ~neck[before]
         points, neck, ring, source = points[keep], neck[keep], ring[keep], source[: keep.sum()]
         begin = np.searchsorted(ring, np.arange(len(lines)))
-    return Outline(points, begin, source, np.asarray(owner), neck, cell)
+    outline = Outline(points, begin, source)
+    outline.owner, outline.neck, outline.cell = np.asarray(owner), neck, cell
+    return outline
 
 
 def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:

@@ -17,19 +17,26 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.files.atomic import written
+from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
-from robocov_app.formats.foreign import ForeignMap
 from robocov_app.formats.geometry.cells import not_held
+from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
-from robocov_app.formats.geometry.enclosing import foreign_map
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
-from robocov_app.formats.geometry.primitives import with_numbers
-from robocov_app.formats.geometry.shapes import Line, Shapes
-from robocov_app.formats.options import Exporter, ExportReport, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.svg import path as paths
-from robocov_app.formats.svg.path import affine, composed, length, moved, numbers, stretch
-from robocov_app.formats.svg.style import INHERITED, Style, StyleSheet, inherited, is_hidden, is_painted
-from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_svg_tree
+from robocov_app.formats.svg.path import (
+    Style,
+    StyleSheet,
+    affine,
+    composed,
+    inherited,
+    length,
+    moved,
+    numbers,
+    stretch,
+)
+from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
 from robocov_app.render.theme import DARK, LIGHT, Theme
 
 DIGITS = 3
@@ -47,15 +54,10 @@ _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "roun
 _EVEN = 1.0 + 1e-6
 
 
-def is_svg(path: Path, head: bytes) -> bool:
-    """Return whether a file that begins with `head` looks like SVG; compressed SVG does by its name."""
-    return _ROOT.search(head) is not None or path.suffix.lower() == ".svgz"
-
-
 def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     """Return the map that an SVG file draws.
 
-    Filled shapes are areas, by their fill rule: solid, but for the boundary (see `enclosing.foreign_map`;
+    Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`;
     names are ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes
     that are only stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn
     more sharply than their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
@@ -65,7 +67,7 @@ def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     attribute ``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own
     scale.
     """
-    root, where = read_svg_tree(path)
+    root, where = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
     shapes = Shapes(where, options)
     drawing = _Drawing(root, shapes)
     try:
@@ -133,7 +135,7 @@ def _labels(element: Element) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where an element stands, and what it has from the groups around it.
+    """Transform and inherited attributes of an element.
 
     `matrix`, (3, 3): from its units to metres. `labels`: the innermost first. `width`, `height`: of the
     viewport.
@@ -148,7 +150,7 @@ class _Place:
 
     @property
     def diagonal(self) -> float:
-        """What a percentage of a length in no direction is of (SVG 2, section 8.9)."""
+        """Reference length of a percentage in no direction (SVG 2, section 8.9)."""
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
 
     def shifted(self, x: float, y: float) -> _Place:
@@ -184,7 +186,7 @@ class _Drawing:
     def draw(self, matrix: Array, width: float, height: float) -> None:
         """Add all that is drawn, by the matrix and viewport of `_page`."""
         self._require_few()
-        style = inherited(INHERITED, self.sheet.of(self.root))
+        style = inherited(paths.INHERITED, self.sheet.of(self.root))
         labels = tuple(dict.fromkeys(_labels(self.root)))
         for child in self.root.children:
             self._draw(child, _Place(matrix, style, labels, width, height))
@@ -241,7 +243,7 @@ class _Drawing:
         if outer.depth > DEEPEST:
             element.refuse(self.where, f"nested deeper than {DEEPEST}, but less was wanted")
         own = self.sheet.of(element)
-        if is_hidden(own):
+        if paths.is_hidden(own):
             self.shapes.leave_out("hidden element")
             return
         self.clipped += any(own.get(name, "none") != "none" for name in ("clip-path", "mask"))
@@ -294,8 +296,8 @@ class _Drawing:
         visible = style["visibility"].lower() not in ("hidden", "collapse")
         if visible and not self.shapes.wants(place.labels):
             return
-        filled = is_painted(style, "fill") and element.tag != "line"
-        stroked = is_painted(style, "stroke")
+        filled = paths.is_painted(style, "fill") and element.tag != "line"
+        stroked = paths.is_painted(style, "stroke")
         if not (visible and (filled or stroked)):
             self.shapes.leave_out("hidden element")
             return
@@ -304,7 +306,7 @@ class _Drawing:
         parts = self._points(element, place)
         rings = [moved(place.matrix, points) for points, _ in parts]
         rule: Rule = "evenodd" if style["fill-rule"].lower() == "evenodd" else "nonzero"
-        if filled and rings and self.shapes.add_outline(rings, place.labels, rule=rule, at=at):
+        if filled and rings and self.shapes.add_outline(rings, place.labels, rule=rule, at=at, thing=""):
             return
         if stroked:
             self._strokes(parts, place, at)
@@ -403,13 +405,10 @@ def _rectangle(element: Element, place: _Place, tolerance: float) -> Array | Non
 
 
 IMPORTER = Importer(
-    name="svg",
-    title="SVG drawings: filled shapes, strokes as walls",
-    suffixes=(".svg", ".svgz"),
-    sniff=is_svg,
-    read=read_svg,
+    "svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
+    lambda path, head: _ROOT.search(head) is not None or path.suffix.lower() == ".svgz", read_svg,
     options=frozenset({"scale", "thickness", "outlines", "boundary", "around", "only", "skip"}),
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -516,9 +515,6 @@ def _plain(text: str) -> str:
 
 
 EXPORTER = Exporter(
-    name="svg",
-    title="SVG at true scale: boundary and obstacles by their ids",
-    suffixes=(".svg",),
-    write=_write,
+    "svg", "SVG at true scale: boundary and obstacles by their ids", (".svg",), _write,
     options=frozenset({"digits", "scale"}),
-)
+)  # fmt: skip

@@ -43,7 +43,7 @@ class Arguments(JsonOption):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of checking a map: a report or an error."""
+    """Outcome of checking a map: a report or an error."""
 
     name: str
     report: MapReport | None

@@ -23,11 +23,8 @@ def command(options: Arguments) -> None:
     for name in bundled_maps():
         environment = load_map(name)
         low_x, low_y, high_x, high_y = environment.region.bounds
-        starts, density, description = (
-            list(environment.starts),
-            density_kind(environment),
-            environment.description,
-        )
+        starts, description = list(environment.starts), environment.description
+        density = density_kind(environment)
         rows.append(
             {
                 "name": name,

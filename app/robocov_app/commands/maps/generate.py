@@ -133,9 +133,8 @@ def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
             raise InputError(f"{out}: the folder is not empty; another --out, or --overwrite, was wanted")
     elif out is not None:
         if out.is_dir() or not out.name:
-            raise InputError(
-                f"--out: {str(out)!r}, but the name of a file was wanted (--count makes a folder)"
-            )
+            wanted = "the name of a file was wanted (--count makes a folder)"
+            raise InputError(f"--out: {str(out)!r}, but {wanted}")
         require_fresh(out, "another --out", overwrite=overwrite)
 
 
