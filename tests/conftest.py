@@ -34,7 +34,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # examples differ in cost by orders of magnitude, and machines are shared: time says nothing here
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
-# the same examples every time, so that a failure is the fault of the change that is tested; a quarter of them
+# the same examples every time, so that a failure is the fault of the change that is tested; a sixth of them
 # unless `pytest --hypothesis-profile=thorough` asks for all, or `=explore` for new ones
 settings.register_profile("thorough", derandomize=True, database=None, **QUIET)
 settings.register_profile("explore", max_examples=500, print_blob=True, **QUIET)
@@ -47,7 +47,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         return
     for test in {item.function for item in items if item.get_closest_marker("hypothesis")}:  # type: ignore[attr-defined]
         wanted = getattr(test, "_hypothesis_internal_use_settings", None) or settings.default
-        test._hypothesis_internal_use_settings = settings(wanted, max_examples=-(-wanted.max_examples // 4))
+        test._hypothesis_internal_use_settings = settings(wanted, max_examples=-(-wanted.max_examples // 6))
 
 
 SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))

@@ -1,1 +1,1 @@
-"""What people touch of robocov: the command line, pictures, frames and films."""
+"""Application layer of robocov: command line, pictures, frames and films."""

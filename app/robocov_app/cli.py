@@ -16,36 +16,14 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 
+from robocov_app.commands import COMMANDS
+
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 TRACEBACK = "ROBOCOV_TRACEBACK"  # environment variable; where it is set, errors come with their traceback
 # commands that call kernels, see `robocov.compiled`
-_COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "replay", "cost", "optimum"}
+_COMPILING = {"run", "compare", "sweep", "demo", "report", "paper", "replay", "cost", "optimum", "benchmark"}
 _LONGEST = 1000  # characters of an error that are told
-
-COMMANDS = {
-    # name: (module, one line)
-    "demo": ("demo", "the interactive window: watch, touch, compare, go back in time"),
-    "run": ("run", "one headless run, everything saved in a folder: record, cost, pictures, film"),
-    "compare": ("compare", "several controllers from the same starts, side by side"),
-    "sweep": ("sweep", "many runs in parallel, from a study file; resumable; one table of all"),
-    "replay": ("replay", "a saved run or comparison again: in the window, or as frames and a film"),
-    "report": ("report", "one HTML page of runs, comparisons and sweeps, with a replay; no network"),
-    "metrics": ("metrics", "covered and visible area, energy, ways, connectivity, clearance of saved runs"),
-    "paper": ("paper", "the paper's figures again, and its claims tested over many maps"),
-    "edit": ("edit", "the map editor: draw, check, try; nothing is lost"),
-    "check": ("check", "validate maps; area, free area, components, narrowest gap"),
-    "maps": ("maps", "list the bundled maps"),
-    "generate": ("generate", "random maps by a seed: scattered obstacles, towns, rooms, mazes, caves"),
-    "controllers": ("controllers", "list the controllers and their gains"),
-    "cost": ("cost", "the exact coverage cost (22) of given positions"),
-    "optimum": ("optimum", "the best positions with the whole map known: a reference for the cost"),
-    "bench": ("bench", "speed, as ratios to yardsticks in the same run"),
-    "import": ("import_map", "turn a foreign map file into a map JSON"),
-    "export": ("export_map", "write a map in a foreign format: SVG, GeoJSON, WKT, ROS, MovingAI, PNG"),
-    "lesson": ("lesson", "check a lesson for the window: its form, and that every chapter ends"),
-    "schema": ("schema", "print the JSON Schema of map files"),
-}
 
 _EXAMPLES = (
     ("robocov demo", "the interactive window; robocov demo --tour plays a lesson of eleven chapters"),
@@ -54,13 +32,20 @@ _EXAMPLES = (
     ("robocov run rooms --controller mine.py:MyController", "a control law of your own"),
 )
 
+_FIRST_STEPS = """\
+robocov demo --tour                           a lesson in the window
+robocov run rooms --video --out first-run     one run, with pictures and a film
+robocov edit mine.json                        draw a map
+robocov handbook                              tutorials, guides, reference
+robocov --help                                all commands"""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run `robocov` with the given arguments and return its exit status."""
     _prepare_output()
     given = sys.argv[1:] if arguments is None else arguments
     if not given or given[0] in ("-h", "--help", "help"):
-        print(_overview())
+        print(_overview() if given or not sys.stdout.isatty() else _FIRST_STEPS)
         return OK if given else BAD_INPUT
     if given[0] == "--version":
         from robocov import __version__

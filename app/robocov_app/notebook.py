@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 
+from robocov.controllers import make_controller
 from robocov.cost import LATTICE, CoverageResult
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, counted, shown
+from robocov.mapfile import load_map, save_map
 from robocov.metrics import CostHistory, cost_history
 from robocov.record import Record
 from robocov.robots import Team
+from robocov.simulation import Simulation
 from robocov_app.figures.files import figure_png
 from robocov_app.render.camera import length_label, round_length
 from robocov_app.render.density import mean_label
@@ -25,6 +32,7 @@ from robocov_app.report.pictures import Frame, map_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_html
 from robocov_app.report.theme_css import theme_rules
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost
+from robocov_app.web.live import LiveWindow
 
 if TYPE_CHECKING:  # pages of HTML need no matplotlib
     from matplotlib.axes import Axes
@@ -175,6 +183,28 @@ def _history_to_show(record: Record) -> CostHistory | None:
 def record_png(record: Record) -> bytes:
     """Return a run's page."""
     return figure_png(_figures().plot_trajectories(record))
+
+
+def show(
+    map: str | Path | Environment,  # noqa: A002 - as everywhere else
+    *,
+    robots: int = 6,
+    controllers: Sequence[str] = ("rapf",),
+    seed: int = 0,
+    height: int = 620,
+) -> LiveWindow | Record:
+    """Return the interactive window of a map, live; without ``robocov[web]`` a replay of one minute."""
+    if find_spec("websockets") is None:
+        environment = map if isinstance(map, Environment) else load_map(map)
+        starts = environment.start().sample(robots, seed=seed)
+        return Simulation(environment, make_controller(controllers[0]), starts=starts).run(60.0)
+    options = ["--robots", str(robots), "--seed", str(seed), "--controllers", *controllers]
+    if not isinstance(map, Environment):
+        return LiveWindow(["demo", str(map), *options], height)
+    with TemporaryDirectory() as folder:  # the window has read it when it is there
+        file = Path(folder) / "map.json"
+        save_map(map, file)
+        return LiveWindow(["demo", str(file), *options], height)
 
 
 def _checked(axes: Any) -> Any:

@@ -162,7 +162,7 @@ _READ = {"import": _import, "map": _map, "study": _study, "check": _check, "misb
 
 def _load() -> None:
     """Load what reading needs, so that neither time nor memory for that counts."""
-    import robocov_app.commands.check
+    import robocov_app.commands.maps.check
     import robocov_app.formats
     import robocov_app.sweep.study_file  # noqa: F401
 

@@ -14,7 +14,7 @@ from robocov.environment import (
 )
 from robocov.errors import MapError
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.edits import boolean, clipboard, create, properties, simplify, transform, vertices
+from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
@@ -193,7 +193,7 @@ def changes(draw, sketch):
         lambda: create.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
         lambda: create.disc_start_drawn(sketch, a, length),
         lambda: create.points_start_drawn(sketch, [a, b]),
-        lambda: create.uniform_start_added(sketch),
+        lambda: create.anywhere_added(sketch),
         lambda: transform.moved(sketch, selection, dx, dy),
         lambda: transform.rotated(sketch, selection, degrees, draw(st.sampled_from([None, a]))),
         lambda: transform.scaled(sketch, selection, factor, draw(st.sampled_from([None, 1.5])), a),
@@ -233,8 +233,8 @@ def changes(draw, sketch):
         lambda: boolean.offset(sketch, selection, draw(st.sampled_from([length, -length]))),
         lambda: boolean.clipped(sketch, selection),
         lambda: boolean.repaired(sketch, selection),
-        lambda: simplify.simplified(sketch, selection, length),
-        lambda: simplify.straightened(sketch, selection, 20.0),
+        lambda: vertices.simplified(sketch, selection, length),
+        lambda: vertices.straightened(sketch, selection, 20.0),
         lambda: transform.aligned(sketch, selection, side),
         lambda: transform.distributed(sketch, selection, axis),
         lambda: clipboard.pasted(sketch, clipboard.copied(sketch, selection), a),

@@ -1,7 +1,10 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import binomtest
 
 from robocov.errors import ParameterError
 from robocov_app.figures.statistics import (
@@ -9,7 +12,8 @@ from robocov_app.figures.statistics import (
     bootstrap,
     bootstrap_by,
     mean_with_t_interval,
-    paired,
+    median_time,
+    share,
     spread,
 )
 
@@ -64,18 +68,6 @@ def test_a_t_interval_of_four_values_holds_the_truth_as_often_as_it_says() -> No
     assert str(mean_with_t_interval([1.0, 1.0, 1.0])) == "1"  # three times the same is one value
 
 
-def test_pairs() -> None:
-    a, b = np.array([1.0, 2.0, 3.0, 4.0, 5.0]), np.array([2.0, 4.0, 3.0, 8.0, 4.0])
-    found = paired(a, b)
-    assert found.pairs == 5
-    assert found.ratio.estimate == 0.5
-    assert found.difference.estimate == -1.0
-    assert found.wins.estimate == pytest.approx(0.7)  # three wins and a tie
-    back = paired(b, a)
-    assert back.wins.estimate == pytest.approx(0.3)
-    assert back.difference.low == pytest.approx(-found.difference.high)
-
-
 def test_one_cluster_has_no_interval() -> None:
     for found in (
         bootstrap([1.0, 2.0], clusters=["a", "a"]),
@@ -106,8 +98,6 @@ def test_spread() -> None:
         (lambda: bootstrap([[1.0]]), "values: shape"),
         (lambda: bootstrap([1.0, np.nan]), r"values\[1\]: nan"),
         (lambda: bootstrap([1.0], clusters=["a", "b"]), "clusters: 2 labels of 1 values"),
-        (lambda: paired([1.0], [1.0, 2.0]), "pairs: 1 and 2"),
-        (lambda: paired([1.0], [0.0]), "b: 0, but values above 0"),
         (lambda: spread([1.0]), "values: 1, but at least two"),
         (lambda: spread([-1.0, 1.0]), "their mean is 0"),
         (lambda: bootstrap_by(len, []), "clusters: none"),
@@ -116,3 +106,31 @@ def test_spread() -> None:
 def test_what_cannot_be_taken_is_refused(call, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         call()
+
+
+@given(st.integers(1, 200), st.integers(1, 3), st.booleans())
+def test_what_is_always_or_never_so_has_an_exact_bound(maps: int, runs: int, always: bool) -> None:
+    found = share([always] * (maps * runs), [k // runs for k in range(maps * runs)])
+    exact = binomtest(maps * always, maps).proportion_ci(0.9, "exact")  # one of its two sides
+    wanted = (1.0, exact.low, 1.0) if always else (0.0, 0.0, exact.high)
+    assert (found.estimate, found.low, found.high) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_share_between_is_drawn_by_clusters() -> None:
+    values, clusters = [0.0, 0.0, 1.0, 0.5, 1.0, 1.0], [0, 0, 1, 1, 2, 2]
+    assert share(values, clusters) == bootstrap(values, "mean", clusters)
+
+
+@given(st.lists(st.integers(1, 20), max_size=12), st.lists(st.integers(1, 20), max_size=12))
+def test_the_median_of_times_is_the_product_limit(ended: list[int], censored: list[int]) -> None:
+    if not ended + censored:
+        return
+    left, wanted = Fraction(1), np.inf
+    for time in sorted(set(ended)):
+        at_risk = sum(each >= time for each in ended + censored)
+        left *= 1 - Fraction(ended.count(time), at_risk)
+        if left <= Fraction(1, 2):
+            wanted = time
+            break
+    found = median_time(ended, censored)
+    assert found == wanted or abs(float(left) - 0.5) < 1e-9  # in floats a half may be missed by rounding

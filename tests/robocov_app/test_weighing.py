@@ -66,6 +66,7 @@ def test_check_and_maps(maps, capsys) -> None:
     assert {row["density"] for row in rows} == {None, "polygons"}
 
 
+@pytest.mark.slow
 def test_a_run_keeps_the_density_and_says_so(maps, capsys, tmp_path) -> None:
     _, heavy, _ = maps
     out = tmp_path / "out"

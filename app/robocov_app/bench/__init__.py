@@ -1,1 +1,1 @@
-"""How fast robocov is: each time beside a yardstick that is taken in turn with it."""
+"""Benchmarks of speed: each time beside a yardstick that is taken in turn with it."""

@@ -21,7 +21,7 @@ class Row:
     part: str
     name: str
     parameters: Parameters
-    """What varies: ``{"robots": 50}``."""
+    """Varied quantities, as in ``{"robots": 50}``."""
     seconds: float
     """Median, as of the yardstick in the same run."""
     yardstick: str | None = None

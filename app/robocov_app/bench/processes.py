@@ -54,7 +54,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "import robocov": ("-c", "import robocov"),
     "import robocov, all of it": ("-c", EVERYTHING),
 }
-"""What people do first, and the words of the interpreter for it."""
+"""First actions of a user, with the interpreter's arguments for each."""
 
 GOALS = {"robocov --help": 2.0}
 

@@ -1,6 +1,6 @@
-"""What a plot shows of the world: the map, and a whole run in it."""
+"""World layers of a plot: the map, and a whole run in it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch, Polygon
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import ScaledTranslation
 
 from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment
@@ -64,7 +65,6 @@ def draw_map(
 
 
 def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
-    """Draw the path of a moving obstacle, its shape in a colour of its own, and an arrow where it heads."""
     shape = Polygon(
         np.asarray(obstacle.polygon.exterior.coords),
         facecolor=tone(theme.moving_obstacle) if not obstacle.polygon.interiors else "none",
@@ -129,6 +129,11 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     failed = _failed(record)
     robots = [wreck_colour(theme) if failed[robot] else robots[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
+    if record.steering is not None:
+        facing = {
+            robot: record.steering[-1, robot, 0] for robot in working[record.team.turns[working]].tolist()
+        }
+        _draw_noses(axes, last, facing, dict(zip(there.tolist(), drawn, strict=True)), theme)
     if has_goals(record):
         radius = np.array(drawn)[np.searchsorted(there, working)]
         aims = record.goals[-1][working]
@@ -170,6 +175,21 @@ def draw_robots(
     return drawn
 
 
+def _draw_noses(
+    axes: Axes, places: Array, facing: Mapping[int, float], radii: Mapping[int, float], theme: Theme
+) -> None:
+    """Draw where robots face, rad, as triangles at discs of radii in points, both by row."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    for robot, heading in facing.items():
+        off = 1.25 * radii[robot] / 72.0  # inches
+        shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), figure.dpi_scale_trans)
+        where: Any = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False}
+        marker = (3, 0, float(np.degrees(heading)) - 90.0)
+        size = 0.9 * radii[robot]
+        axes.plot(*places[robot], marker=marker, ms=size, mec="none", c=tone(theme.ink), ls="", **where)
+
+
 def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
     if paper:
         return [theme.trajectory] * n
@@ -209,7 +229,6 @@ def _start_style(theme: Theme, size: float) -> dict[str, Any]:
 
 
 def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
-    """Return a plus for centroids, or a times sign for goals of another kind."""
     return {
         "linestyle": "none",
         "label": CENTROID if plus else GOAL,
@@ -253,7 +272,6 @@ def wreck_colour(theme: Theme) -> Colour:
 
 
 def _failed(record: Record) -> BoolArray:
-    """Return which robots had failed at the end, (n,) bool."""
     return np.asarray(record.present[-1] & ~record.working[-1])
 
 

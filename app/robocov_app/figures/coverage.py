@@ -63,7 +63,7 @@ class Moment:
 
 
 class _Rooms(NamedTuple):
-    """Where things stand on a page, in pixels."""
+    """Boxes of a page's parts, in pixels."""
 
     curves: Box | None
     maps: Box
@@ -81,10 +81,8 @@ def plot_coverage(
 ) -> Figure:
     """Plot cost curves, and maps of the distance to the nearest robot, all in one scale of colours.
 
-    `curves`: may be empty: there are only maps then. `moments`: at least one. `size`, (width, height) or
-    None: of the page; by default what suits the shapes of the maps. One that is too small for both, below 720
-    x 400, has the curves alone. `times`: mean times, s, where robots are not equally fast; they stand below
-    the curves. Raises ParameterError when there are no moments.
+    `curves` may be empty, `moments` not: that raises ParameterError. `size`: (width, height) of the page;
+    below 720 x 400 it has the curves alone. `times`: mean times, s, where robots are not equally fast.
     """
     check_some("moments", moments)
     if curves and size is not None and (size[0] < _LEAST[0] or size[1] < _LEAST[1]):
@@ -111,10 +109,8 @@ def plot_coverage(
         _draw_moment(axes, moment, limit, theme, box, s)
         page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
         page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
-    (left, _, width, _), _ = panels[0]
-    right = max(box[0] + box[2] for box, _ in panels)
-    bottom = max(box[1] + box[3] for box, _ in panels)
-    page.footer(handles, left, right, bottom, width / (high_x - low_x), rooms.maps[0])
+    boxes = [box for box, _ in panels]
+    page.footer(handles, boxes, boxes[0][2] / (high_x - low_x), rooms.maps[0])
     return page.figure
 
 
@@ -141,7 +137,6 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
 
 
 def _limit(moments: Sequence[Moment]) -> float:
-    """Return the length, m, at which the scale of colours ends."""
     largest = [moment.field.largest for moment in moments if np.isfinite(moment.field.largest)]
     return round_limit(max(largest, default=1.0))
 
@@ -169,7 +164,6 @@ def _laid_out(
     beside: bool,
     handles: Sequence[Artist],
 ) -> tuple[Page, _Rooms]:
-    """Return the page, and its rooms for curves and maps: beside or below each other."""
     page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
     s, margin, below = page.scale, page.margin, with_curves and not beside
     part = 0.5 if with_curves and beside else 1.0
@@ -197,25 +191,18 @@ def _draw_all_curves(
     page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str
 ) -> None:
     """Draw the mean distances, and if there are any the mean times: below, or beside them in a wide room."""
-    left, top, width, height = room
+    s, (left, top, width, height) = page.scale, room
     across = bool(times) and width > 2.4 * height
     drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
     for k, (some, words, unit) in enumerate(drawn):
         if across:
-            place = left + k * width / 2, top, width / 2, height
+            x, y, wide, high = left + k * width / 2, top, width / 2, height
         else:
-            place = left, top + k * height / len(drawn), width, height / len(drawn)
-        axes = page.axes(_curves_box(page, some, place, unit))
+            x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
+        longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in some)
+        right = min(26 * s + longest, 0.45 * wide)
+        axes = page.axes((x + 34 * s, y + 34 * s, wide - 34 * s - right, high - 34 * s - 50 * s))
         draw_curves(axes, some, page.theme, label=words, unit=unit)
-
-
-def _curves_box(page: Page, curves: Sequence[Curve], room: Box, unit: str) -> Box:
-    """Return the box of the axes in the room for curves with all of their labels."""
-    s = page.scale
-    left, top, width, height = room
-    longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-    right = min(26 * s + longest, 0.45 * width)
-    return left + 34 * s, top + 34 * s, width - 34 * s - right, height - 34 * s - 50 * s
 
 
 def _panels(room: Box, count: int, aspect: float, above: float, gap: float) -> list[tuple[Box, float]]:

@@ -42,11 +42,7 @@ def draw_curves(
     unit: str = "m",
     weight: float = 1.0,
 ) -> None:
-    """Draw curves with their labels at their right ends, pushed apart where they would overlap.
-
-    The first is the widest and lowest: curves that lie on each other are still all seen. `bands` are what
-    lies around each curve, as quartiles around a median; a `weight` below 1 is for small pictures.
-    """
+    """Draw curves, the first lowest and widest, and quartile `bands`; labels at the ends are pushed apart."""
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
     around = list(bands or [None] * len(curves))
     _frame(axes, curves, theme, [band for band in around if band is not None], label)
@@ -105,7 +101,6 @@ def _draw_end_labels(
 def _frame(
     axes: Axes, curves: Sequence[Curve], theme: Theme, bands: Sequence[tuple[Array, Array]], label: str
 ) -> None:
-    """Set limits, units and a quiet grid."""
     lines = [*(np.asarray(curve[3]) for curve in curves), *(edge for band in bands for edge in band)]
     values = np.concatenate([line[np.isfinite(line)] for line in lines])
     times = np.concatenate([np.asarray(curve[2]) for curve in curves])

@@ -52,11 +52,9 @@ def figure_png(figure: Figure) -> bytes:
 
 
 def save_figure(figure: Figure, path: Path | str) -> None:
-    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all.
+    """Write a figure as PNG, SVG or PDF, by the path's suffix, whole or not at all; without a date.
 
-    A PNG has exactly the page's pixels. An SVG holds its letters as outlines, a PDF the fonts themselves, so
-    that both look the same everywhere. None holds a date: the same plot gives the same bytes. Raises
-    OutputError when the file cannot be written; ParameterError when the suffix is another.
+    Raises OutputError when the file cannot be written; ParameterError when the suffix is another.
     """
     kind = figure_kind(Path(path))
     with written(Path(path)) as part:

@@ -102,10 +102,9 @@ def plot_gain_grid(
     *,
     scale: float | None = None,
 ) -> Figure:
-    """Plot values over a grid of two gains as a heat map with the numbers in it; darkest is highest.
+    """Plot values (rows, columns) over a grid of two gains as a heat map with its numbers; nan for none.
 
-    `values` (rows, columns) are nan where there is none; `first` and `second` are the gains' values,
-    ascending, None for no limit. Raises ParameterError when the values have another shape, or none is finite.
+    `first`, `second`: the gains' values, ascending, None for no limit. ParameterError: another shape.
     """
     theme = theme_named(theme)
     if values.shape != (len(second), len(first)) or not np.isfinite(values).any():
@@ -115,7 +114,9 @@ def plot_gain_grid(
         )
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     colours = theme.quiet_heat
-    decimals = _decimals(low, high)
+    # numbers tell three digits, and a tenth of the way between the lowest and the highest
+    digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
+    decimals = min(max(0, *digits), 4) if digits else 2
     if axes is None:
         axes = _page_axes(theme, size or (700, 480), title, scale)
     for row, column in np.argwhere(np.isfinite(values)).tolist():
@@ -136,12 +137,6 @@ def plot_gain_grid(
     quiet_axes(axes, theme, x, y)
     axes.tick_params(length=0.0)
     return figure_of(axes)
-
-
-def _decimals(low: float, high: float) -> int:
-    """Return with how many decimals numbers tell three digits, and a tenth of the way between them apart."""
-    digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
-    return min(max(digits, default=2), 4) if max(digits, default=2) > 0 else 0
 
 
 def _page_axes(theme: Theme, size: tuple[int, int], title: str, scale: float | None) -> Axes:
@@ -174,18 +169,15 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
         end = high + 3 * room if unlimited else high
         axes.set_xlim(low - room, end + room)
     null = [end] if unlimited else []
-    ticks = levels.tolist() if len(levels) <= 8 else _even_ticks(axes, low, float(levels[-1]))
+    ticks = levels.tolist()
+    if len(levels) > 8:
+        locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
+        ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
     axes.xaxis.set_major_locator(FixedLocator([*ticks, *null]))
     axes.xaxis.set_minor_locator(NullLocator())
     texts = [value_text(value, digits=4) for value in ticks]
     axes.set_xticklabels([*texts, *("none" for _ in null)])
     return end if unlimited else None
-
-
-def _even_ticks(axes: Axes, low: float, high: float) -> list[float]:
-    logarithmic = axes.get_xscale() == "log"
-    locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
-    return [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
 
 
 def _draw_dependence(

@@ -26,11 +26,7 @@ _LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on
 
 
 class AtHeight(NamedTuple):
-    """The best place at one height.
-
-    `height`, m: 0 and inf stand for the limits. `x`, `y` in m. `from_centroid` in m. `missed`: what part of
-    the best place's value a sensor over the centroid misses; nan in the limits.
-    """
+    """The best place, m, at a height, m; `missed`: the part of its value missed over the centroid."""
 
     height: float
     x: float
@@ -69,9 +65,8 @@ def plot_heights(
 ) -> Figure:
     """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
 
-    At the left the whole cell, in the middle what happens in it, enlarged, and at the right how far the
-    optimum is from the centroid. `vertices`, m: of a convex cell. `size`, (width, height) or None: by default
-    1080 x 440. `scale`: of texts and lines; None for what suits the size.
+    From left to right: the convex cell of `vertices`, m; what happens in it, enlarged; how far the optimum is
+    from the centroid. `size`: (width, height), by default 1080 x 440; `scale`: of texts and lines.
     """
     theme = theme_named(theme)
     cell = _cell_of(vertices)
@@ -140,7 +135,6 @@ def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) ->
 
 
 def _draw_rays(left: Axes, middle: Axes, window: Box, theme: Theme) -> None:
-    """Draw from the corners of the frame to those of what it holds."""
     x, y, width, height = window
     for part in (0.0, 1.0):
         begin: Any = {"xyA": (x + width, y + part * height), "coordsA": left.transData}

@@ -50,7 +50,5 @@ def plot_maps(
     if title:
         y = first[1] - above - 18 * page.scale
         page.text(title, first[0], y, points=HEADING, bold=True, room=page.room)
-    right = max(box[0] + box[2] for box, _ in panels)
-    bottom = max(box[1] + box[3] for box, _ in panels)
-    page.footer(entries, first[0], right, bottom, first[2] / wide)
+    page.footer(entries, [box for box, _ in panels], first[2] / wide)
     return page.figure

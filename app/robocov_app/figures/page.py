@@ -143,11 +143,7 @@ class Page:
     def panels(
         self, count: int, columns: int, aspect: float, words: float, above: float, top: float, below: float
     ) -> list[tuple[Box, float]]:
-        """Return equal boxes, `aspect` wide by high, in rows, and how wide lines above each may be, px.
-
-        `words`: how wide these would be: slots grow for them as far as there is room; `above`: their height.
-        `top` and `below` stay free.
-        """
+        """Return equal boxes, px, and how wide lines above each may be: `words` where there is room."""
         rows = -(-count // columns)
         gap = 14 * self.scale
         widest = (self.size[0] - self.margin) / columns - self.margin
@@ -206,19 +202,12 @@ class Page:
         return 36 * self.scale + height + 14 * self.scale
 
     def footer(
-        self,
-        handles: Sequence[Artist],
-        left: float,
-        right: float,
-        bottom: float,
-        zoom: float,
-        begin: float | None = None,
+        self, handles: Sequence[Artist], boxes: Sequence[Box], zoom: float, begin: float | None = None
     ) -> None:
-        """Draw the scale bar, at `zoom` px/m, and the legend: beside each other or below.
-
-        `left`, `right`, `bottom`: edges of what is plotted above, px; nothing is left of `begin`.
-        """
+        """Draw the scale bar, at `zoom` px/m, and the legend below `boxes`; nothing left of `begin` px."""
         begin = self.margin if begin is None else begin
+        left, right = boxes[0][0], max(x + width for x, _, width, _ in boxes)
+        bottom = max(y + height for _, y, _, height in boxes)
         columns, width, _ = self._legend_extent(handles, begin)
         middle, end = bottom + 24 * self.scale, self.size[0] - self.margin
         if columns == len(handles) and width <= self._beside_bar(begin):

@@ -89,20 +89,15 @@ def plot_cost_bands(
                 f"{len(band.time)} columns was wanted"
             )
         if not np.isfinite(band.values).any():
-            raise ParameterError(
-                f"band {shown(band.label)}: no finite value, but at least one in each was wanted"
-            )
+            wanted = "at least one in each was wanted"
+            raise ParameterError(f"band {shown(band.label)}: no finite value, but {wanted}")
     theme = theme_named(theme)
     looks = styles_of([band.controller for band in bands]) if styles is None else styles
-    quarters = [quartiles(band.values) for band in bands]
-    curves = [
-        (band.label, band.controller, band.time, middle)
-        for band, (_, middle, _) in zip(bands, quarters, strict=True)
-    ]
-    around = [
-        (low, high) if len(band.values) > 1 else None
-        for band, (low, _, high) in zip(bands, quarters, strict=True)
-    ]
+    curves, around = [], []
+    for band in bands:
+        low, middle, high = quartiles(band.values)
+        curves.append((band.label, band.controller, band.time, middle))
+        around.append((low, high) if len(band.values) > 1 else None)
     page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
     s = page.scale
     most = 0.5 * page.size[0] - 30 * s
@@ -130,11 +125,10 @@ def plot_final_costs(
     label: str = DISTANCE,
     origin: float = 0.0,
 ) -> Figure:
-    """Plot samples as boxes on their side, every value as a point, in groups such as maps.
+    """Plot samples as boxes on their side, every value as a point, in groups such as maps, from the top.
 
-    Boxes span the quartiles, whiskers 1.5 times as much; a sample of fewer than `FEW` values has points and
-    median alone. `rows` are groups from top to bottom. A height of None is what they need. The axis begins at
-    `origin` unless all values are far from it.
+    Boxes span the quartiles, whiskers 1.5 times as much; below `FEW` values only points and median stand.
+    A height of None is what they need. The axis begins at `origin` unless all values are far from it.
     """
     samples = [sample for _, group in rows for sample in group]
     _check_samples(samples)
@@ -152,9 +146,12 @@ def plot_final_costs(
     low, high = float(values.min()), float(values.max())
     axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
     even_ticks(axes.xaxis, 6)
+    box, ink = axes.get_position(), tone(theme.ink)
+    style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": ink}
     for (name, _), head in zip(rows, heads, strict=True):
         if name:
-            _draw_heading(axes, name, head, theme)
+            left = -box.x0 / box.width + 0.01
+            axes.text(left, head, name, transform=axes.get_yaxis_transform(), **style)
     return figure_of(axes)
 
 
@@ -181,8 +178,7 @@ def plot_paired(
     known = curve_styles(each.controller for each in pairs)
     looks = [known[each.controller] for each in pairs] if styles is None else styles
     for each, look, place in zip(pairs, looks, places, strict=True):
-        colour = tone(look.colour(theme))
-        _draw_points(axes, np.sort(each.ratios), place, colour, theme)
+        _draw_points(axes, np.sort(each.ratios), place, tone(look.colour(theme)), theme)
         ratio = each.interval
         if np.isfinite(ratio.low):
             line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
@@ -219,9 +215,8 @@ def _check_samples(samples: Sequence[Sample]) -> None:
     check_some("samples", samples)
     for sample in samples:
         if not np.isfinite(sample.values).any():
-            raise ParameterError(
-                f"sample {shown(sample.label)}: no finite value, but at least one was wanted"
-            )
+            wanted = "at least one was wanted"
+            raise ParameterError(f"sample {shown(sample.label)}: no finite value, but {wanted}")
 
 
 def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[float], float]:
@@ -284,13 +279,6 @@ def _row_frame(
     style: Any = {"markersize": 5.5, "transform": axes.get_yaxis_transform(), "clip_on": False}
     for place, look in zip(places, looks, strict=False):
         axes.plot(aside, place, look.mark, color=tone(look.colour(theme)), **style)
-
-
-def _draw_heading(axes: Axes, name: str, height: float, theme: Theme) -> None:
-    """Write the name of a group at the left edge of the page."""
-    box = axes.get_position()
-    style: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "color": tone(theme.ink)}
-    axes.text(-box.x0 / box.width + 0.01, height, name, transform=axes.get_yaxis_transform(), **style)
 
 
 def ratio_limits(axes: Axes, ratios: Array, theme: Theme) -> None:

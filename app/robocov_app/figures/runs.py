@@ -52,9 +52,8 @@ def plot_trajectories(
 ) -> Figure:
     """Plot a whole run: map, where the robots began, went and ended, and the final Voronoi cells.
 
-    `axes`: where to draw; None makes a page of `size` px with a title. `colours`: those of the paper, or a
-    hue for each robot. `mean_distance`, m, and `mean_time`, s (where robots are not equally fast), are those
-    of the final positions, for the title.
+    `axes`: None makes a page of `size` px. `colours`: those of the paper, or a hue for each robot.
+    `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
     _check_colours(colours)
     theme = theme_named(theme)
@@ -88,9 +87,8 @@ def plot_comparison(
         )
     times = list(mean_times) if mean_times is not None else [None] * len(records)
     if len(times) != len(records):
-        raise ParameterError(
-            f"comparison: {len(records)} runs and {len(times)} mean times, but one time for each was wanted"
-        )
+        wanted = "one time for each was wanted"
+        raise ParameterError(f"comparison: {len(records)} runs and {len(times)} mean times, but {wanted}")
     theme = theme_named(theme)
     bounds = np.array([record.environment.region.bounds for record in records])
     limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
@@ -130,9 +128,8 @@ def plot_comparison(
             page.text(text, left, edge - up, colour=theme.faint, room=room)
     if shared:
         page.text(shared, first[0], first[1] - above - 20 * s, points=HEADING, bold=True, room=page.room)
-    right = max(box[0] + max(box[2], room if one_line else 0.0) for box, _ in panels)
-    bottom = max(box[1] + box[3] for box, _ in panels)
-    page.footer(entries, first[0], right, bottom, first[2] / (limits[2] - limits[0]))
+    taken = [(x, y, max(width, room if one_line else 0.0), height) for (x, y, width, height), _ in panels]
+    page.footer(entries, taken, first[2] / (limits[2] - limits[0]))
     return page.figure
 
 
@@ -146,9 +143,8 @@ def plot_cost(
 ) -> Figure:
     """Plot mean distance against time, each curve named with its final value at its end.
 
-    RAPF is blue and RPF red, as in the paper; curves differ in their dashes as well. `axes`: where to draw;
-    None makes a page of `size` px with a `title`. Raises ParameterError when there are no curves, or one has
-    no finite value.
+    `axes`: None makes a page of `size` px with a `title`. Raises ParameterError when there are no
+    curves, or one has no finite value.
     """
     check_some("curves", curves)
     for label, _, time, values in curves:
@@ -184,7 +180,6 @@ def _map_page(
     facts: str,
     handles: Sequence[Artist],
 ) -> Axes:
-    """Return the axes for one map, on a page with titles, scale bar and legend around."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     aspect = (high_x - low_x) / (high_y - low_y)
     page = Page(size or (1400, 1000), theme, None if size else _SCALE)
@@ -197,10 +192,10 @@ def _map_page(
     room_y = page.size[1] - above - page.footer_height(handles)
     width = min(page.room, room_y * aspect)
     height = width / aspect
-    left, top = (page.size[0] - width) / 2, above + (room_y - height) / 2
-    _titles(page, (left, top, width, height), title, facts)
-    page.footer(handles, left, left + width, top + height, width / (high_x - low_x))
-    return page.map_axes((left, top, width, height), low_x, low_y, high_x, high_y)
+    box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
+    _titles(page, box, title, facts)
+    page.footer(handles, [box], width / (high_x - low_x))
+    return page.map_axes(box, low_x, low_y, high_x, high_y)
 
 
 def _titles(page: Page, box: Box, title: str, facts: str) -> None:

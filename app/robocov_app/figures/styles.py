@@ -1,4 +1,4 @@
-"""How curves of controllers look: colours, dashes and marks, the same in every picture."""
+"""Curve styles of controllers: colours, dashes and marks, the same in every picture."""
 
 import itertools
 from collections.abc import Iterable, Sequence

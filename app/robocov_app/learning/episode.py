@@ -58,7 +58,7 @@ class Learner:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What came of an action: rewards, (n,), and how long each robot touched something, (n,) s."""
+    """Outcome of an action: rewards, (n,), and how long each robot touched something, (n,) s."""
 
     rewards: Array
     contact: Array
@@ -208,7 +208,7 @@ class Episode:
 
     @property
     def cycle(self) -> int:
-        """How many actions there were."""
+        """Number of actions so far."""
         return len(self.trail) - 1
 
     def observations(self) -> Rows:

@@ -1,4 +1,4 @@
-"""What a learner is told of what a robot knows: one row of numbers from -1 to 1 for each robot."""
+"""Observation vectors of learners: one row of numbers from -1 to 1 for each robot."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,7 +23,7 @@ MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
 
 @dataclass(frozen=True)
 class ObservationLayout:
-    """Which numbers an observation has, and in what order.
+    """Layout of an observation: its numbers and their order.
 
     Row i holds only what robot i knows (see `robocov.observation`); all are from -1 to 1. The unit of
     ``D`` is the diagonal of the known region's bounding box, that of ``S`` the robot's sensing range, or
@@ -65,7 +65,7 @@ class ObservationLayout:
 
     @cached_property
     def blocks(self) -> dict[str, slice]:
-        """Where in a row each block is, in their order; only those that it has."""
+        """Slices of the blocks of a row, in their order; only those that it has."""
         counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
         counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
         places: dict[str, slice] = {}
@@ -78,7 +78,7 @@ class ObservationLayout:
 
     @property
     def size(self) -> int:
-        """How many numbers a row has."""
+        """Length of a row."""
         return 7 + 3 * self.neighbours + self.rays + 2 * self.centroid
 
     @property

@@ -1,4 +1,4 @@
-"""What all environments of a task have: the present episode, and its pictures."""
+"""Shared base of a task's environments: the present episode, and its pictures."""
 
 from __future__ import annotations
 

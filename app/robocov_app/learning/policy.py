@@ -27,7 +27,7 @@ _SOON = 5e-7  # seconds that sums of control periods may miss
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What is remembered of a policy: its last actions, (n, 2) N or m/s, and when the next are due, s."""
+    """Memory of a policy: its last actions, (n, 2) N or m/s, and when the next are due, s."""
 
     team: Team
     actions: Array | None = None

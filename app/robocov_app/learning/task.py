@@ -68,7 +68,7 @@ def actions_of(action: Action, forces: Array, velocities: Array, team: Team) -> 
 
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
-"""Who is rewarded for what; see `shares`."""
+"""Sharing of rewards among robots; see `shares`."""
 
 REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
 
@@ -283,12 +283,12 @@ class CoverageTask:
 
     @property
     def cycles(self) -> int:
-        """How many actions an episode has."""
+        """Number of actions of an episode."""
         return max(1, round(self.duration / self.period))
 
     @property
     def agents(self) -> list[str]:
-        """What the robots are called: ``robot_1``, ``robot_2``, ..."""
+        """Names of the robots: ``robot_1``, ``robot_2``, ..."""
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:

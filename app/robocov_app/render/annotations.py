@@ -1,4 +1,4 @@
-"""What stands around the arena: scale bar, status line and legend, each in a strip of its own."""
+"""Annotations around the arena: scale bar, status line and legend, each in a strip of its own."""
 
 from collections.abc import Iterable, Sequence, Set
 from dataclasses import replace
@@ -11,6 +11,7 @@ from robocov_app.render.camera import Camera, length_label, round_length
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.fonts import shortened, text_width
 from robocov_app.render.scene import Scene
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Theme, robot_hues
 
 MARGIN = 14.0
@@ -105,15 +106,14 @@ class LegendStrip:
     """Glyphs, drawn as the layers draw them, with words; kept until one changes."""
 
     def __init__(self) -> None:
-        self._kept: tuple[object, pygame.Surface] | None = None
+        self._strip = Latest[pygame.Surface]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         """Draw the canvas's legend at the top."""
         width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
-        if self._kept is None or key != self._kept[0]:
-            self._kept = key, legend_strip(canvas.legend, canvas)
-        canvas.surface.blit(self._kept[1], (0, 0))
+        strip = self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas))
+        canvas.surface.blit(strip, (0, 0))
 
 
 def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surface:

@@ -91,12 +91,7 @@ class LegendEntry:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """Where layers draw.
-
-    `scale` multiplies widths and text sizes of the theme (2 on a screen of twice the density), `hues` are the
-    indices of the robots' colours, (n,), `shown` the names of all layers that are drawn, and `legend` is what
-    explains them.
-    """
+    """Drawing target; `scale` multiplies the theme's sizes, `hues` (n,) index its colours of robots."""
 
     surface: pygame.Surface
     camera: Camera

@@ -23,7 +23,7 @@ _RIVALS = 5  # different ways that a place may choose from
 
 
 class FieldLattice:
-    """Which sites are around each place of a map; the same for all results on it."""
+    """Interpolation lattice of a map: the sites around each place, the same for all results on it."""
 
     def __init__(self, sites: Sites) -> None:
         side = sites.lattice
@@ -69,11 +69,9 @@ class Borders:
 
 
 class _Rivals(NamedTuple):
-    """Sites whose ways a place may choose from.
+    """Sites (k, r) whose ways a place may choose from; `number` (s, s): of each square with any, else -1.
 
-    `number` (s, s) is that of each square that has any, else -1, `site` (k, r). `right` (k, 4, r): whether
-    the straight end of the way, led to each corner of the square, is not shorter than the shortest way to it;
-    if it is, there is a wall in between.
+    `right` (k, 4, r): no wall is between the end of the way and a square's corner, to which none is shorter.
     """
 
     number: IntArray
@@ -106,7 +104,6 @@ class Field:
         self._around = self._rivals(beside, _first_different(others, source[others]))
 
     def _rivals(self, squares: BoolArray, site: IntArray) -> _Rivals:
-        """Return the rivals of some squares, given their sites (k, r)."""
         number = np.full(squares.shape, -1, dtype=np.intp)
         number[squares] = np.arange(len(site))
         corner = self.lattice.around[squares]
@@ -192,9 +189,8 @@ class Field:
         apart = np.maximum(np.hypot(ux - vx, uy - vy), _SHALLOW)
         # between places that robots reach and such that none does, there is a wall
         with np.errstate(invalid="ignore"):
-            gap = np.nan_to_num(
-                (others[each, second] - distance[each, first]) / apart, nan=np.inf, posinf=np.inf
-            )
+            gap = (others[each, second] - distance[each, first]) / apart
+        gap = np.nan_to_num(gap, nan=np.inf, posinf=np.inf)
         return Borders(high, wide, owner[each, first], gap)
 
     def _asked(self, rivals: _Rivals, number: IntArray, x: Array, y: Array) -> Array:
@@ -315,9 +311,8 @@ def ticks(limit: float, most: int = 5) -> list[float]:
 
 def palette(theme: Theme) -> NDArray[np.uint8]:
     """Return the colours of `levels`, (256, 3): from near to far, then of where no robot can come."""
-    return np.concatenate([theme.heat_table(FARTHEST + 1), [theme.unreached, theme.obstacle_edge]]).astype(
-        np.uint8
-    )
+    closed = np.array([theme.unreached, theme.obstacle_edge], dtype=np.uint8)
+    return np.concatenate([theme.heat_table(FARTHEST + 1), closed])
 
 
 def levels(field: Field, x: Array, y: Array, limit: float, hatch: int) -> NDArray[np.uint8]:

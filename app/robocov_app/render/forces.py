@@ -33,10 +33,7 @@ def _level_arrow(canvas: Canvas, x: float, y: float, colour: Colour, width: floa
 
 
 def force_layer(term: str, title: str, head: str) -> Layer:
-    """Return a term of the controller's force, their sum, or the world's viscosity, as arrows.
-
-    Lengths saturate: a force that would give the largest acceleration has 63 % of `FORCE_LENGTH`.
-    """
+    """Return arrows of a term of the force: the largest acceleration has 63 % of `FORCE_LENGTH`."""
 
     def forces_of(scene: Scene) -> Array | None:
         decision = scene.now.decision

@@ -17,6 +17,7 @@ from robocov_app.render.density import colours, density_label, parts
 from robocov_app.render.distance_field import Field, levels, middles, palette, strength, ticks
 from robocov_app.render.layers import says
 from robocov_app.render.scene import Scene
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Theme, border_colour
 
 # on a surface the density is looked at in at most about so many places; between them it is interpolated
@@ -46,7 +47,6 @@ def density_entry(words: str) -> LegendEntry:
 
 
 def _strip_entry(words: str, row: Callable[[Theme, int], NDArray[np.uint8]]) -> LegendEntry:
-    """Return the legend's entry of a scale of colours, of which `row` gives so many."""
 
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
@@ -84,10 +84,9 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
 
 
 class _Dots(NamedTuple):
-    """Where the density is looked at along one axis, and how the pixels between are made of that.
+    """Sample positions of the density along one axis, (d,) px, the same whichever pixels are wanted.
 
-    `at` (d,) px are the middles of the dots, the same whichever pixels are wanted; `first` (p,) is the dot
-    before each pixel's middle, and `part` (p, 1) how far it is on the way to the next.
+    `first` (p,) is the dot before each pixel's middle, `part` (p, 1) how far it is on the way to the next.
     """
 
     at: Array
@@ -119,8 +118,7 @@ class FieldPicture:
 
     def __init__(self, draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface]) -> None:
         self.draw_picture = draw_picture
-        self._kept: tuple[object, pygame.Surface] | None = None
-        self._field: Field | None = None
+        self._picture = Latest[pygame.Surface]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
         """Draw the picture within the region."""
@@ -130,12 +128,14 @@ class FieldPicture:
             return
         view = canvas.camera, canvas.theme.name, canvas.scale, (left, top, width, height)
         key = (scene.field_limit, *view, canvas.hues.tolist(), "distances" in canvas.shown)
-        if self._kept is None or self._field is not field or self._kept[0] != key:
+
+        def picture() -> pygame.Surface:
             across = np.column_stack([left + np.arange(width), np.full(width, top)])
             down = np.column_stack([np.full(height, left), top + np.arange(height)])
             x, y = canvas.camera.to_world(across)[:, 0], canvas.camera.to_world(down)[:, 1]
-            self._field, self._kept = field, (key, self.draw_picture(canvas, scene, field, x, y))
-        canvas.surface.blit(self._kept[1], (left, top))
+            return self.draw_picture(canvas, scene, field, x, y)
+
+        canvas.surface.blit(self._picture.of(field, key, picture), (left, top))
         _cut_to_region(canvas, scene)
 
 
@@ -223,7 +223,6 @@ def bar_room(canvas: Canvas, scene: Scene) -> float:
 
 
 def _marks(scene: Scene) -> list[tuple[float, str]]:
-    """Return the marks of the scale of colours, m, with their words."""
     assert scene.field is not None
     marks = ticks(scene.field_limit)
     words = ["0", *(length_label(mark) for mark in marks[1:])]
@@ -244,7 +243,6 @@ def _seen(canvas: Canvas, scene: Scene) -> tuple[int, int, int, int]:
 
 
 def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
-    """Paint the background over what is outside the convex region."""
     corners = canvas.camera.to_pixels(scene.environment.region.vertices)
     far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -258,7 +256,6 @@ def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
 
 
 def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:
-    """Return (h, w) numbers of colours as a surface."""
     height, width = numbers.shape
     surface = pygame.image.frombytes(numbers.tobytes(), (width, height), "P")
     surface.set_palette([tuple(colour) for colour in colours.tolist()])

@@ -10,14 +10,7 @@ import pygame
 from robocov.arrays import Array
 from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
-from robocov_app.render.canvas import (
-    Canvas,
-    LegendEntry,
-    bounded,
-    clipped_polygon,
-    clipped_segment,
-    premultiplied,
-)
+from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
 from robocov_app.render.layers import draw_blocked, draw_boundary, draw_motion, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
@@ -42,7 +35,7 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     corners = np.array([view.topleft, view.bottomright], dtype=float)
     row, column = raster.cells(canvas.camera.to_world(corners))
     first, last = (int(row.min()), int(column.min())), (int(row.max()) + 1, int(column.max()) + 1)
-    state = known.state[first[0] : last[0], first[1] : last[1]]
+    state = np.minimum(known.state[first[0] : last[0], first[1] : last[1]], WALL)
     outside = raster.outside[first[0] : last[0], first[1] : last[1]]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
     theme = canvas.theme
@@ -173,7 +166,6 @@ class SensedObstacles:
     def _page_for(
         self, canvas: Canvas, scene: Scene, points: Array, asked: int | None
     ) -> tuple[pygame.Surface, int]:
-        """Return the page of the pale truth and the first points, and how many of them it has."""
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
         key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
         # objects rather than their ids, which others may get when these are gone
@@ -191,7 +183,6 @@ class SensedObstacles:
 
 
 def _draw_pale(canvas: Canvas, scene: Scene) -> None:
-    """Draw all obstacles once more, as hardly more than their outlines."""
     draw_blocked(canvas, scene.environment, *_pale_colours(canvas))
     for obstacle in scene.moving:
         draw_motion(canvas, scene, obstacle, *_pale_colours(canvas))
@@ -269,13 +260,14 @@ def _draw_path_begin(canvas: Canvas, x: float, y: float) -> None:
     canvas.stamp(partial(sprites.dot, 3.6 * canvas.scale, canvas.theme.final), (x, y))
 
 
-def path_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of the path, where it is one."""
+def _path_glyph(canvas: Canvas, x: float, y: float) -> None:
+    half = 9 * canvas.scale
+    canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
+    _draw_path_begin(canvas, x - half + 2 * canvas.scale, y)
 
-    def glyph(canvas: Canvas, x: float, y: float) -> None:
-        half = 9 * canvas.scale
-        canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
-        _draw_path_begin(canvas, x - half + 2 * canvas.scale, y)
 
-    drawn = scene.path is not None and len(scene.path) > 1
-    return [LegendEntry("shortest path to the nearest robot", glyph)] if drawn else []
+path_legend = says(
+    "shortest path to the nearest robot",
+    _path_glyph,
+    lambda scene: scene.path is not None and len(scene.path) > 1,
+)

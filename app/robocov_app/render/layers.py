@@ -23,18 +23,16 @@ NARROW = 20.0
 Legend: TypeAlias = Callable[[Scene], list[LegendEntry]]
 
 
-def says(text: str, glyph: Glyph) -> Legend:
-    """Return a legend that has always the same entry."""
-    return lambda scene: [LegendEntry(text, glyph)]
+def says(text: str, glyph: Glyph, when: Callable[[Scene], bool] = lambda scene: True) -> Legend:
+    """Return a legend of one entry, in scenes for which `when` holds."""
+    return lambda scene: [LegendEntry(text, glyph)] if when(scene) else []
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One thing that a picture can show; `title` is for check boxes.
+    """One thing that a picture can show, of scenes where no field of `needs` is None or empty.
 
-    It is drawn, and explained in the legend, of scenes where no field of `needs` is None or empty. `default`:
-    shown unless asked otherwise; `static`: depends on map, camera and theme alone; `in_world`: stays inside
-    the camera's view.
+    `static`: depends on map, camera and theme alone; `in_world`: stays inside the camera's view.
     """
 
     name: str
@@ -52,8 +50,7 @@ class Layer:
         return not any(each is None or (isinstance(each, Sequence | Mapping) and not each) for each in values)
 
 
-def colours_mean_distance(canvas: Canvas, scene: Scene) -> bool:
-    """Whether colours below mean something else than cells."""
+def _colours_mean_distance(canvas: Canvas, scene: Scene) -> bool:
     return scene.field is not None and bool({"distances", "geodesic_cells"} & canvas.shown)
 
 
@@ -64,7 +61,7 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
     corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
     ends = np.cumsum(sizes)
     fills: list[Colour | None] = [None] * len(sizes)
-    if not colours_mean_distance(canvas, scene):
+    if not _colours_mean_distance(canvas, scene):
         tints = [canvas.theme.cell(hue) for hue in range(len(canvas.theme.robots))]
         hues = canvas.hues if scene.cell_owners is None else canvas.hues[scene.cell_owners]
         fills = [tints[hue] for hue in hues.tolist()]
@@ -77,8 +74,14 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
     following = np.arange(1, len(corners) + 1)
     following[ends[sizes > 0] - 1] = (ends - sizes)[sizes > 0]
     edges = np.hstack([corners, corners[following]])
-    # what lies on the rim is drawn over
-    edges = _forward(edges) if "boundary" in canvas.shown else _once(edges)
+    if "boundary" in canvas.shown:
+        # one of the two cells beside has it to the right or straight down; what lies on the rim is drawn over
+        x1, y1, x2, y2 = np.rint(edges * 16.0).T
+        edges = edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))]
+    else:  # each once, also from the other end: drawn twice they are not smooth
+        turned = (edges[:, 0] > edges[:, 2]) | ((edges[:, 0] == edges[:, 2]) & (edges[:, 1] > edges[:, 3]))
+        edges = np.where(turned[:, None], edges[:, [2, 3, 0, 1]], edges)
+        edges = edges[np.unique(np.rint(edges * 16.0), axis=0, return_index=True)[1]]
     canvas.segments(edges, edge, canvas.width(canvas.theme.line))
 
 
@@ -86,24 +89,10 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
     """Return the entry of Voronoi cells."""
 
     def glyph(canvas: Canvas, x: float, y: float) -> None:
-        fill = None if colours_mean_distance(canvas, scene) else canvas.theme.cell(0)
+        fill = None if _colours_mean_distance(canvas, scene) else canvas.theme.cell(0)
         canvas.swatch(x, y, fill, canvas.theme.cell_edge)
 
     return [LegendEntry("Voronoi cell", glyph)]
-
-
-def _forward(edges: Array) -> Array:
-    """Return the (m, 4) px edges that run right or straight down: one of the two cells beside has it so."""
-    x1, y1, x2, y2 = np.rint(edges * 16.0).T
-    return np.asarray(edges[(x1 < x2) | ((x1 == x2) & (y1 < y2))])
-
-
-def _once(edges: Array) -> Array:
-    """Return (m, 4) px edges without repeats, also from the other end: drawn twice they are not smooth."""
-    turned = (edges[:, 0] > edges[:, 2]) | ((edges[:, 0] == edges[:, 2]) & (edges[:, 1] > edges[:, 3]))
-    edges = np.where(turned[:, None], edges[:, [2, 3, 0, 1]], edges)
-    _, first = np.unique(np.rint(edges * 16.0), axis=0, return_index=True)
-    return np.asarray(edges[first])
 
 
 def draw_grid(canvas: Canvas, scene: Scene) -> None:

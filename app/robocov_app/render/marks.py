@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pygame
 
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
 from robocov.observation import Snapshot
 from robocov.voronoi import VoronoiPartition
 from robocov_app.render import sprites
@@ -85,7 +85,21 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
         partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, str(number or ""))
         for radius, ring, hue, number in looks
     ]
-    canvas.stamps(discs, canvas.camera.to_pixels(scene.now.positions), np.array(which, dtype=int))
+    centers = canvas.camera.to_pixels(scene.now.positions)
+    if scene.now.steering is not None:
+        _draw_noses(canvas, centers, radii, scene.now.steering[:, 0], scene.team.turns)
+    canvas.stamps(discs, centers, np.array(which, dtype=int))
+
+
+def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, turns: BoolArray) -> None:
+    """Draw where unicycles face, under their discs."""
+    parts = np.rint(headings * (sprites.NOSE_TURNS / (2.0 * np.pi))).astype(int) % sprites.NOSE_TURNS
+    noses = [
+        partial(sprites.nose, min(radius, sprites.LARGE), canvas.theme.ink, canvas.theme.background, turn)
+        for radius, turn in zip(radii.tolist(), parts.tolist(), strict=True)
+    ]
+    rows = np.flatnonzero(turns)
+    canvas.stamps(noses, centers[rows], rows)
 
 
 def _robot_glyph(canvas: Canvas, x: float, y: float) -> None:
@@ -100,10 +114,7 @@ robots_legend = says("robot", _robot_glyph)
 
 
 def draw_centroids(canvas: Canvas, scene: Scene) -> None:
-    """Draw a plus at each centroid, or a times sign where controllers, as Atlas, head for something else.
-
-    RPF has no goals: nothing is drawn, nor where a robot has arrived: it would stick out from under its disc.
-    """
+    """Draw a plus at each centroid, or a times sign at each goal, but not where a robot has arrived."""
     known, goals = _aims(scene)
     if not known:
         return
@@ -132,11 +143,6 @@ def draw_goals(canvas: Canvas, scene: Scene) -> None:
     canvas.stamps([_cross(canvas, GOAL)], goals)
 
 
-def goals_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of goals."""
-    return [] if scene.now.decision.goals is None else [LegendEntry(GOAL, _aim_glyph(GOAL))]
-
-
 def _aims(scene: Scene) -> tuple[str, Array]:
     """Return what the crosses are called, and where they are, (n, 2) m; an empty word for none."""
     goals = None if scene.snapshot is None else scene.snapshot.decision.goals
@@ -152,7 +158,6 @@ def _aims(scene: Scene) -> tuple[str, Array]:
 
 
 def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
-    """Return the plus of a centroid, or the times sign of a goal."""
     arm = 5.5 * canvas.scale if arm is None else arm
     theme = canvas.theme
     colour, width, part = (theme.final, 1.8, 0.4) if kind == GOAL else (theme.ink, 1.3, 0.3)
@@ -162,6 +167,9 @@ def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
 
 def _aim_glyph(kind: str) -> Glyph:
     return lambda canvas, x, y: canvas.stamp(_cross(canvas, kind), (x, y))
+
+
+goals_legend = says(GOAL, _aim_glyph(GOAL), lambda scene: scene.now.decision.goals is not None)
 
 
 def draw_failed(canvas: Canvas, scene: Scene) -> None:
@@ -234,7 +242,6 @@ def _stamp_belief(canvas: Canvas, hue: int, place: list[float]) -> None:
 
 
 def _draw_belief(canvas: Canvas, snapshot: Snapshot, robot: int) -> None:
-    """Draw the cell and the places of others as a robot believes them to be."""
     seen, cells, theme = snapshot.seen, snapshot.decision.cells, canvas.theme
     if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
         corners = canvas.camera.to_pixels(cells.polygons[robot])

@@ -18,6 +18,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
 from robocov_app.render.layers import Layer
 from robocov_app.render.scene import Scene
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import LIGHT, ONE_HUE_EACH, Theme, robot_hues
 from robocov_app.render.trajectories import Trajectories
 
@@ -120,7 +121,7 @@ class Painter:
         self._camera: Camera | None = None
         self._follows = True
         self._hues = robot_hues(0)
-        self._static: tuple[object, Environment, pygame.Surface] | None = None
+        self._static = Latest[pygame.Surface]()
         self._own: pygame.Surface | None = None
         self._room: tuple[object, int, float] = (None, 0, 0.0)
 
@@ -149,7 +150,7 @@ class Painter:
 
     @property
     def camera(self) -> Camera:
-        """What is shown where; set it to zoom and pan, see `fit` for the way back."""
+        """The camera; set it to zoom and pan, see `fit` for the way back."""
         if self._camera is None:
             self._place_view(0)
         assert self._camera is not None
@@ -244,12 +245,13 @@ class Painter:
         coloured = scene.field is not None and "distances" in canvas.shown
         names = [layer.name for layer in layers]
         key = names, canvas.camera, self.theme.name, self.scale, self.size, coloured
-        if self._static is None or self._static[0] != key or self._static[1] is not scene.environment:
+
+        def drawn() -> pygame.Surface:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
             page.set_clip(self._clip())
-            own = replace(canvas, surface=page)
             for layer in layers:
                 if layer.has(scene):
-                    layer.draw(own, scene)
-            self._static = key, scene.environment, page
-        return self._static[2]
+                    layer.draw(replace(canvas, surface=page), scene)
+            return page
+
+        return self._static.of(scene.environment, key, drawn)

@@ -112,7 +112,7 @@ def moving_obstacles(environment: Environment, time: float) -> list[MovingObstac
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn of one moment; what is None is left out."""
+    """Content of a picture at one moment; what is None is left out."""
 
     environment: Environment
     team: Team
@@ -156,10 +156,9 @@ class Scene:
 
     @classmethod
     def of(cls, environment: Environment, team: Team, snapshot: Snapshot, **more: Any) -> "Scene":
-        """Return the scene of `snapshot` with all robots' Voronoi cells, and obstacles where they are then.
+        """Return the scene of a snapshot, obstacles where they are then, with all robots' Voronoi cells.
 
-        The cells that the law used are taken where they are these: not where communication is limited, or
-        messages are late or get lost, since they overlap there, nor where a user's law says something else.
+        Those of the law are taken where they are these: limited, late or lost messages make them overlap.
         """
         moving = moving_obstacles(environment, snapshot.time)
         environment = environment.at(snapshot.time)
@@ -181,10 +180,7 @@ class Scene:
 
 
 def record_scene(record: Record, row: int, *, cost: str = "", fields: Fields | None = None) -> Scene:
-    """Return the scene of a row of a record, with its trail, and with distances where `fields` are given.
-
-    Robots that have failed are marked as such, those that have not joined yet are left out.
-    """
+    """Return the scene of a row of a record, with distances if `fields` are given, failed robots marked."""
     environment, time = record.environment, float(record.time[row])
     snapshot, team = record.snapshot(row), record.team
     starts, trail = record.positions[0], record.positions[: row + 1]
@@ -226,6 +222,7 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
         obstacle_points=seen.obstacle_points[rows],
         max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
         scans=None,
+        steering=None if seen.steering is None else seen.steering[rows],
         reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
         report_ages=None if seen.report_ages is None else seen.report_ages[kept],
     )

@@ -4,6 +4,7 @@ Discs with numbers, rings and crosses are kept, for each quarter of a pixel's sh
 robots glide in films instead of hopping. All is premultiplied: blit with ``BLEND_PREMULTIPLIED``.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -101,6 +102,23 @@ def _disc(
         # the ink of digits, without the room for ascenders and descenders, goes to the middle
         ink = number.get_bounding_rect()
         large.blit(number, (center[0] - ink.centerx, center[1] - ink.centery))
+    return _shrunk(large, fine)
+
+
+NOSE = 1.65  # how far the tip of a nose is from the middle of the disc, in its radii
+NOSE_TURNS = 96  # so many directions of noses are told apart
+
+
+@kept(12_000_000)
+def nose(radius: float, fill: Colour, edge: Colour, turn: int, shift: Shift) -> pygame.Surface:
+    """Return what points where a disc faces, to be put under it; `turn` is of `NOSE_TURNS`, 0 right."""
+    fine = _fineness(radius)
+    large, (x, y) = _blank(NOSE * radius + 1, shift, fine)
+    angle, apart = 2 * math.pi * turn / NOSE_TURNS, 0.5
+    for colour, more in ((edge, 0.6), (fill, 0.0)):
+        reach = [(NOSE * radius + 1.5 * more, 0.0), (radius + more, apart), (radius + more, -apart)]
+        corners = [(far * math.cos(angle + side), far * math.sin(angle + side)) for far, side in reach]
+        pygame.draw.polygon(large, colour, [(x + fine * dx, y - fine * dy) for dx, dy in corners])
     return _shrunk(large, fine)
 
 

@@ -1,13 +1,14 @@
-"""Pictures that are kept as long as there is room: so many bytes, not so many pictures."""
+"""Caches: pictures as long as there is room, so many bytes, and what was made last."""
 
 from collections import OrderedDict
 from collections.abc import Callable
 from functools import wraps
-from typing import ParamSpec
+from typing import Generic, ParamSpec, TypeVar
 
 import pygame
 
 Arguments = ParamSpec("Arguments")
+_Made = TypeVar("_Made")
 
 
 def kept(
@@ -59,3 +60,21 @@ def kept(
 
 def _bytes(picture: pygame.Surface) -> int:
     return picture.get_pitch() * picture.get_height()
+
+
+class Latest(Generic[_Made]):
+    """Keeps what was made last.
+
+    >>> page, size = Latest(), [1, 2]
+    >>> page.of(size, "light", lambda: object()) is page.of(size, "light", lambda: object())
+    True
+    """
+
+    def __init__(self) -> None:
+        self._kept: tuple[object, object, _Made] | None = None
+
+    def of(self, source: object, look: object, make: Callable[[], _Made]) -> _Made:
+        """Return what `make` makes of a source, anew for another object, or a look that is not equal."""
+        if self._kept is None or self._kept[0] is not source or self._kept[1] != look:
+            self._kept = source, look, make()
+        return self._kept[2]

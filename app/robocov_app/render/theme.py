@@ -67,10 +67,8 @@ TRAIL_CONTRAST = 2.4  # least contrast of a robot's trajectory with its own cell
 class Theme:
     """One look. Widths and text sizes are pixels at scale 1.
 
-    `faint`: text or marks of lesser weight. `start`, `final`, `trajectory`: the paper's green, blue and red.
-    `others`: curves of controllers that have no colour of their own, in turn. `robots`: one for each robot of
-    a small team; the first `MAP_COLOURS` for the cells of a large one. `heat`: from near to far. `density`,
-    `density_strength`: where it is highest. `tint`, `paper_tint`: how much of a robot's colour its cell has.
+    `start`, `final`, `trajectory`: the paper's green, blue and red. `robots`: one for each of a small team;
+    the first `MAP_COLOURS` for cells of a large one. `heat`: from near to far. `tint`: of cells.
     """
 
     name: str
@@ -129,13 +127,8 @@ class Theme:
         return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
 
     def controller(self, name: str) -> Colour:
-        """Return the colour of a controller's curves and labels."""
-        return self.controllers.get(name, self.other)
-
-    @property
-    def other(self) -> Colour:
-        """The colour of the first controller that has none of its own."""
-        return self.others[0]
+        """Return the colour of a controller's curves and labels, that of others where it has none."""
+        return self.controllers.get(name, self.others[0])
 
     def trail(self, hue: int) -> Colour:
         """Return the colour of a robot's trajectory: its hue, but never too pale to be followed."""
@@ -164,11 +157,7 @@ _COLOURS = {
     "unreached": ("E3DED4", "332E28"),
     "density": ("B4550A", "FFB45A"),
 }
-_CONTROLLERS = {
-    "rapf": ("1F5FE0", "5B9BFF"),
-    "rpf": ("D62222", "FF6B63"),
-    "lloyd": ("118038", "46C46A"),
-}
+_CONTROLLERS = {"rapf": ("1F5FE0", "5B9BFF"), "rpf": ("D62222", "FF6B63"), "lloyd": ("118038", "46C46A")}
 _FORCES = {
     "attraction": ("0B7A6F", "2DD4BF"),
     "repulsion_robots": ("D9480F", "FF9354"),
@@ -211,10 +200,9 @@ def theme_named(name: str | Theme) -> Theme:
 
 
 def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | None = None) -> IntArray:
-    """Return for each robot the index of its colour in `Theme.robots`.
+    """Return for each robot the row of its colour: its own up to `ONE_HUE_EACH`, else shared.
 
-    Up to `ONE_HUE_EACH` robots have one each; in larger teams cells that share an edge, (m, 2) `adjacency`,
-    differ, or hues repeat in turn where that is not known. Those of the frame before stay where they can.
+    Cells that share an edge, (m, 2) `adjacency`, differ; hues of the frame before stay where they can.
     """
     if n <= ONE_HUE_EACH:
         return np.arange(n, dtype=np.intp)

@@ -22,7 +22,7 @@ _FADE_FINE = 2  # they are drawn so many times larger, and shrunk
 
 
 class Trajectories:
-    """Where the robots went, nan for nowhere; each in its robot's colour, or all red (`colours` "paper")."""
+    """Trajectories, nan where there is none; each in its robot's colour, or all red (`colours` "paper")."""
 
     def __init__(self, colours: str = "robots") -> None:
         self.colours = colours
@@ -238,7 +238,6 @@ def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
 
 
 def _runs(path: Array) -> list[list[list[float]]]:
-    """Return the parts of a (k, 2) path without nan."""
     there = np.isfinite(path[:, 0])
     if there.all():
         return [path.tolist()]

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from robocov.arrays import Array
-from robocov_app.figures.statistics import Interval, bootstrap, spread
+from robocov_app.figures.statistics import Interval, bootstrap, share, spread
 from robocov_app.replication.contenders import LABELS, potential_text
 from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.plan import CONVEX_KINDS
@@ -110,7 +110,7 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """What the criteria say together; see the head of this module."""
+        """Overall verdict of the criteria; see the head of this module."""
         if self.maps < self.least_maps or not self.criteria:
             return "undecided"
         met = [criterion.met for criterion in self.criteria]
@@ -222,7 +222,7 @@ def paper_claims(
 
 def share_of(there: ArrayLike, on: Outcomes) -> Interval:
     """Return in which share of the runs something is so, (m,) bool."""
-    return bootstrap(there, "mean", on.maps)
+    return share(there, on.maps)
 
 
 def _both(

@@ -1,4 +1,4 @@
-"""Who is compared: controllers with their gains, those of the paper, those of other authors, and our own."""
+"""Compared controllers with their gains: the paper's, other authors', and our own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -101,7 +101,14 @@ GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
     "tangentbug": (*grid(detour=(4.0, 8.0, 16.0), moved=(0.5,)), {"detour": 4.0, "moved": 0.25}),
     # a higher gamma lets robots of 2 m/s into the safe gap
     "barrier": (*grid(gamma=(5.0, 20.0), braking=(0.8,)), {"gamma": 20.0, "braking": 0.5}),
+    "visibility": grid(k_area=(0.05, 0.1, 0.3), jump=(0.3,)),
+    "boosting": (*grid(boost=("phi", "p", "neighbours"), decay=(0.1,)), {"boost": "phi", "decay": 0.3}),
+    "adaptive": grid(learning=(1.0, 3.0, 10.0)),
+    "diffeomorphism": grid(shrink=(1e2, 1e3, 1e4)),
     "geodesic-lloyd": grid(exponent=(1.0, 1.5, 2.0)),
+    "frontier-median": grid(beta=(0.02, 0.05, 0.15)),
+    "greedy-submodular": grid(threshold=(0.003, 0.01, 0.03)),
+    "voronoi-graph": grid(threshold=(0.003, 0.01, 0.03)),
 }
 
 

@@ -39,7 +39,7 @@ class Account(NamedTuple):
 
 @dataclass(frozen=True)
 class LawRow:
-    """What one contender reached over all scenarios."""
+    """Results of one contender over all scenarios."""
 
     contender: Contender
     runs: int
@@ -53,7 +53,7 @@ class LawRow:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What is said of a registered controller."""
+    """Evidence on a registered controller."""
 
     account: Account
     rows: Sequence[LawRow]  # of its contenders; what follows is of the best, the first

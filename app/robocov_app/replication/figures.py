@@ -176,10 +176,9 @@ def panels(
     inner, head = (wide - (count + 1) * sketch.margin) / count, above * DOTS
     high = inner / ((high_x - low_x) / (high_y - low_y))
     page = Page((wide, round(head + high + sketch.footer_height(handles))), theme, DOTS)
-    lefts = [page.margin + k * (inner + page.margin) for k in range(count)]
-    found = [page.map_axes((left, head, inner, high), low_x, low_y, high_x, high_y) for left in lefts]
-    page.footer(handles, page.margin, wide - page.margin, head + high, inner / (high_x - low_x))
-    return page, found
+    boxes = [(page.margin + k * (inner + page.margin), head, inner, high) for k in range(count)]
+    page.footer(handles, boxes, inner / (high_x - low_x))
+    return page, [page.map_axes(box, low_x, low_y, high_x, high_y) for box in boxes]
 
 
 def arrival(history: CostHistory) -> float:

@@ -20,7 +20,7 @@ from robocov.controllers import CONTROLLERS, gains_of
 from robocov.controllers.gains import Value
 from robocov.metrics import CostHistory
 from robocov.metrics.results import read_results
-from robocov_app.figures.statistics import Interval, bootstrap
+from robocov_app.figures.statistics import Interval, bootstrap, share
 from robocov_app.replication.plan import ROBOTS
 from robocov_app.replication.references import Reference
 from robocov_app.replication.studies import Contest
@@ -40,7 +40,7 @@ COLUMNS = {
 
 
 class Scenario(NamedTuple):
-    """Where the robots began, and on what map."""
+    """Map and starts of a run."""
 
     map: str
     start: str
@@ -52,7 +52,7 @@ class Scenario(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """What every contender reached in each of m scenarios; nan where its run failed.
+    """Results of every contender in each of m scenarios; nan where its run failed.
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
     ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), and ``time`` (s).
@@ -145,7 +145,7 @@ class Comparison:
     def wins(self) -> Interval:
         """Share of pairs in which the first's value is the lower one; ties count half."""
         won = np.where(self.a < self.b, 1.0, np.where(self.a == self.b, 0.5, 0.0))
-        return bootstrap(won, "mean", self.fine.maps)
+        return share(won, self.fine.maps)
 
 
 def joined(parts: Sequence[Outcomes]) -> Outcomes:
@@ -168,7 +168,7 @@ def joined(parts: Sequence[Outcomes]) -> Outcomes:
 
 @dataclass(frozen=True, eq=False)
 class GainOutcomes:
-    """What one controller reached in m scenarios with each of g sets of gains.
+    """Results of one controller in m scenarios with each of g sets of gains.
 
     `excess`, (g, m), is J/J_ref: the final mean distance by that of the map's centralised reference; nan
     where a run failed.

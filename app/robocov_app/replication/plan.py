@@ -1,4 +1,4 @@
-"""How much is run: the full study and the quick one, with all their parameters."""
+"""Extent of the study: the full one and the quick one, with all their parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ TEAM: Mapping[str, Any] = {"radius": 0.1, "max_speed": 1.0, "max_acceleration": 
 
 @dataclass(frozen=True)
 class BeyondPlan:
-    """How much is run beyond the paper; by default that of the full study, ours as often as RAPF."""
+    """Extent of the study beyond the paper; by default the full one, ours as often as RAPF."""
 
     # of baselines and ours: bundled maps, seeds of generated ones, kinds and seeds of starts, of the claims'
     bundled: tuple[str, ...] = NON_CONVEX
@@ -70,7 +70,7 @@ class BeyondPlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is run; by default the full study: 33 non-convex maps, 8 convex regions, 6 maps for gains."""
+    """Extent of a study; by default the full one: 33 non-convex maps, 8 convex regions, 6 maps for gains."""
 
     name: str  # "full" or "quick"
     beyond: BeyondPlan

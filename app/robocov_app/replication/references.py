@@ -26,7 +26,7 @@ _PATIENCE = 0.2  # s between two looks whether somebody has pressed Ctrl-C
 
 @dataclass(frozen=True)
 class Question:
-    """What a reference depends on: the map as JSON, the team, and how well it is searched for."""
+    """Inputs of a reference: the map as JSON, the team, and how well it is searched for."""
 
     document: Mapping[str, Any]
     robots: int
@@ -92,7 +92,7 @@ def find_references(
             found[each.name] = kept
     if missing:
         with progress("references", len(missing), quiet=quiet) as update:
-            for number, (name, answer) in enumerate(_searched(missing, workers, stop), start=1):
+            for number, (name, answer) in enumerate(searched(missing, workers, stop), start=1):
                 _keep(folder / f"{name}.json", missing[name], answer)
                 found[name] = answer
                 update(number)
@@ -129,22 +129,26 @@ def _keep(path: Path, question: Question, answer: Reference) -> None:
         part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _searched(
-    questions: Mapping[str, Question], workers: int, stop: Interruption
-) -> Iterator[tuple[str, Reference]]:
+def searched(
+    questions: Mapping[str, Any],
+    workers: int,
+    stop: Interruption,
+    service: str = "robocov_app.replication.references:Searching",
+) -> Iterator[tuple[str, Any]]:
+    """Yield a service's answers to questions by their names, as they are found, until `stop`."""
     processes: list[subprocess.Popen[bytes]] = []
     own = threading.local()
 
     def begin() -> None:
-        own.process = worker.started("robocov_app.replication.references:Searching")
+        own.process = worker.started(service)
         processes.append(own.process)
 
-    def answer(name: str) -> tuple[str, Reference]:
+    def answer(name: str) -> tuple[str, Any]:
         reply = worker.asked(own.process, questions[name])
         if reply is None:
             raise OutputError(f"references: the process that searched for that of {name} has ended")
-        if not isinstance(reply.answer, Reference):
-            raise OutputError(f"reference of map {questions[name].document.get('name')!r}: {reply.trouble}")
+        if reply.answer is None:
+            raise OutputError(f"reference of map {name!r}: {reply.trouble}")
         return name, reply.answer
 
     pool = ThreadPoolExecutor(min(workers, len(questions)), initializer=begin)

@@ -53,7 +53,7 @@ class Interrupted(Exception):  # noqa: N818 - it is no error
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """How runs are done: on `workers` processes, or by the workers of a Dask `scheduler` (its address).
+    """Execution options: `workers` processes, or the workers of a Dask `scheduler` (its address).
 
     With `keep_versions`, runs of other versions of robocov, or of what it computes with, are used.
     """
@@ -85,7 +85,7 @@ class FigureRun:
 
 @dataclass(frozen=True, eq=False)
 class PaperResults:
-    """What the runs of the paper's claims gave."""
+    """Results of the paper's claims."""
 
     plan: Plan
     figures: Mapping[str, FigureRun]  # by "case/controller"
@@ -101,7 +101,7 @@ class PaperResults:
 
 @dataclass(frozen=True, eq=False)
 class DensityResults:
-    """What became of knowing the density."""
+    """Results on knowing the density."""
 
     outcomes: Outcomes  # of ``known`` and ``ignored``; ``final`` is the mean distance by φ, m
     pictures: tuple[FigureRun, FigureRun]  # one run that knew it, one that did not, from the same places
@@ -122,7 +122,7 @@ class Degradation:
 
 @dataclass(frozen=True, eq=False)
 class BeyondResults:
-    """What the runs beyond the paper gave."""
+    """Results beyond the paper."""
 
     plan: Plan
     outcomes: Outcomes  # of all contenders: those of the claims, the baselines, and ours

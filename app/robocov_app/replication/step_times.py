@@ -1,4 +1,4 @@
-"""How long a step of every controller takes, beside RAPF's, measured in turn; kept in a file."""
+"""Times of a step of every controller, beside RAPF's, measured in turn; kept in a file."""
 
 import hashlib
 import json

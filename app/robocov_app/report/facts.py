@@ -1,4 +1,4 @@
-"""What a report says of a result in words: what was run, what came of it, what went wrong."""
+"""Facts of a result in words: what was run, what came of it, what went wrong."""
 
 from collections import Counter
 from collections.abc import Sequence

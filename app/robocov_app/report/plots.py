@@ -154,7 +154,7 @@ def _sample_plot(
 
 
 class _Parameter(NamedTuple):
-    """What a result may depend on: a gain, or a property of the team; `choices` are the words it may be."""
+    """Parameter of a result: a gain, or a property of the team; `choices` are the words it may be."""
 
     title: str
     value_of: Callable[[Entry], Value]
@@ -177,7 +177,7 @@ class _Parameter(NamedTuple):
 
 
 class _Scale(NamedTuple):
-    """What final costs are divided by: the medians of the parts of a result; and the label of the axis."""
+    """Scale of final costs: the medians of the parts of a result; and the label of the axis."""
 
     label: str
     part_of: Callable[[Entry], object]

@@ -134,6 +134,7 @@ def embedded_run(
         "count": len(times),
         "positions": _places(record, record.positions, times + begin),
         "goals": _places(record, record.goals, times + begin) if wanted else None,
+        **({} if record.steering is None else {"headings": _headings(record, times + begin)}),
         "cost": _cost(run.history, begin, even_times(end - begin, rate), 1.0 / rate),
     }
 
@@ -183,6 +184,14 @@ def _places(record: Record, values: Array, times: Array) -> str:
     low, high = np.array(record.environment.region.bounds).reshape(2, 2)
     flat = _between(record.time, values.reshape(len(record), -1), times).reshape(len(times), -1, 2)
     return quantised((flat - low) / (high - low), 0.0, 1.0)
+
+
+def _headings(record: Record, times: Array) -> str:
+    """Return where robots face at other times as unit vectors, quantised; nan for points."""
+    assert record.steering is not None
+    angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
+    vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
+    return quantised(_between(record.time, vectors, times), -1.0, 1.0)
 
 
 def _between(time: Array, rows: Array, times: Array) -> Array:

@@ -71,12 +71,12 @@ class Entry:
 
     @property
     def setting(self) -> tuple[object, ...]:
-        """What costs can be compared on: map, number of robots, team."""
+        """Key of comparable costs: map, number of robots, team."""
         return self.map, self.robots, self.team
 
     @property
     def case(self) -> tuple[object, ...]:
-        """What pairs of runs share: the setting, the start and the seed."""
+        """Key of paired runs: the setting, the start and the seed."""
         return *self.setting, self.start, self.seed
 
 
@@ -124,7 +124,7 @@ class Result:
 
     @property
     def missing(self) -> int:
-        """How many runs are not done."""
+        """Number of runs that are not done."""
         return max(self.wanted - len(self.entries) - len(self.damaged), 0)
 
     def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:

@@ -1,4 +1,4 @@
-"""What is made of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
+"""Artifacts of runs: a folder with numbers, pictures and a film of one, or of several side by side."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -109,7 +109,9 @@ def save_comparison(runs: Mapping[str, Run], cost: CoverageCost, folder: Path, o
 def save_pictures(
     runs: Sequence[Run], cost: CoverageCost, folder: Path, options: RunOptions, *, comparison: bool = False
 ) -> None:
-    """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison."""
+    """Draw ``trajectories.png|svg`` and ``cost.png|svg`` of a run, or of a comparison, if wanted."""
+    if options.no_pictures:
+        return
     records, times = [run.record for run in runs], [run.final_time for run in runs]
     finals = [float(run.history.mean_distance[-1]) for run in runs]
     film = options.film

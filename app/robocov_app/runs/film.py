@@ -33,7 +33,7 @@ GAP = 2  # pixels of the line between two panes
 _NARROWEST = 360  # least width in pixels of a pane at scale 1: its caption fits
 
 FILM_SCALE = 1.3
-"""How far the scale of colours of a film reaches, as a multiple of the largest distance at its end."""
+"""Upper end of a film's colour scale, as a multiple of the largest distance at its end."""
 
 FILMS = "run.mp4", "comparison.mp4"  # of one run, of several side by side
 FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
@@ -93,7 +93,7 @@ def _cost_text(what: str, time: float, cost: CostHistory | None) -> str:
 
 
 class PaneLayout(NamedTuple):
-    """How panes share a film: sizes in px of each and of all, and the legend, as wide as the film."""
+    """Layout of a film's panes: sizes in px of each and of all, and the legend, as wide as the film."""
 
     columns: int
     pane: tuple[int, int]

@@ -65,7 +65,29 @@ class LayerOptions:
 
 
 @dataclass(kw_only=True)
-class WindowOptions:
+class WebOptions:
+    """The window in a browser."""
+
+    serve: bool = False
+    """Show the window in browsers instead of on this screen: prints the link."""
+    host: str = "127.0.0.1"
+    """Address to listen at with --serve; 0.0.0.0 for all of this machine's, which is not encrypted."""
+    port: int = 8765
+    """Port to listen at with --serve; 0 for any that is free."""
+    each: bool = False
+    """With --serve: everybody who has the link gets a window of their own, a process each."""
+    most: int = 8
+    """So many of them at a time."""
+
+    def __post_init__(self) -> None:
+        checked("--port", self.port, 0, 65535)
+        checked("--most", self.most, 1, 200)
+        if self.each and not self.serve:
+            raise ParameterError("--each: --serve was wanted beside it")
+
+
+@dataclass(kw_only=True)
+class WindowOptions(WebOptions):
     """How a window looks."""
 
     theme: Annotated[Literal["light", "dark"] | None, tyro.conf.arg(metavar="{light,dark}")] = None
@@ -78,6 +100,7 @@ class WindowOptions:
     """Where screenshots, films, runs and maps are saved that are not given a path."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         window_size(self.size)
         if self.scale is not None:
             checked("--scale", self.scale, 0.5, 4.0)
@@ -148,6 +171,10 @@ class FilmOptions(LayerOptions):
         checked("--fps", self.fps, 1, 240)
         checked("--film-speed", self.film_speed, 0.01, 1e4)
         self.picture_size()
+        if self.video:  # rather than after the run
+            from robocov_app.runs.recording import encoder
+
+            encoder()
 
     def picture_size(self) -> tuple[int, int] | None:
         """Return the size that was asked for (width, height), None when none was."""
@@ -169,7 +196,7 @@ class FilmOptions(LayerOptions):
 class ScenarioOptions:
     """A map, a team at its start, and what goes wrong."""
 
-    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="MAP")] = "rooms"
+    map: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="[MAP]")] = "rooms"
     """Path to a map JSON, or the name of a bundled map (see `robocov maps`)."""
     robots: int = 6
     """Number of robots."""
@@ -209,10 +236,18 @@ class RunOptions(ScenarioOptions, JsonOption):
     """How far the range sensor reaches, in metres from the robot's centre."""
     communication_range: float | None = None
     """How far robots hear each other, in metres; without limit by default."""
+    kinematics: Literal["point", "unicycle"] = "point"
+    """What robots can do: move in any direction, or drive on two wheels and turn (differential drive)."""
+    track_width: float = 0.0
+    """Distance between a unicycle's wheels in metres; 1.6 radii where it is 0."""
+    turning_rate: float = 4.0
+    """Largest turning rate of a unicycle in rad/s."""
     out: Path | None = None
     """Folder for the results."""
     overwrite: bool = False
     """Replace an earlier result in that folder."""
+    no_pictures: bool = False
+    """Save the numbers only, without trajectories and cost as pictures."""
     film: tyro.conf.OmitArgPrefixes[FilmOptions] = field(default_factory=FilmOptions)
 
     def __post_init__(self) -> None:
@@ -255,6 +290,8 @@ class RunOptions(ScenarioOptions, JsonOption):
         said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
         if self.communication_range is None:
             said["communication_range"] = math.inf
+        if self.kinematics == "unicycle":
+            said["kinematics"] = self.kinematics
         return Team.homogeneous(self.robots, **said) if self.team is None else read_team(self.team, said)
 
     def spec(self, environment: Environment, controller: str, gains: Mapping[str, Any]) -> RunSpec:

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import shutil
 import subprocess
 import tempfile
 from collections import deque
@@ -115,16 +116,22 @@ def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[Binar
             raise OutputError(f"{path}: the film's encoder failed ({why})")
 
 
+def encoder() -> str:
+    """Return where ffmpeg is: that of the extra "film", else one on the path; raises OutputError for none."""
+    with contextlib.suppress(ModuleNotFoundError, RuntimeError):
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        return str(get_ffmpeg_exe())
+    if found := shutil.which("ffmpeg"):
+        return found
+    raise OutputError(
+        'film: no ffmpeg was found: pip install "robocov[film]", or set IMAGEIO_FFMPEG_EXE to one'
+    )
+
+
 def film_command(path: Path, size: tuple[int, int], fps: float, *, streamed: bool = False) -> list[str]:
     """Return the encoder's command: raw RGB frames in, an MP4 film out, playable while `streamed`."""
-    import imageio_ffmpeg
-
-    try:
-        ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
-    except RuntimeError as error:
-        raise OutputError(
-            "film: no ffmpeg was found; set IMAGEIO_FFMPEG_EXE to one, or reinstall imageio-ffmpeg"
-        ) from error
+    ffmpeg = encoder()
     flags = "+frag_keyframe+empty_moov+default_base_moof" if streamed else "+faststart"
     return [
         *(ffmpeg, "-y", "-nostdin", "-loglevel", "error"),

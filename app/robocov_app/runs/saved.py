@@ -33,7 +33,7 @@ class Saved(NamedTuple):
 
 
 class Roster(NamedTuple):
-    """Who is who in a record: the map without robots that failed, and where these stand, m."""
+    """Robots of a record: the map without robots that failed, and where these stand, m."""
 
     environment: Environment
     numbers: tuple[int, ...]

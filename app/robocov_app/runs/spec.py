@@ -1,4 +1,4 @@
-"""What a run is, for whoever does it: the window, the command line, a sweep, learning, the paper."""
+"""Specification of a run, shared by the window, the command line, a sweep, learning and the paper."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +23,8 @@ class RunSpec:
     """One run: all that its result depends on; the only place that makes simulations and recorders of it.
 
     `source`: the file of `controller`, where that may be gone. `positions`, `velocities`, (n, 2) m and m/s:
-    else drawn by `start` and `seed`, and at rest. `duration` and the control period `dt` are in s.
+    else drawn by `start` and `seed`, and at rest. `steering`: see `Simulation`. `duration` and
+    the control period `dt` are in s.
     """
 
     environment: Environment
@@ -35,13 +36,14 @@ class RunSpec:
     seed: int | None = 0
     positions: Array | None = None
     velocities: Array | None = None
+    steering: Array | None = None
     duration: float = 60.0
     dt: float = DEFAULT_DT
     conditions: Conditions | None = None
 
     @cached_property
     def starts(self) -> Array:
-        """Where the robots begin, (n, 2) m; raises StartError when there is no room for the team."""
+        """Starting positions, (n, 2) m; raises StartError when there is no room for the team."""
         if self.positions is not None:
             return self.positions
         radius = float(self.team.radius.max())  # room for the largest
@@ -72,6 +74,7 @@ class RunSpec:
             self.team,
             self.dt,
             velocities=self.velocities,
+            steering=self.steering,
             steps=steps,
             resumed=resumed,
             conditions=self.conditions,

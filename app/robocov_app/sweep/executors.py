@@ -64,7 +64,7 @@ class Executor(ABC):
     @property
     @abstractmethod
     def most(self) -> int:
-        """How many tasks should be handed out at once, so that nobody is idle."""
+        """Number of tasks to hand out at once, so that nobody is idle."""
 
     @abstractmethod
     def _hand_out(self, task: Task) -> None: ...
@@ -91,7 +91,7 @@ class Executor(ABC):
 
     @property
     def busy(self) -> int:
-        """How many tasks were submitted and have not come back."""
+        """Number of submitted tasks that have not come back."""
         return self._out + len(self._backlog) + len(self._alone)
 
     @property
@@ -302,7 +302,7 @@ class Cluster(Executor):
 
     @property
     def threads(self) -> int:
-        """How many tasks the cluster does at once."""
+        """Number of tasks that the cluster does at once."""
         if time.monotonic() - self._asked > _LOOK:
             self._threads = 0
             with suppress(Exception):  # the scheduler may be gone

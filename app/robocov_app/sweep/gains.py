@@ -51,7 +51,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How all ranges of a controller are sampled together by `scipy.stats.qmc`, scrambled."""
+    """Joint sampling of a controller's ranges by `scipy.stats.qmc`, scrambled."""
 
     method: Method = "sobol"
     samples: int = 16
@@ -79,7 +79,7 @@ Choice: TypeAlias = Mapping[str, Value]
 """A value for every gain of a controller."""
 
 Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
-"""What a study may be told of a controller's gains; see `Gains.of`."""
+"""Accepted forms of a controller's gains in a study; see `Gains.of`."""
 
 
 @dataclass(frozen=True)

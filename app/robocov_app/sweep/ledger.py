@@ -37,7 +37,7 @@ _NAMED = 5  # damaged runs that are named
 
 
 class Entry(NamedTuple):
-    """What the table holds of a run; no figures where it failed, not `checked` in version 1."""
+    """Ledger entry of a run; no figures where it failed, not `checked` in version 1."""
 
     figures: Mapping[str, float | int | None]
     error: str | None
@@ -165,12 +165,6 @@ class Ledger:
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
         return Entry(outcome.figures, outcome.error, outcome.versions)
 
-    def _tidy(self) -> None:
-        for folder in (self._runs, self.folder):
-            for part in folder.glob(".*"):
-                if _LEFT_OVER.fullmatch(part.name):
-                    _remove(part)
-
 
 def difference_of(versions: Mapping[str, str]) -> str:
     """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
@@ -198,7 +192,9 @@ def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     with locked(folder):
         ledger = Ledger(folder)
         try:
-            ledger._tidy()
+            for part in (*ledger._runs.glob(".*"), *folder.glob(".*")):
+                if _LEFT_OVER.fullmatch(part.name):
+                    _remove(part)
             # first: it says that the folder is ours
             if not (folder / "results.parquet").exists():
                 write_json(folder / STUDY, study)

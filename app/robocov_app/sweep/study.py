@@ -19,7 +19,7 @@ from robocov.controllers.user_modules import Source, own_modules
 from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, checked, place, shown, unknown_name
 from robocov.mapfile import to_json
-from robocov.robots import DEFAULT_RADIUS, Team, team_of_groups
+from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.spec import MOST_ROWS
@@ -28,14 +28,14 @@ from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, onc
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
 
-WORDS = ("fail", "join")  # conditions that are texts: ``3@20 5@40`` are two failures, in one run
-CONDITIONS = (*LIMITS, *WORDS)  # the conditions that a study may sweep
+WORDS = ("fail", "join", "kinematics")  # those that are texts: ``3@20 5@40`` are two failures, in one run
+CONDITIONS = (*LIMITS, *WORDS[:2])  # the conditions that a study may sweep
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
 """Units of all that may be varied."""
 
-_KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m"}
+_KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m", "rad/s": "_rad_s"}
 _KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
 """Units in the names of columns."""
 
@@ -118,6 +118,8 @@ ALL = "*"  # stands for all starts of a map
 
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
+UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
+"""More of them, with defaults: what is as by default a study does not tell."""
 
 _RANGES = ("sensing_range", "communication_range")  # those that may be without limit
 
@@ -139,7 +141,7 @@ class StudyMap:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What a sweep runs: every combination of what is given, from the same starts for every controller.
+    """Definition of a sweep: every combination of what is given, from the same starts for every controller.
 
     What has the type `Swept` is a value, in SI units, or several of which each is tried. Raises
     ParameterError or StartError, whose message begins with the place, as in ``gains.rapf.k_rep[1]``.
@@ -159,6 +161,9 @@ class Study:
     viscosity: Swept = 2.0
     sensing_range: Swept = 3.0
     communication_range: Swept = None  # without limit
+    kinematics: str | Sequence[str] = "point"
+    track_width: Swept = 0.0
+    turning_rate: Swept = TURNING_RATE
     conditions: Mapping[str, Any] = field(default_factory=dict)  # of lists each is tried
     group: Sequence[Mapping[str, Any]] = ()  # robots that differ, as in a team file
     lattice: int = 64
@@ -206,7 +211,7 @@ class Study:
             )
 
     def __len__(self) -> int:
-        """How many runs there are."""
+        """Number of runs."""
         starts = sum(len(self.starts_on(each)) for each in self.maps)
         choices = sum(len(self.gains_of(name).choices) for name in self.controllers)
         return starts * len(self.robots) * len(self.teams) * len(self.seeds) * choices
@@ -297,13 +302,14 @@ class Study:
                     raise type(error)(f"starts[{k}]: {error}") from None
 
     def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
+        names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
         axes: list[Sequence[TeamValue]] = [
-            axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in TEAM
+            axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names
         ]
         conditions = condition_axes(self.conditions)
         if self.group:
             conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
-        names = (*TEAM, *conditions)
+        names = (*names, *conditions)
         teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *conditions.values()))
         for team in teams:
             for robots in self.robots:
@@ -353,19 +359,25 @@ def source_json(source: Source) -> dict[str, Any]:
     return {"source": source.text, **({"modules": modules} if modules else {})}
 
 
-def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> float | None:
+def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
+    if name == "kinematics":
+        if value not in KINEMATICS:
+            raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
+        return str(value)
     if name in _RANGES and value in (None, NO_LIMIT, math.inf):
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
     number = float(value)
-    placed(path, lambda: Team.homogeneous(1, **{name: number}))
+    one: dict[str, Any] = {name: number}
+    placed(path, lambda: Team.homogeneous(1, **one))
     return number
 
 
 def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     """Return so many robots with the parameters of a study, equal ones but for its groups."""
-    values = {name: math.inf if team[name] is None else float(team[name] or 0.0) for name in TEAM}
+    values: dict[str, Any] = {name: math.inf if team[name] is None else team[name] for name in TEAM}
+    values |= {name: team[name] for name in UNICYCLES if name in team}
     if GROUPS in team:
         return team_of_groups(json.loads(str(team[GROUPS])), ("team", "group"), values)
     return Team.homogeneous(robots, **values)

@@ -11,14 +11,14 @@ from robocov.errors import InputError, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.sweep.gains import NO_LIMIT, Method, Range, Sampling, Scale, once
-from robocov_app.sweep.study import ALL, CONDITIONS, MOST_RUNS, TEAM, Study, StudyMap
+from robocov_app.sweep.study import ALL, CONDITIONS, MOST_RUNS, TEAM, UNICYCLES, Study, StudyMap
 
 Check: TypeAlias = Callable[[Any], Any]
 """Returns a value as it is meant; raises ValueError when it is of another kind."""
 
 
 class _Value(NamedTuple):
-    """What may stand at a key: one value, a list, or a table, and these in words."""
+    """Accepted values of a key: one value, a list, or a table, and these in words."""
 
     one: Check | None
     wanted: str
@@ -60,6 +60,7 @@ _RANGE = _Table(
 )
 _LIMIT_WORDS = f'a number, or "{NO_LIMIT}" for no limit,'
 _TEAM = _Value(_LIMIT, "a number, or a list of numbers,", _LIMIT, _LIMIT_WORDS)
+_KINDS = _Value(_TEXT, _TEXTS, _TEXT, "a text")
 _CONDITION = _Value(_WORD, "a number or a text, or a list of them,", _WORD, "a number or a text")
 _GAIN_WORDS = "a number or a word, a list of them, or a range {low, high},"
 _GAIN = _Value(_WORD, _GAIN_WORDS, _WORD, f'a number, "{NO_LIMIT}" for no limit, or a word,', _RANGE)
@@ -77,7 +78,10 @@ _STUDY = _Table(
         **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _ONE),
         "lattice": _COUNT,
         "metrics": _Value(_of(bool), "true or false"),
-        "team": _Table("a table [team]", {**dict.fromkeys(TEAM, _TEAM), "group": _GROUPS}),
+        "team": _Table(
+            "a table [team]",
+            {**dict.fromkeys((*TEAM, *UNICYCLES), _TEAM), "kinematics": _KINDS, "group": _GROUPS},
+        ),
         "conditions": _Table("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
         "sampling": _Table(
@@ -88,7 +92,7 @@ _STUDY = _Table(
     },
     ("maps", "controllers"),
 )
-"""What a study file may hold. What is not given is as `Study` has it."""
+"""Schema of a study file. What is not given is as `Study` has it."""
 
 
 class _Reading:

@@ -31,7 +31,7 @@ PERIOD = 10.0  # seconds between two lines where there is no terminal
 
 @dataclass
 class Count:
-    """How many runs there are, and what became of them so far."""
+    """Number of runs, done and left."""
 
     total: int
     done: int = 0
@@ -138,7 +138,7 @@ _ERRORS = 3  # different errors of runs that are told
 
 @dataclass
 class Totals:
-    """What became of the runs of a study.
+    """Totals of the runs of a study.
 
     `failed` counts earlier ones too. `errors`: the first different ones, by run. `versions`: how many runs
     were made with which. `table_replaced`: false where the table would have become shorter.
@@ -302,7 +302,7 @@ class _Rows:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What a sweep would take, by one `run` of it: seconds for all that are left, bytes for all."""
+    """Estimate of a sweep by one `run` of it: seconds for all that are left, bytes for all."""
 
     runs: int
     left: int

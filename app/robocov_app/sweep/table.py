@@ -171,7 +171,9 @@ class Table:
         """Append a row; what it does not hold is null."""
         if self._broken is not None:
             raise self._broken
-        values = {column.name: _cell(row.get(column.name), column.kind) for column in self._columns}
+        values = {name: row.get(name) for name in self._names}
+        texts = [name for name, kind, *_ in self._columns if kind == "string" and values[name] is not None]
+        values |= {name: str(values[name]) for name in texts}
         try:
             self._write(_csv_line(values.values()))
             self._rows.append(values)
@@ -225,7 +227,8 @@ class Table:
         names = {PARQUET: _PART.format("parquet")}
         names |= {} if self.replaced else {CSV: _PART.format("csv")}
         with _told(self._folder / PARQUET):
-            if self._study is not None and not _holds(self._folder / "study.json", self._study):
+            study = self._folder / "study.json"
+            if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
                 names["study.json"] = ".study.part.json"
                 (self._folder / names["study.json"]).write_bytes(self._study)
             on_disk([self._folder / part for part in names.values()] + [self._folder / CSV] * self.replaced)
@@ -233,10 +236,6 @@ class Table:
                 (self._folder / part).replace(self._folder / name)
             on_disk([self._folder])
         self.replaced = True
-
-
-def _holds(path: Path, content: bytes) -> bool:
-    return path.is_file() and path.read_bytes() == content
 
 
 @contextmanager
@@ -262,10 +261,6 @@ def _csv_line(values: Any) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(values)
     return text.getvalue()
-
-
-def _cell(value: object, kind: str) -> object:
-    return str(value) if kind == "string" and value is not None else value
 
 
 def _schema(columns: Sequence[Column]) -> pa.Schema:

@@ -13,13 +13,17 @@ from typing import Any
 
 import numpy as np
 
+from robocov.controllers import information_of
+from robocov.controllers.user_modules import provided
 from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
 from robocov.metrics import CostHistory, cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
-from robocov.record import ARRAYS, Record, versions
+from robocov.planning.discovered import DiscoveredMap
+from robocov.record import Record, versions
+from robocov.simulation import Simulation
 from robocov_app.runs.run import cost_table
 from robocov_app.runs.spec import RunSpec
 from robocov_app.sweep.study import Task, conditions_of, source_json, team_of
@@ -33,7 +37,10 @@ FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
     *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
 )
-"""What the table holds of a run, in this order."""
+"""Figures of a run in the table, in this order."""
+
+EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
+POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
 
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 
@@ -52,7 +59,7 @@ def made_with() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a task: files of the run's folder, figures of the table, or why it failed."""
+    """Outcome of a task: files of the run's folder, figures of the table, or why it failed."""
 
     files: Mapping[str, bytes]
     figures: Mapping[str, float | int | None]
@@ -90,13 +97,57 @@ def failed(message: str, details: str) -> Outcome:
 
 def simulated(task: Task, environment: Environment) -> Record:
     """Simulate a run, and return the whole of it."""
+    return measured(task, environment)[0]
 
-    def tidy(step: int) -> bool:
-        if step and step % _TIDY == 0:
-            gc.collect(0)
-        return False
 
-    return spec_of(task, environment).record(watch=tidy)
+def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, float | None]]:
+    """Simulate a run, and return the whole of it, and what it took: what ``effort.json`` holds."""
+    spec = spec_of(task, environment)
+    with provided(spec.source.modules if spec.source else {}):
+        simulation = spec.simulation()
+        telling = Telling(simulation)
+
+        def watch(step: int) -> bool:
+            if step and step % _TIDY == 0:
+                gc.collect(0)
+            if step and task.metrics:
+                telling.count()
+            return False
+
+        record = spec.record(simulation, watch=watch)
+    return record, {"deciding_s": simulation.deciding, "told_bytes": telling.bytes}
+
+
+class Telling:
+    """Counts the bytes that robots tell each other, whether they are heard or not.
+
+    A message is a position, `POSITION` bytes with the robot's number, at the rate of the conditions or each
+    control period. Robots that share maps also tell each cell of theirs that has changed, `CELL` bytes with
+    its number, whoever they know it from. The bytes are None where a law shares other maps than ours.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        conditions = simulation.conditions
+        rate = None if conditions is None else conditions.message_rate
+        self._share = 1.0 if rate is None else min(1.0, rate * simulation.dt)
+        self._sharing = information_of(simulation.controller) == "shared map"
+        self._maps = self._known()
+        self.bytes: float | None = 0.0
+
+    def _known(self) -> tuple[DiscoveredMap, ...] | None:
+        return getattr(self._simulation.memory, "maps", None) if self._sharing else ()
+
+    def count(self) -> None:
+        """Count what is told in the step that was just made."""
+        before, self._maps = self._maps, self._known()
+        if self.bytes is None or before is None or self._maps is None:
+            self.bytes = None
+            return
+        self.bytes += self._share * POSITION * int(self._simulation.working.sum())
+        for old, new in zip(before, self._maps, strict=True):
+            if new is not old:
+                self.bytes += CELL * int(np.count_nonzero(new.state != old.state))
 
 
 def spec_of(task: Task, environment: Environment) -> RunSpec:
@@ -148,7 +199,7 @@ def _undisturbed() -> Iterator[None]:
 
 def _performed(task: Task) -> Outcome:
     environment, cost = prepared(task)
-    record = simulated(task, environment)
+    record, effort = measured(task, environment)
     history = cost_history(record, cost, task.cost_hz)
     # of all moments: what is kept of them is for people to look at
     summary = finite(summarise(record, history))
@@ -159,7 +210,10 @@ def _performed(task: Task) -> Outcome:
         known[TIMED] = figures[TIMED]
     if task.metrics:
         known |= finite(figures_of(record, history))
-    return Outcome(_files(task, record, history, summary), known)
+    files = _files(task, record, history, summary)
+    if task.metrics:
+        files[EFFORT] = json_text(effort).encode()
+    return Outcome(files, known)
 
 
 def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]) -> dict[str, bytes]:
@@ -169,7 +223,7 @@ def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[st
         content["controller"] |= source_json(task.source)
     kept = record.thinned(task.record_hz)
     arrays = io.BytesIO()
-    np.savez_compressed(arrays, **{name: getattr(kept, name) for name in ARRAYS})
+    np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
     return {
         "run.json": json_text(content).encode(),
         "record.npz": arrays.getvalue(),

@@ -1,1 +1,1 @@
-"""What the commands share: values of options, tables, progress, Ctrl-C."""
+"""Terminal services of the commands: values of options, tables, progress, Ctrl-C."""

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import tyro
 
@@ -21,11 +21,11 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     ),
     (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
     (
-        r"^Error parsing (\S+): no type matching \{None\}\|(INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
+        r"^Error parsing (\S+): no type matching (INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
         lambda match: f"{match[1]}: {match[3]}, but a {'whole ' * (match[2] == 'INT')}number was wanted",
     ),
     (
-        r"^Error parsing (\S+): no type matching \{None\}\|\{FLOAT FLOAT\} could be .* from \[(.*?)\]\. .*$",
+        r"^Error parsing (\S+): no type matching \{?FLOAT FLOAT\}? could be .* from \[(.*?)\]\. .*$",
         r"\1: \2, but two numbers were wanted",
     ),
     (
@@ -38,9 +38,13 @@ _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
 )
 
 
+_FIRST = ("map", "controller", "controllers", "out", "robots", "gains", "duration", "seed", "start", "video")
+_LAST = ("json", "overwrite")
+"""Options that the help lists first, and last."""
+
 _WORD = r"[A-Za-z][A-Za-z0-9_-]*"
 _JSON_WORDS = frozenset(("null", "true", "false", "NaN", "Infinity"))
-"""What a gain's value may look like where it is a word, and what looks so and is none."""
+"""Words that are JSON values, not words of an option."""
 
 
 def _choices(text: str) -> str:
@@ -53,13 +57,41 @@ def parsed(kind: type[T], command: str, words: list[str]) -> T:
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(
-                kind, prog=f"robocov {command}", args=words, config=(tyro.conf.FlagCreatePairsOff,)
-            )
+            config = tyro.conf.FlagCreatePairsOff, tyro.conf.DisallowNone
+            return tyro.cli(_for_readers(kind), prog=f"robocov {command}", args=words, config=config)
     except SystemExit as ending:
         if not ending.code:
             raise
         raise InputError(f"{one_line(complaint.getvalue())} (robocov {command} -h explains)") from None
+
+
+def _for_readers(kind: type[T]) -> type[T]:
+    """Return options with the most used ones first in the help, and without defaults that say nothing."""
+    hint = tyro.conf.arg(help_behavior_hint=_default_hint)
+    for each in (kind, *groups_of(kind)):
+        own: Any = each
+        hints = get_type_hints(own, include_extras=True)
+        own.__annotations__ = {name: Annotated[hints[name], hint] for name in hints}
+        order = [*_FIRST, *(name for name in own.__dataclass_fields__ if name not in _LAST), *_LAST]
+        known = own.__dataclass_fields__
+        own.__dataclass_fields__ = {name: known[name] for name in order if name in known}
+    return kind
+
+
+def _default_hint(label: str) -> str:
+    """Return what the help says of a default value.
+
+    >>> _default_hint("0.016666666666666666"), _default_hint("None")
+    ('(default: 0.01667)', '')
+    """
+    with contextlib.suppress(ValueError):
+        label = f"{float(label):.4g}" if "." in label else label
+    return "" if label in ("", "None", "False") else f"(default: {label})"
+
+
+def groups_of(kind: Any) -> list[Any]:
+    """Return the groups of options that a class of options has."""
+    return [each.default_factory for each in fields(kind) if is_dataclass(each.default_factory)]
 
 
 def by_option(kind: Any, message: str) -> str:
@@ -69,7 +101,7 @@ def by_option(kind: Any, message: str) -> str:
     >>> by_option(make_dataclass("Arguments", ["fail"]), "conditions.failures[0]: robot 9, but 1 was wanted")
     '--fail: robot 9, but 1 was wanted'
     """
-    groups = [kind, *(each.default_factory for each in fields(kind) if is_dataclass(each.default_factory))]
+    groups = [kind, *groups_of(kind)]
     found = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
     name = {"failures": "fail", "joins": "join"}.get(found[1], found[1]) if found else ""
     if found is None or not any(name == each.name for group in groups for each in fields(group)):

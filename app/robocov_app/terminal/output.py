@@ -1,4 +1,4 @@
-"""What commands answer: small files of results, names for them, and tables for people."""
+"""Output of commands: small files of results, names for them, and tables for people."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What both windows are built with; it knows no robots and no maps."""
+"""Toolkit of both windows; it knows no robots and no maps."""

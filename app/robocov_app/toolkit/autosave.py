@@ -1,9 +1,4 @@
-"""Work that survives a crash: kept aside while it is edited, and found again at the next start.
-
-Each open document has a folder of its own in the user's folder for states, locked while its program lives:
-so two programs never meet, and what one left behind that ended without a word can be told from what is being
-worked on. The environment variable ``ROBOCOV_DRAFTS`` names another folder, or none if it is empty.
-"""
+"""Work that survives a crash: each open document has a folder, locked while its program lives."""
 
 import json
 import os
@@ -31,13 +26,13 @@ _PATIENCE = 2.0  # seconds until it is tried again when work could not be writte
 _TRIES = 3  # folders that are tried to work in
 _YOUNG = 60.0  # seconds in which a folder without work may be one that a program is just making
 
-_Found = TypeVar("_Found")
+_Work = TypeVar("_Work")
 _Content = Callable[[], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
 class Record:
-    """What the folder of a document holds."""
+    """Content of a document's autosave folder."""
 
     folder: Path
     path: Path | None  # the document's file; None if it never had one
@@ -46,11 +41,7 @@ class Record:
 
 
 class Autosaver:
-    """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk.
-
-    Without a `folder` it keeps nothing. `kind` is the format that records name, `resumed` the folder of one
-    whose work goes on; OutputError when another program has taken it over.
-    """
+    """Keeps one document aside, in a thread of its own: only `flush` and `close` wait for the disk."""
 
     def __init__(
         self, folder: Path | None, kind: str, path: Path | None = None, resumed: Path | None = None
@@ -177,14 +168,8 @@ def autosave_folder() -> Path | None:
     return user_state_path("robocov", appauthor=False) / "drafts"
 
 
-def recoverable(
-    folder: Path | None, kind: str, read: Callable[[Record], _Found | None]
-) -> tuple[_Found, ...]:
-    """Return the work that programs left behind which live no more, the newest first.
-
-    `read` returns what a record stands for, None where nothing would be lost without it, and raises MapError
-    where it cannot be read. Folders without work are removed; what cannot be read stays, and is not offered.
-    """
+def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work | None]) -> tuple[_Work, ...]:
+    """Return what `read` makes of work that ended programs left, the newest first; remove empty folders."""
     found = []
     for place in _places(folder):
         try:

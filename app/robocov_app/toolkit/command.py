@@ -1,18 +1,4 @@
-"""Commands: one list a window, read by its keys, menus, buttons, help, tool tips and palette.
-
-How a window writes its list::
-
-    commands = Commands([
-        Command("pause", "Play or pause", "Run", editor.pause, keys=("space",)),
-        Command("remove", "Remove the robot", "Edit", viewer.remove, ("delete",), when=viewer.why_not),
-        Command("map", "Open a map", "Run", viewer.open_map, takes=Takes("name", options=viewer.maps)),
-        Command("speed", "Speed", "Run", viewer.set_speed, takes=Takes("factor", read=float)),
-    ], attempt=viewer.attempt)
-    commands.press(event)                       # a key of the keyboard
-    commands.do("pause")                        # a button or a menu
-    commands.typed("map office")                # raises InputError where it means nothing
-    commands.offered("map of")                  # what the palette lists, with completion
-"""
+"""Commands: one list a window, read by its keys, menus, buttons, help, tool tips and palette."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -20,14 +6,20 @@ from dataclasses import dataclass
 from functools import partial
 
 import pygame
+from pygame import Rect, Surface
 
 from robocov.errors import InputError, unknown_name
+from robocov_app.render.fonts import label, shortened, text_width
+from robocov_app.render.theme import Theme, mix
+from robocov_app.toolkit.dialogs import Choice, Option
 from robocov_app.toolkit.input import key_of, key_words
+from robocov_app.toolkit.overlay import card, dim
+from robocov_app.toolkit.ui import SMALL, TEXT, Ui
 
 
 @dataclass(frozen=True)
 class Takes:
-    """What is typed after a command's name."""
+    """Argument that is typed after a command's name."""
 
     name: str  # for the palette: "number of robots"
     read: Callable[[str], object] = str  # makes a value of what was typed; InputError
@@ -55,29 +47,14 @@ class Command:
         return f"{self.title} ({keys})" if keys else self.title
 
 
-@dataclass(frozen=True)
-class Offer:
-    """A line of the palette."""
-
-    text: str
-    aside: str  # its keys, or what it takes
-    fills: str  # what completion makes of what was typed
-    call: Callable[[], object] | None  # does it; None where more is to be typed first
-    why: str = ""  # it cannot be done now
-
-
 class Commands:
-    """The list of a window's commands.
-
-    `attempt` calls what it is given, and tells returned words or the error; `more` returns commands that come
-    and go, such as the gains of the controller in use.
-    """
+    """The list of a window's commands."""
 
     def __init__(
         self,
         listed: Iterable[Command],
-        attempt: Callable[[Callable[[], object]], object],
-        more: Callable[[], Iterable[Command]] = tuple,
+        attempt: Callable[[Callable[[], object]], object],  # calls it, and tells returned words or the error
+        more: Callable[[], Iterable[Command]] = tuple,  # that come and go, as gains of the controller in use
     ) -> None:
         self.listed = list(listed)
         self._attempt, self._more = attempt, more
@@ -139,8 +116,8 @@ class Commands:
             raise InputError(unknown_name("command", word, list(known)))
         return _done(known[word], rest)
 
-    def offered(self, text: str, most: int = 9) -> list[Offer]:
-        """Return what the palette lists for a text: commands, or completions of what one takes."""
+    def offered(self, text: str, most: int = 9) -> list[Option]:
+        """Return the palette's lines for a text, with what does them as value; None: more is to be typed."""
         word, rest = parted(text)
         command = self._typable().get(word)
         if command is not None and command.takes is not None and (rest or text.rstrip() != text):
@@ -149,24 +126,24 @@ class Commands:
         found = matching([each for each in commands if not each.hidden], text)
         return [self._offer(each) for each in found[:most]]
 
-    def _completions(self, command: Command, takes: Takes, rest: str, text: str) -> list[Offer]:
+    def _completions(self, command: Command, takes: Takes, rest: str, text: str) -> list[Option]:
         options, low, why = list(takes.options()), rest.lower(), command.when()
         begun = [each for each in options if each.lower().startswith(low)]
         begun += [each for each in options if low in each.lower() and each not in begun]
         found = []
         if rest in options or not begun:
-            found.append(Offer(text.strip(), takes.name, text, lambda: self.typed(text), why))
+            found.append(Option(text.strip(), takes.name, text, why, lambda: self.typed(text)))
         for option in begun:
             if option != rest:
                 whole = f"{command.name} {option}"
-                found.append(Offer(whole, "", whole, partial(self.typed, whole), why))
+                found.append(Option(whole, "", whole, why, partial(self.typed, whole)))
         return found
 
-    def _offer(self, command: Command) -> Offer:
+    def _offer(self, command: Command) -> Option:
         if command.takes is not None:
-            return Offer(command.title, f"{command.name} …", f"{command.name} ", None, command.when())
+            return Option(command.title, f"{command.name} …", f"{command.name} ", command.when())
         keys = " or ".join(key_words(key) for key in command.keys[:2])
-        return Offer(command.title, keys, command.title, lambda: self._do(command), command.when())
+        return Option(command.title, keys, command.title, command.when(), lambda: self._do(command))
 
 
 def _done(command: Command, *typed: str) -> object:
@@ -190,3 +167,142 @@ def matching(commands: Sequence[Command], typed: str) -> list[Command]:
     words, begun = typed.lower().split(), typed.lower().strip()
     found = [each for each in commands if all(word in f"{each.title} {each.name}".lower() for word in words)]
     return sorted(found, key=lambda each: not (each.name == begun or each.title.lower().startswith(begun)))
+
+
+def palette(commands: Commands, ghost: str, told: Callable[[str], object]) -> Choice:
+    """Return the dialog that finds and does commands; `told` gets the words of what was done, if any."""
+
+    def accept(text: str, option: Option | None) -> object:
+        if option is not None and option.value is None:
+            return option.fills
+        if option is not None and option.why:
+            raise InputError(option.why)
+        words = option.value() if option is not None and callable(option.value) else commands.typed(text)
+        told(words if isinstance(words, str) else "")
+        return None
+
+    hint = "↑ ↓ choose · Tab completes · Enter does it · Esc closes"
+    return Choice("", commands.offered, accept, ghost, hint)
+
+
+class Menu:
+    """Commands to choose from at a place of the window, None for a line between groups."""
+
+    def __init__(
+        self, rows: Sequence[Command | None], at: tuple[int, int], do: Callable[[str], object]
+    ) -> None:
+        self.commands, self.at, self._do = rows, at, do
+        self.open = True
+        self.chosen = -1
+        self._ui: Ui | None = None
+
+    def _page(self, ui: Ui) -> None:
+        ui.inset(5, 5, 5)
+        for k, command in enumerate(self.commands):
+            ui.row(height=7 if command is None else 24, below=0)
+            if command is None:
+                ui.cell()
+                continue
+            why, chosen = command.when(), k == self.chosen
+            if ui.option(command.title, _keys(command), key=command.name, chosen=chosen, why=why):
+                self._choose(command)
+
+    def _choose(self, command: Command) -> None:
+        self.open = False
+        self._do(command.name)
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Take an event; return whether it was meant for the menu. A press beside it closes it."""
+        if event.type == pygame.KEYDOWN:
+            self._key(key_of(event))
+        elif event.type == pygame.MOUSEBUTTONDOWN and self._ui is not None:
+            self.open = self._ui.box.collidepoint(event.pos)
+            return self._ui.take(event) or not self.open
+        elif self._ui is not None:
+            self._ui.take(event)
+        keys = (pygame.KEYDOWN, pygame.KEYUP, pygame.TEXTINPUT)
+        return event.type in (*keys, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION)
+
+    def _key(self, name: str) -> None:
+        usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
+        by = {"up": -1, "down": 1}.get(name, 0)
+        if name == "escape":
+            self.open = False
+        elif by and usable:
+            k = usable.index(self.chosen) + by if self.chosen in usable else (0 if by > 0 else -1)
+            self.chosen = usable[k % len(usable)]
+        elif name in ("return", "enter") and self.chosen in usable:
+            command = self.commands[self.chosen]
+            assert command is not None
+            self._choose(command)
+
+    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
+        """Draw it, whole in the window."""
+        if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
+            self._ui = Ui(self._page, theme, scale)
+            self._ui.background = None
+        wide = round(50 * scale) + max(
+            text_width(each.title, round(TEXT * scale)) + text_width(_keys(each), round(SMALL * scale))
+            for each in self.commands
+            if each is not None
+        )
+        high = round(sum(7 if each is None else 24 for each in self.commands) * scale + 10 * scale)
+        box = Rect(*self.at, wide, high)
+        self._ui.box = box.clamp(screen.get_rect())
+        card(screen, self._ui.box, theme, scale)
+        self._ui.stale = True
+        self._ui.draw(screen)
+        self._ui.draw_over(screen)
+
+
+def _keys(command: Command) -> str:
+    return key_words(command.keys[0]) if command.keys else ""
+
+
+def draw_keys(
+    screen: Surface,
+    theme: Theme,
+    scale: float,
+    commands: Iterable[Command],
+    groups: Sequence[str],
+    words: str,
+) -> None:
+    """Show the keys of commands, group by group in columns, under a line with a hint."""
+    dim(screen, theme)
+    keyed = [each for each in commands if each.keys and not each.hidden]
+    blocks: list[tuple[str, Command | None]] = []
+    for group in groups:
+        blocks.append((group, None))
+        blocks += [(group, each) for each in keyed if each.group == group]
+    width, height = screen.get_size()
+    row = 16.5 * scale
+    columns = 4 if width >= 1150 * scale else 3
+    # small windows get smaller letters rather than a page that does not fit
+    rows = -(-(len(blocks) + len(groups)) // columns) + 1
+    row = min(row, (height - 90 * scale) / rows)
+    size = max(8, round(row * 0.66))
+    box = Rect(0, 0, round(min(width - 24 * scale, 1240 * scale)), round(rows * row + 66 * scale))
+    box.center = width // 2, height // 2
+    card(screen, box, theme, scale)
+    title = label("Keys", round(16 * scale), theme.ink, True)
+    screen.blit(title, (box.left + round(20 * scale), box.top + round(12 * scale)))
+    hint = label(words, round(11 * scale), theme.faint)
+    screen.blit(hint, hint.get_rect(midright=(box.right - round(20 * scale), box.top + round(22 * scale))))
+    wide = (box.width - 40 * scale) / columns
+    x, y = box.left + 20 * scale, box.top + 44 * scale
+    limit = box.bottom - 14 * scale
+    for group, command in blocks:
+        # a heading does not stand alone at the foot of a column
+        if y + row * (2.6 if command is None else 1.0) > limit:
+            x, y = x + wide, box.top + 44 * scale
+        if command is None:
+            if y > box.top + 45 * scale:
+                y += 0.5 * row
+            heading = label(group.upper(), max(8, round(size * 0.92)), theme.final, True)
+            screen.blit(heading, (round(x), round(y)))
+        else:
+            screen.blit(label(key_words(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
+            told = shortened(command.title.partition(":")[0], size, wide - 92 * scale)
+            meaning = label(told, size, mix(theme.panel, theme.ink, 0.8))
+            screen.blit(meaning, (round(x + 84 * scale), round(y)))
+        y += row

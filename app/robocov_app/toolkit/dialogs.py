@@ -1,14 +1,4 @@
-"""Dialogs over a window: questions with answers, lists to choose from by typing, files.
-
-    dialogs = Dialogs()
-    dialogs.ask(Question("Save?", "It was edited.", [Answer("Save", save), Answer("Discard", leave)]))
-    dialogs.ask(Choice("Go to", lambda text: [Option(name, "robot") for name in names], go_to))
-    dialogs.ask(file_choice("Open a map", folder, open_map, endings=(".json",)))
-    if dialogs.take(event): ...          # all events of mouse and keyboard, while one is open
-    dialogs.draw(screen, theme, scale)
-
-`accept` of a choice may raise a RobocovError: it is told in the dialog, which keeps what was typed.
-"""
+"""Dialogs over a window: questions with answers, lists to choose from by typing, files."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
@@ -18,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 
 import pygame
+from pygame import Rect, Surface
 
 from robocov.errors import InputError, RobocovError
 from robocov_app.render.fonts import text_width
@@ -58,7 +49,7 @@ class Dialog(ABC):
 
 @dataclass
 class Answer:
-    """What can be answered: its words, what that does, and a key besides those of the focus."""
+    """Button of a dialog: its words, its action, and a key besides those of the focus."""
 
     text: str
     call: Callable[[], object] = lambda: None
@@ -129,17 +120,13 @@ class Option:
 
 @dataclass
 class Choice(Dialog):
-    """A list that typing narrows down.
-
-    `accept` is called with what is typed and the chosen line, None where there is none; an error it raises is
-    told below the field, and nothing typed is lost. What it returns is typed in place, if it is a text.
-    """
+    """A list that typing narrows down; an error of `accept` is told below, and nothing typed is lost."""
 
     width = 620.0
 
     title: str
     options: Callable[[str], Sequence[Option]]  # the lines for what is typed
-    accept: Callable[[str, Option | None], object]
+    accept: Callable[[str, Option | None], object]  # takes text and line; a text it returns is typed in place
     ghost: str = ""  # in the empty field
     hint: str = "↑ ↓ choose · Enter does it · Esc closes"
     none: str = "nothing of that name"
@@ -245,10 +232,7 @@ def file_choice(
     recent: Sequence[Path] = (),
     text: str = "",
 ) -> Choice:
-    """Return a choice of a file, with the `text` of a name of one to be saved.
-
-    Folders are walked into, and what is typed is a path from `folder`.
-    """
+    """Return a choice of a file by its path from `folder`; `text` is the name of one to be saved."""
     saves = bool(text)
 
     def path_of(typed: str) -> Path:
@@ -362,7 +346,7 @@ class Dialogs:
         self._ui = ui = Ui(page, theme, scale)
         self._high = 0.0
         ui.background = None
-        ui.box = pygame.Rect(0, 0, round(asked.width * scale), 100)
+        ui.box = Rect(0, 0, round(asked.width * scale), 100)
         ui.run(None, None)
         return ui
 
@@ -374,7 +358,7 @@ class Dialogs:
         elif composing or not asked.key(name, ui):
             ui.take(event)
 
-    def draw(self, screen: pygame.Surface, theme: Theme, scale: float) -> None:
+    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
         """Draw what is asked over everything else."""
         asked = self.asked
         if asked is None:
@@ -386,7 +370,7 @@ class Dialogs:
         wide = min(asked.width * scale, screen.get_width() - 24 * scale)
         for _ in range(2):  # its height is known after it has run
             high = min(round(self._high * scale) or 100, screen.get_height())
-            ui.box = pygame.Rect(0, 0, round(wide), high)
+            ui.box = Rect(0, 0, round(wide), high)
             top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
             ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
             ui.run(None, None)

@@ -11,10 +11,7 @@ SAME = 1e-6  # metres below which two points are one
 
 @dataclass
 class Outline:
-    """Points that are being drawn; `at` is the cursor's, where the next would go.
-
-    `press` and `release` return whether they complete the outline; `take` then hands it over.
-    """
+    """Points that are being drawn; `press` and `release` return whether they complete the outline."""
 
     least: int = 2  # points that are needed
     most: int = 1_000_000  # and that are taken

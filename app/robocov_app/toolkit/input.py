@@ -39,7 +39,17 @@ def wheel_notches(event: pygame.event.Event) -> float:
     return float(min(max(getattr(event, "precise_y", event.y) or event.y, -5.0), 5.0))
 
 
+_cursor = pygame.SYSTEM_CURSOR_ARROW
+
+
+def shown_cursor() -> int:
+    """Return the shape that the cursor has, or would have if the display had one."""
+    return _cursor
+
+
 def show_cursor(shape: int) -> None:
     """Give the mouse's cursor one of the system's shapes."""
+    global _cursor
+    _cursor = shape
     with suppress(pygame.error):  # not every display has cursors
         pygame.mouse.set_cursor(shape)

@@ -1,4 +1,4 @@
-"""Where everything stands in the window: arena, panel, plot, time line and status line. Pure arithmetic."""
+"""Window layout: arena, panel, plot, time line and status line. Pure arithmetic."""
 
 from math import floor
 from typing import NamedTuple, TypeAlias
@@ -10,7 +10,9 @@ Box: TypeAlias = tuple[int, int, int, int]
 
 PANEL, CHART, TRACK, STATUS, GAP, LEGEND_ROW = 320, 150, 26, 26, 2, 22
 SMALLEST = (900, 600)
-"""Width and height at scale 1 that everything has room in."""
+"""Width and height at scale 1 that everything has room in,"""
+UPRIGHT = (460, 600)
+"""and on a telephone that is held upright, where the panel, while it is shown, takes most of the width."""
 
 
 class Layout(NamedTuple):
@@ -78,10 +80,11 @@ def laid_out(
 def largest_scale(size: tuple[int, int]) -> float:
     """Return the largest scale that a window has room for: in steps, so that text does not tremble.
 
-    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480))]
-    [1.0, 1.125, 3.5, 0.625]
+    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480), (1170, 2532))]
+    [1.0, 1.125, 3.5, 0.625, 2.5]
     """
-    return max(floor(8 * min(size[0] / SMALLEST[0], size[1] / SMALLEST[1])) / 8, 0.25)
+    least = SMALLEST if size[0] >= size[1] else UPRIGHT
+    return max(floor(8 * min(size[0] / least[0], size[1] / least[1])) / 8, 0.25)
 
 
 def inside(box: Box, pixel: tuple[float, float]) -> bool:

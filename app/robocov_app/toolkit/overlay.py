@@ -1,9 +1,8 @@
-"""What lies over a window for a while: cards, tags, messages, a veil."""
-
-from collections.abc import Sequence
+"""Overlays of a window: cards, tags, messages, a veil."""
 
 import numpy as np
 import pygame
+from pygame import Rect, Surface
 
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas
@@ -15,15 +14,15 @@ from robocov_app.toolkit.layout import Box
 _FINE = 4
 
 
-def flat_canvas(surface: pygame.Surface, theme: Theme, scale: float) -> Canvas:
+def flat_canvas(surface: Surface, theme: Theme, scale: float) -> Canvas:
     """Return a canvas for strokes and words that are placed in pixels alone."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
     return Canvas(surface, camera, theme, scale, np.zeros(1, dtype=np.intp))
 
 
 @kept(4_000_000)
-def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, width: int) -> pygame.Surface:
-    large = pygame.Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
+def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, width: int) -> Surface:
+    large = Surface((size[0] * _FINE, size[1] * _FINE), pygame.SRCALPHA, 32)
     box = large.get_rect()
     pygame.draw.rect(large, edge, box, border_radius=radius * _FINE)
     inner = box.inflate(-2 * width * _FINE, -2 * width * _FINE)
@@ -31,9 +30,7 @@ def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, wid
     return pygame.transform.smoothscale(large.premul_alpha(), size)
 
 
-def rounded(
-    screen: pygame.Surface, box: pygame.Rect, fill: Colour, edge: Colour, radius: int, width: int = 1
-) -> None:
+def rounded(screen: Surface, box: Rect, fill: Colour, edge: Colour, radius: int, width: int = 1) -> None:
     """Draw a box with smooth round corners."""
     if box.width > 0 and box.height > 0:
         picture = _rounded(box.size, fill, edge, min(radius, min(box.size) // 2), width)
@@ -65,23 +62,23 @@ def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]
     return lines
 
 
-def card(screen: pygame.Surface, box: pygame.Rect, theme: Theme, scale: float) -> None:
+def card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
     """Draw a card with a soft edge."""
     edge = mix(theme.panel, theme.ink, 0.28)
     rounded(screen, box, theme.panel, edge, round(8 * scale), max(1, round(scale)))
 
 
-def dim(screen: pygame.Surface, theme: Theme) -> None:
+def dim(screen: Surface, theme: Theme) -> None:
     """Let everything so far step back."""
-    veil = pygame.Surface(screen.get_size(), pygame.SRCALPHA, 32)
+    veil = Surface(screen.get_size(), pygame.SRCALPHA, 32)
     veil.fill((*theme.background, 150))
     screen.blit(veil, (0, 0))
 
 
-def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
+def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
     """Write words on a small card that begins at a pixel, and stays on the surface."""
     size = round(theme.text * scale)
-    box = pygame.Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
+    box = Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
     box.midleft = round(at[0] - 6 * scale), round(at[1])
     box.clamp_ip(screen.get_rect())
     rounded(screen, box, theme.background, mix(theme.background, theme.ink, 0.3), round(4 * scale))
@@ -89,12 +86,10 @@ def tag(screen: pygame.Surface, words: str, at: tuple[float, float], theme: Them
     screen.blit(picture, picture.get_rect(center=box.center))
 
 
-def draw_status(
-    screen: pygame.Surface, box: Box, theme: Theme, scale: float, facts: Sequence[str], hint: str
-) -> None:
+def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: list[str], hint: str) -> None:
     """Draw the status line; what there is no room for is left out, from the end."""
     left, top, width, height = box
-    screen.fill(mix(theme.panel, theme.ink, 0.06), pygame.Rect(box))
+    screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
     canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2
     room = width - 44 * scale - canvas.text_width(hint, size)
     kept = list(facts)
@@ -105,9 +100,7 @@ def draw_status(
     canvas.text(hint, (left + width - 12 * scale, y), size=size, colour=theme.faint, anchor="right")
 
 
-def draw_message(
-    screen: pygame.Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool
-) -> None:
+def draw_message(screen: Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool) -> None:
     """Show a message at the foot of a box; nothing where there is none."""
     if not words:
         return
@@ -116,7 +109,7 @@ def draw_message(
     room = min(width - 80 * scale, 620 * scale)
     lines = [line for part in words.split("\n") for line in wrapped(part, size, room)]
     wide = max(text_width(line, size) for line in lines) + 28 * scale
-    box = pygame.Rect(0, 0, round(wide), round((len(lines) * 18 + 14) * scale))
+    box = Rect(0, 0, round(wide), round((len(lines) * 18 + 14) * scale))
     box.midbottom = round(left + width / 2), round(top + height - 42 * scale)
     fill = mix(theme.panel, theme.trajectory, 0.14) if trouble else theme.panel
     edge = theme.trajectory if trouble else mix(theme.panel, theme.ink, 0.3)

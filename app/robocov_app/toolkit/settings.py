@@ -1,4 +1,4 @@
-"""What a window remembers from one time to the next, as JSON in the user's folder for settings."""
+"""Persistent settings of a window, as JSON in the user's folder for settings."""
 
 import os
 from pathlib import Path

@@ -4,30 +4,16 @@ A page runs once for every event and once for every drawing; a widget returns wh
 this run: a button True, others the new value, None where nothing happened::
 
     def page(ui: Ui) -> None:
-        ui.header("RUN")
         ui.row(0, 0, 80)  # widths at scale 1 of the cells of the rows to come; 0 shares what is left
         if ui.button("Pause", key="pause", why="" if running else "nothing runs"):
             pause()
         if (robots := ui.text_entry("robots", str(count))) is not None:  # after Enter
             set_count(robots)
-        if (fade := ui.check("Fading", now=fades)) is not None:
-            set_fading(fade)
-        with ui.scroll("gains"):  # what is left of the box
-            for gain in gains:
-                ui.row(100, 0)
-                ui.label(gain.name, tip=gain.meaning)
-                if (place := ui.slider(gain.name, gain.place(), 0.0, 1.0)) is not None:
-                    set_gain(gain.at(place))
 
-    panel = Ui(page, theme, scale)
-    panel.box = pygame.Rect(960, 0, 320, 720)
-    panel.take(event)    # True where the event was meant for a widget
-    panel.draw(screen)   # then, over all else: panel.draw_over(screen)
-
-Keys of widgets are unique within a page. Lengths are pixels at scale 1. Where `why` is given a widget is
-disabled, and says so in its tool tip. Tab and Shift Tab move the focus once a widget has it.
+Keys of widgets are unique within a page. Where `why` is given a widget is disabled, and says so in its tip.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,10 +21,12 @@ from itertools import pairwise
 from time import perf_counter
 
 import pygame
+from pygame import Rect, Surface
 
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix
 from robocov_app.toolkit.input import DOUBLE, key_of, wheel_notches
+from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
 
@@ -61,7 +49,7 @@ class Shown:
 
     kind: str
     key: str
-    rect: pygame.Rect
+    rect: Rect
     text: str = ""
     value: object = None
     tip: str = ""
@@ -77,7 +65,7 @@ class _List:
     """An open list: what it offers, and where."""
 
     options: list[str]
-    rect: pygame.Rect
+    rect: Rect
     row: int
     chosen: int
     top: float = 0.0
@@ -87,10 +75,10 @@ class _List:
     def beyond(self) -> float:
         return max(len(self.options) * self.row + 2 - self.rect.height, 0)
 
-    def item(self, k: int) -> pygame.Rect:
+    def item(self, k: int) -> Rect:
         """Return where the option of a number is, which may be outside of the list."""
         y = self.rect.top + 1 + k * self.row - round(self.top)
-        return pygame.Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
+        return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
 
     def at(self, pixel: tuple[int, int]) -> int | None:
         if not self.rect.collidepoint(pixel):
@@ -110,7 +98,7 @@ class Ui:
 
     def __init__(self, page: Callable[["Ui"], None], theme: Theme, scale: float = 1.0) -> None:
         self.page, self.theme, self.scale = page, theme, scale
-        self.box = pygame.Rect(0, 0, 1, 1)  # where the page is, px
+        self.box = Rect(0, 0, 1, 1)  # where the page is, px
         self.background: Colour | None = theme.panel
         self.stale = True  # whether what was drawn is not what there is any more
         self.at = (-1, -1)
@@ -121,8 +109,8 @@ class Ui:
         self.open_list: _List | None = None
         self._open_key = ""
         self._event: pygame.event.Event | None = None
-        self.surface: pygame.Surface | None = None  # to draw on in cells; None in a run for an event
-        self._picture: pygame.Surface | None = None
+        self.surface: Surface | None = None  # to draw on in cells; None in a run for an event
+        self._picture: Surface | None = None
         self._folded: set[str] = set()
         self._scrolled: dict[str, float] = {}
         self._heights: dict[str, float] = {}
@@ -145,7 +133,7 @@ class Ui:
         self._order = []
         self.shown = {}
 
-    def run(self, event: pygame.event.Event | None, surface: pygame.Surface | None) -> None:
+    def run(self, event: pygame.event.Event | None, surface: Surface | None) -> None:
         """Run the page for an event, for a drawing, or to learn how high it is."""
         self._event, self.surface = event, surface
         self._begin()
@@ -171,7 +159,12 @@ class Ui:
         if kind == pygame.KEYDOWN and not self._key_is_ours(key_of(event)):
             return False
         if kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
-            return self._letters(event)
+            if self.edit is not None and kind == pygame.TEXTEDITING:
+                self.edit.composed = event.text
+            elif self.edit is not None:
+                self.edit.type(event.text)
+            self.stale |= self.edit is not None
+            return self.edit is not None
         if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
             return False
         if kind == pygame.MOUSEBUTTONDOWN and self.focus is not None:
@@ -213,17 +206,7 @@ class Ui:
             return not _is_function_key(name)
         return name in (*_ENTER, "space", "left", "right", "up", "down")
 
-    def _letters(self, event: pygame.event.Event) -> bool:
-        if self.edit is None:
-            return False
-        if event.type == pygame.TEXTEDITING:
-            self.edit.composed = event.text
-        else:
-            self.edit.type(event.text)
-        self.stale = True
-        return True
-
-    def draw(self, screen: pygame.Surface) -> None:
+    def draw(self, screen: Surface) -> None:
         """Draw the page, anew where something is different."""
         if self.stale or self._picture is None or self._picture.get_size() != self.box.size:
             self.stale = False
@@ -248,7 +231,7 @@ class Ui:
     def _tip_of(self) -> Shown | None:
         return next((each for each in self._under() if each.tip), None) if self.active is None else None
 
-    def draw_over(self, screen: pygame.Surface) -> None:
+    def draw_over(self, screen: Surface) -> None:
         """Draw what hangs over other things: the open list, the tool tip."""
         if self.open_list is not None:
             self._draw_list(screen, self.open_list)
@@ -257,11 +240,11 @@ class Ui:
             self._tipped = True
             self._draw_tip(screen, tipped)
 
-    def _draw_tip(self, screen: pygame.Surface, tipped: Shown) -> None:
+    def _draw_tip(self, screen: Surface, tipped: Shown) -> None:
         size, theme = self.px(SMALL), self.theme
         lines = wrapped(tipped.tip, size, self.px(240))
         high = self.px(SMALL + 5)
-        box = pygame.Rect(0, 0, max(text_width(line, size) for line in lines) + self.px(14), 0)
+        box = Rect(0, 0, max(text_width(line, size) for line in lines) + self.px(14), 0)
         box.height = high * len(lines) + self.px(9)
         box.topleft = self.at[0], tipped.rect.bottom + self.px(5)
         if box.bottom > screen.get_height():
@@ -281,14 +264,9 @@ class Ui:
         return self.edit is not None
 
     @property
-    def unfolded(self) -> bool:
-        """Whether a list is open, which may hang over other things."""
-        return self.open_list is not None
-
-    @property
     def busy(self) -> bool:
         """Whether somebody holds a widget, types or chooses."""
-        return self.active is not None or self.typing or self.unfolded
+        return self.active is not None or self.typing or self.open_list is not None
 
     def stop_typing(self) -> None:
         """Take the keys away from all widgets, and close the open list."""
@@ -343,7 +321,7 @@ class Ui:
         self.end_row()
         self.y += height
 
-    def cell(self) -> pygame.Rect:
+    def cell(self) -> Rect:
         """Take the next cell, px."""
         if not self._cells:
             self.row()
@@ -352,14 +330,14 @@ class Ui:
         x, width = self._cells[self._next]
         self._next += 1
         left, top = self.box.left + self.px(x), self.box.top + self.px(self.y)
-        return pygame.Rect(left, top, self.px(width), self.px(self._height))
+        return Rect(left, top, self.px(width), self.px(self._height))
 
     @property
-    def rest(self) -> pygame.Rect:
-        """What is left of the box below the last row, px."""
+    def rest(self) -> Rect:
+        """Rest of the box below the last row, px."""
         top = self.box.top + self.px(self.y + (self._height + self._below if self._next else 0.0))
         left = self.box.left + self.px(self.x)
-        return pygame.Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
+        return Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
 
     @contextmanager
     def scroll(self, key: str, height: float | None = None, margin: float = 12.0) -> Iterator[None]:
@@ -367,7 +345,7 @@ class Ui:
         self.end_row()
         room = self.rest.height / self.scale if height is None else height
         before = self.x, self.y, self.wide, self._clip
-        rect = pygame.Rect(self.box.left, self.rest.top, self.box.width, self.px(room))
+        rect = Rect(self.box.left, self.rest.top, self.box.width, self.px(room))
         needed = self._heights.get(key, 0.0)
         beyond = max(needed - room, 0.0)
         top = self._scrolled[key] = min(max(self._scrolled.get(key, 0.0), 0.0), beyond)
@@ -401,12 +379,12 @@ class Ui:
         self.end_row()
         self.y += (count - last) * height
 
-    def _bar(self, key: str, rect: pygame.Rect, needed: float, top: float) -> float:
+    def _bar(self, key: str, rect: Rect, needed: float, top: float) -> float:
         """Show a scroll bar, and take wheel and drags for it; return how far it is scrolled."""
         room = rect.height / self.scale
         event, name = self._event, f"bar:{key}"
-        track = pygame.Rect(rect.right - self.px(BAR + 1), rect.top, self.px(BAR), rect.height)
-        knob = pygame.Rect(0, 0, track.width, max(round(track.height * room / needed), self.px(20)))
+        track = Rect(rect.right - self.px(BAR + 1), rect.top, self.px(BAR), rect.height)
+        knob = Rect(0, 0, track.width, max(round(track.height * room / needed), self.px(20)))
         free = max(track.height - knob.height, 1)
         knob.topleft = track.left, track.top + round(free * top / (needed - room))
         if event is not None and event.type == pygame.MOUSEWHEEL and rect.collidepoint(self.at):
@@ -428,21 +406,19 @@ class Ui:
     # what widgets share
 
     def _shade(self, part: float) -> Colour:
-        """Return the panel's colour with a part of the ink's."""
         return mix(self.theme.panel, self.theme.ink, part)
 
-    def _draws(self, rect: pygame.Rect) -> bool:
+    def _draws(self, rect: Rect) -> bool:
         return self.surface is not None and bool(rect.colliderect(self._clip))
 
-    def _hovers(self, rect: pygame.Rect) -> bool:
+    def _hovers(self, rect: Rect) -> bool:
         free = self.open_list is None and self.active is None
         return free and rect.collidepoint(self.at) and self._clip.collidepoint(self.at)
 
     def _is(self, kind: int) -> bool:
-        """Return whether this is a run for an event of a kind."""
         return self._event is not None and self._event.type == kind
 
-    def _pressed(self, rect: pygame.Rect) -> bool:
+    def _pressed(self, rect: Rect) -> bool:
         return self._is(pygame.MOUSEBUTTONDOWN) and self._hovers(rect)
 
     def _key(self, key: str) -> str:
@@ -452,13 +428,13 @@ class Ui:
         return key_of(event) if event is not None and for_it else ""
 
     def _note(
-        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str = "", why: str = ""
+        self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
     ) -> None:
         tip = f"{tip}: {why}" if tip and why else tip or why
         self.shown[f"{kind}:{key}"] = Shown(kind, key, rect.clip(self._clip), text, value, tip, not why)
 
     def _clicks(
-        self, kind: str, key: str, rect: pygame.Rect, text: str, value: object, tip: str = "", why: str = ""
+        self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
     ) -> bool:
         """Show a widget; return whether it was clicked in this run, or pressed by a key."""
         self._note(kind, key, rect, text, value, tip, why)
@@ -476,12 +452,12 @@ class Ui:
         return False
 
     def _round(
-        self, rect: pygame.Rect, fill: Colour, edge: Colour | None = None, radius: float = 4, width: int = 1
+        self, rect: Rect, fill: Colour, edge: Colour | None = None, radius: float = 4, width: int = 1
     ) -> None:
         if self.surface is not None:
             rounded(self.surface, rect, fill, edge or fill, self.px(radius), width)
 
-    def _face(self, rect: pygame.Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
+    def _face(self, rect: Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
         """Draw the box of something to press; return the colour of what is on it."""
         theme, hovered = self.theme, self._hovers(rect)
         held = self.active == key and rect.collidepoint(self.at)
@@ -497,20 +473,13 @@ class Ui:
         self._ring(key, rect)
         return ink
 
-    def _ring(self, key: str, rect: pygame.Rect) -> None:
+    def _ring(self, key: str, rect: Rect) -> None:
         if self.surface is not None and self.focus == key:
             width = max(2, self.px(1.5))
             pygame.draw.rect(self.surface, self.theme.final, rect, width, border_radius=self.px(4))
 
     def _write(
-        self,
-        text: str,
-        rect: pygame.Rect,
-        colour: Colour,
-        size: float,
-        *,
-        bold: bool = False,
-        at: str = "left",
+        self, text: str, rect: Rect, colour: Colour, size: float, *, bold: bool = False, at: str = "left"
     ) -> None:
         if self.surface is not None and text and self._draws(rect):
             words = shortened(text, self.px(size), rect.width, bold)
@@ -570,11 +539,9 @@ class Ui:
             self._write(text, rect.inflate(-self.px(6), 0), ink, size, bold=chosen and not small, at="center")
         return clicked
 
-    def option(
-        self, text: str, aside: str = "", *, key: str = "", chosen: bool = False, why: str = ""
-    ) -> bool:
+    def option(self, text: str, aside: str = "", *, key: str, chosen: bool = False, why: str = "") -> bool:
         """Show a line of a list, with words at its right end; return whether it was clicked."""
-        key, rect = key or text, self.cell()
+        rect = self.cell()
         clicked = self._clicks("option", key, rect, text, chosen, "", why)
         if self._draws(rect):
             if chosen or self._hovers(rect):
@@ -588,7 +555,7 @@ class Ui:
                 self._write(line, inner.move(0, self.px((TEXT + 5) * k)), ink, TEXT)
         return clicked
 
-    def area(self, key: str) -> tuple[pygame.Rect, bool]:
+    def area(self, key: str) -> tuple[Rect, bool]:
         """Take the next cell for a picture; return where it is, px, and whether it was clicked."""
         rect = self.cell()
         return rect, self._clicks("area", key, rect, "", None)
@@ -624,30 +591,29 @@ class Ui:
         self.row()
         return is_open
 
-    def check(self, text: str, *, now: bool, key: str = "", tip: str = "", why: str = "") -> bool | None:
+    def check(self, text: str, *, now: bool, key: str = "", tip: str = "") -> bool | None:
         """Show a check box and its words; return its new state once it was clicked."""
         key, rect = key or text, self.cell()
-        clicked = self._clicks("check", key, rect, text, now, tip, why)
+        clicked = self._clicks("check", key, rect, text, now, tip)
         if self._draws(rect):
-            box = pygame.Rect(0, 0, self.px(16), self.px(16))
+            box = Rect(0, 0, self.px(16), self.px(16))
             box.midleft = rect.midleft
-            theme, hovered = self.theme, self._hovers(rect) and not why
+            theme, hovered = self.theme, self._hovers(rect)
             field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
-            on = self._shade(0.35) if why else theme.final
-            edge = on if now or hovered else self._shade(0.35)
-            self._round(box, on if now else field, edge, 3, max(1, self.px(0.75)))
+            edge = theme.final if now or hovered else self._shade(0.35)
+            self._round(box, theme.final if now else field, edge, 3, max(1, self.px(0.75)))
             if now:
                 self._tick(box)
             words = rect.move(self.px(23), 0)
             words.width -= self.px(23)
-            self._write(text, words, self._shade(0.45) if why else theme.ink, TEXT)
+            self._write(text, words, theme.ink, TEXT)
             self._ring(key, rect)
         return (not now) if clicked else None
 
-    def _tick(self, box: pygame.Rect) -> None:
+    def _tick(self, box: Rect) -> None:
         assert self.surface is not None
         side = 4 * box.width
-        large = pygame.Surface((side, side), pygame.SRCALPHA, 32)
+        large = Surface((side, side), pygame.SRCALPHA, 32)
         corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
         for start, end in pairwise(corners):
             pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side / 8)))
@@ -667,7 +633,7 @@ class Ui:
     ) -> float | None:
         """Show a slider; return where it was moved to. Arrows move it by `step`, or a fiftieth."""
         rect = self.cell()
-        track = pygame.Rect(rect.left, 0, rect.width, self.px(14))
+        track = Rect(rect.left, 0, rect.width, self.px(14))
         track.centery = rect.centery
         knob_wide = self.px(_KNOB)
         free, span = max(track.width - knob_wide, 1), max(high - low, 1e-300)
@@ -695,7 +661,7 @@ class Ui:
             self._draw_slider(key, track, min(max((shown - low) / span, 0.0), 1.0), why)
         return value
 
-    def _draw_slider(self, key: str, track: pygame.Rect, part: float, why: str) -> None:
+    def _draw_slider(self, key: str, track: Rect, part: float, why: str) -> None:
         theme, groove = self.theme, track.inflate(0, -self.px(8))
         half = groove.height // 2 / self.scale
         self._round(groove, self._shade(0.18), radius=half)
@@ -704,21 +670,20 @@ class Ui:
         accent = self._shade(0.35) if why else theme.final
         self._round(filled, mix(theme.panel, accent, 0.6), radius=half)
         strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
-        knob = pygame.Rect(0, 0, self.px(_KNOB), self.px(14))
+        knob = Rect(0, 0, self.px(_KNOB), self.px(14))
         knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
         self._round(knob, mix(accent, theme.ink, strength), radius=5)
         self._ring(key, track)
 
     def text_entry(
-        self, key: str, text: str, *, ghost: str = "", tip: str = "", why: str = "", live: bool = False
+        self, key: str, text: str, *, ghost: str = "", tip: str = "", live: bool = False
     ) -> str | None:
         """Show a field; return its text after Enter, with `live` after each letter."""
         rect = self.cell()
         given: str | None = None
-        if not why:
-            self._order.append(key)
-            if self._pressed(rect):
-                self._press_field(key, text, rect)
+        self._order.append(key)
+        if self._pressed(rect):
+            self._press_field(key, text, rect)
         edit = self.edit if self.focus == key else None
         if edit is not None:
             if self._is(pygame.MOUSEMOTION) and self.active == key:
@@ -734,12 +699,12 @@ class Ui:
         if live and edit is not None and edit.text != text:
             given = edit.text
         shown = edit.text if edit is not None else text
-        self._note("entry", key, rect, shown, text, tip, why)
+        self._note("entry", key, rect, shown, text, tip)
         if self._draws(rect):
-            self._draw_field(rect, edit, shown, ghost, why)
+            self._draw_field(rect, edit, shown, ghost)
         return given
 
-    def _press_field(self, key: str, text: str, rect: pygame.Rect) -> None:
+    def _press_field(self, key: str, text: str, rect: Rect) -> None:
         self._event = None
         now = perf_counter()
         double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
@@ -752,27 +717,27 @@ class Ui:
         if double:
             self.edit.select_word(self.edit.caret)
 
-    def _caret_at(self, edit: TextEdit, rect: pygame.Rect) -> int:
+    def _caret_at(self, edit: TextEdit, rect: Rect) -> int:
         size = self.px(TEXT)
         x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
         widths = [text_width(edit.text[:k], size) for k in range(len(edit.text) + 1)]
         return min(range(len(widths)), key=lambda k: abs(widths[k] - x))
 
-    def _shifted(self, edit: TextEdit, rect: pygame.Rect) -> int:
+    def _shifted(self, edit: TextEdit, rect: Rect) -> int:
         """Return by how much a long text stands further left, so that its caret is in sight."""
         before = text_width(edit.text[: edit.caret] + edit.composed, self.px(TEXT))
         return max(before - (rect.width - self.px(14)), 0)
 
-    def _draw_field(self, rect: pygame.Rect, edit: TextEdit | None, text: str, ghost: str, why: str) -> None:
+    def _draw_field(self, rect: Rect, edit: TextEdit | None, text: str, ghost: str) -> None:
         screen, theme, size = self.surface, self.theme, self.px(TEXT)
         assert screen is not None
-        stands_out = edit is not None or (self._hovers(rect) and not why)
-        edge = theme.final if stands_out else self._shade(0.14 if why else 0.24)
+        stands_out = edit is not None or self._hovers(rect)
+        edge = theme.final if stands_out else self._shade(0.24)
         width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
-        self._round(rect, theme.panel if why else field_colour(theme), edge, width=width)
+        self._round(rect, field_colour(theme), edge, width=width)
         inner = rect.inflate(-self.px(12), -self.px(4))
         if edit is None:
-            ink = theme.faint if not text else self._shade(0.45) if why else theme.ink
+            ink = theme.ink if text else theme.faint
             self._write(text or ghost, inner, ink, TEXT)
             return
         clip = screen.get_clip()
@@ -780,7 +745,7 @@ class Ui:
         left = inner.left - self._shifted(edit, rect)
         whole = edit.text[: edit.caret] + edit.composed + edit.text[edit.caret :]
         low, high = (text_width(edit.text[:k], size) for k in edit.selection)
-        tall = pygame.Rect(left + low, 0, high - low, self.px(17))
+        tall = Rect(left + low, 0, high - low, self.px(17))
         tall.centery = rect.centery
         if low != high:
             screen.fill(mix(field_colour(theme), theme.final, 0.35), tall)
@@ -790,27 +755,25 @@ class Ui:
         if edit.composed:
             wide = text_width(edit.composed, size)
             screen.fill(theme.ink, (x, tall.bottom - 1, wide, max(1, self.px(1))))
-            pygame.key.set_text_input_rect(pygame.Rect(x, rect.top, wide, rect.height))
+            pygame.key.set_text_input_rect(Rect(x, rect.top, wide, rect.height))
             x += wide
         screen.fill(theme.ink, (x, tall.top, max(1, self.px(1)), tall.height))
         screen.set_clip(clip)
 
     # lists that drop down
 
-    def dropdown(
-        self, key: str, options: Sequence[str], now: str, *, tip: str = "", why: str = ""
-    ) -> str | None:
+    def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
         """Show a menu that drops down; return what was chosen of it, if that is another."""
         rect = self.cell()
         picked = self.open_list.picked if self.open_list is not None and self._open_key == key else None
         if picked is not None:
             self.open_list = None
-        opened = self._clicks("menu", key, rect, now, now, tip, why) or self._key(key) == "down"
+        opened = self._clicks("menu", key, rect, now, now, tip) or self._key(key) == "down"
         if opened and picked is None:
             self._event = None
             self._unfold(key, rect, list(options), now)
         if self.surface is not None and self._draws(rect):
-            ink = self._face(rect, key, why)
+            ink = self._face(rect, key, "")
             words = rect.inflate(-self.px(18), 0)
             words.width -= self.px(12)
             self._write(now, words, ink, TEXT)
@@ -819,11 +782,11 @@ class Ui:
             pygame.draw.polygon(self.surface, ink, corners)
         return picked if picked != now else None
 
-    def _unfold(self, key: str, rect: pygame.Rect, options: list[str], now: str) -> None:
+    def _unfold(self, key: str, rect: Rect, options: list[str], now: str) -> None:
         row = self.px(LIST_ROW)
         high = min(len(options) * row + 2, self.px(LONGEST_LIST))
         below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
-        place = pygame.Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
+        place = Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
         if below < high and above > below:
             place.bottom = rect.top - self.px(2)
         wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
@@ -870,7 +833,7 @@ class Ui:
         self.run(None, None)
         self.open_list = None
 
-    def _draw_list(self, screen: pygame.Surface, found: _List) -> None:
+    def _draw_list(self, screen: Surface, found: _List) -> None:
         theme, field = self.theme, field_colour(self.theme)
         rounded(screen, found.rect, field, self._shade(0.4), self.px(4))
         inner = found.rect.inflate(-2, -2)
@@ -886,7 +849,7 @@ class Ui:
             screen.blit(picture, picture.get_rect(midleft=(item.left + self.px(8), item.centery)))
         if found.beyond:
             whole = inner.height + found.beyond
-            bar = pygame.Rect(0, 0, self.px(6), round(inner.height * inner.height / whole))
+            bar = Rect(0, 0, self.px(6), round(inner.height * inner.height / whole))
             bar.topright = inner.right - self.px(2), inner.top + round(found.top * inner.height / whole)
             rounded(screen, bar, self._shade(0.3), self._shade(0.3), self.px(3))
         screen.set_clip(None)
@@ -894,3 +857,36 @@ class Ui:
     def find(self, kind: str, key: str) -> Shown | None:
         """Return a widget that is shown, None if there is none of that kind and key."""
         return self.shown.get(f"{kind}:{key}")
+
+
+class SidePanel(ABC):
+    """A panel beside the arena whose page is drawn anew when the layout, or what it shows, is different."""
+
+    def __init__(self, tab: str) -> None:
+        self.tab = tab  # the page that is open
+        self.covered = False  # something else is drawn in its place, or takes the events
+        self.hidden = False
+        self.ui = Ui(self._page, LIGHT)
+        self._drawn: object = None  # what the page showed when it was drawn
+
+    @abstractmethod
+    def _page(self, ui: Ui) -> None:
+        """Show it."""
+
+    def arrange(self, layout: Layout, theme: Theme) -> None:
+        """Fit another layout and theme."""
+        self.hidden = not layout.panel[2]
+        if self.hidden:
+            self.ui.stop_typing()
+        if theme is not self.ui.theme or layout.scale != self.ui.scale:
+            self.ui = Ui(self._page, theme, layout.scale)
+        self.ui.box, self.ui.stale = Rect(layout.panel), True
+
+    def draw(self, screen: Surface) -> None:
+        """Draw the panel and what hangs over it."""
+        self.ui.draw(screen)
+        self.ui.draw_over(screen)
+
+    def take(self, event: pygame.event.Event) -> bool:
+        """Give an event to the widgets; return whether one of them took it."""
+        return not self.covered and not self.hidden and self.ui.take(event)

@@ -10,8 +10,10 @@ from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from time import perf_counter
+from typing import Protocol
 
 import pygame
+from pygame import Surface
 
 from robocov.errors import InputError
 from robocov.files.atomic import written
@@ -25,13 +27,27 @@ CALM = 0.8  # seconds of peace after which the loop waits for events; tool tips 
 PAUSE = 0.1  # seconds between two looks for something new, at most, while it waits
 
 
+class Remote(Protocol):
+    """Another place than a screen where a window is seen and touched."""
+
+    def wait(self, seconds: float) -> None:
+        """Wait until something comes in, and so many seconds at most."""
+
+    def receive(self, window: "BaseWindow") -> None:
+        """Give the window the size and look that are wanted there, and post what was done there."""
+
+    def send(self, surface: Surface) -> None:
+        """Show what is in the window now."""
+
+
 class BaseWindow(ABC):
     """A window that is drawn while something moves, and otherwise only when something is different."""
 
-    def __init__(self, size: tuple[int, int], screen: pygame.Surface | None = None) -> None:
+    def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
         self.screen = screen or open_window(size)
         self.windowed: tuple[int, int] | None = None  # the size before full screen
         self.closed = False
+        self.remote: Remote | None = None
         self.rate = float(FPS)
         self._calm = 0.0
         self._touched = False
@@ -57,6 +73,9 @@ class BaseWindow(ABC):
     def close(self) -> None:
         """End what is going on beside the window."""
 
+    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:  # noqa: B027 - some have one look
+        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
+
     def run(self) -> None:
         """Go on until the window is closed."""
         clock, before = pygame.time.Clock(), perf_counter()
@@ -66,6 +85,10 @@ class BaseWindow(ABC):
                     now = perf_counter()
                     self.frame(now - before)
                     before = now
+                    if self.remote is not None:
+                        pause = PAUSE if self.resting else 1.0 / FPS
+                        self.remote.wait(now + pause - perf_counter())
+                        continue
                     clock.tick(FPS)
                     # SDL's own way to wait for events looks for them a thousand times a second
                     while self.resting and perf_counter() - now < PAUSE and not pygame.event.peek():
@@ -89,9 +112,13 @@ class BaseWindow(ABC):
         if not (rested and self.resting and look == self._drawn):
             self.draw()
         self._drawn = look
+        if self.remote is not None:
+            self.remote.send(self.screen)
 
     def advance(self, seconds: float) -> None:
         """Take what has happened, and let so many seconds pass."""
+        if self.remote is not None:
+            self.remote.receive(self)
         events = pygame.event.get()
         self._touched = bool(events)
         for event in events:
@@ -106,6 +133,8 @@ class BaseWindow(ABC):
 
     def toggle_fullscreen(self) -> None:
         """Fill the screen, or be a window again."""
+        if self.remote is not None:  # it has the size of a page, which can do this by itself
+            return
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
         windowed, self.windowed = self.windowed, None if self.windowed else self.screen.get_size()
         full = pygame.FULLSCREEN
@@ -158,7 +187,7 @@ def fitting(size: tuple[int, int]) -> tuple[int, int]:
     return min(size[0], wide), min(size[1], high)
 
 
-def open_window(size: tuple[int, int]) -> pygame.Surface:
+def open_window(size: tuple[int, int]) -> Surface:
     """Show a window of a size, or give the one that is there another; return its surface."""
     screen = pygame.display.set_mode(size, pygame.RESIZABLE)
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():

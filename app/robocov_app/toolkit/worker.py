@@ -7,7 +7,6 @@ runs one in another process, `DirectWorker` in this one; `started` and `asked` a
 import ctypes
 import faulthandler
 import importlib
-import math
 import os
 import pickle
 import signal
@@ -19,6 +18,7 @@ import time
 import traceback
 from contextlib import suppress
 from dataclasses import dataclass
+from math import inf
 from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 
 from robocov.errors import RobocovError
@@ -70,9 +70,7 @@ class LatestWorker(Generic[_Answer]):
     that works longer than `patience`, s, on an older question is ended for a newer one.
     """
 
-    def __init__(
-        self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = math.inf
-    ) -> None:
+    def __init__(self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
         self.trouble = ""
         self._service, self._doing, self._wire, self._patience = service, doing, wire, patience
         self._since = 0.0
@@ -91,7 +89,7 @@ class LatestWorker(Generic[_Answer]):
 
     @property
     def progress(self) -> Any:
-        """How far the newest question is, as the service tells; None if it has not told yet."""
+        """Progress of the newest question, as the service tells; None if it has not told yet."""
         told = None if self._talk is None else self._talk.progress
         return told.answer if told is not None and told.number == self._number else None
 
@@ -158,7 +156,7 @@ class DirectWorker(Generic[_Answer]):
 
 
 Worker: TypeAlias = LatestWorker[_Answer] | DirectWorker[_Answer]
-"""What answers questions for a window."""
+"""Worker that answers a window's questions."""
 
 
 class _Talk:
@@ -230,7 +228,7 @@ class _Talk:
 
 
 class Line:
-    """What a service hears and says while it works: newer questions, and how far it is."""
+    """Channel of a service while it works: newer questions in, progress out."""
 
     def newer(self) -> list[Any]:
         """Return the questions that have come since."""
@@ -260,7 +258,6 @@ class _PipeLine(Line):
             os._exit(0)
 
     def taken(self) -> list[tuple[int, Any]]:
-        """Wait for questions, and take them."""
         with self._asked:
             self._asked.wait_for(lambda: self._questions)
             questions, self._questions = self._questions, []

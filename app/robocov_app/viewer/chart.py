@@ -75,7 +75,7 @@ class Chart:
         self._other: Box | None = None
         self._ghosts: list[tuple[int, Array]] = []
         self.hover: tuple[int, int] | None = None
-        """Where the cursor is in the window."""
+        """Cursor position in the window."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         """Take another layout and theme."""
@@ -86,7 +86,7 @@ class Chart:
 
     @property
     def plotted(self) -> Plotted:
-        """What is plotted now."""
+        """The quantity that is plotted now."""
         return chosen(self.viewer.session, self._wanted)
 
     def switch(self) -> str:
@@ -182,11 +182,11 @@ class Chart:
         weighed = ", weighed by φ" if density_label(session.environment) else ""
         title = f"{what.title}{weighed}, {what.unit}"
         canvas.text(title, (12 * scale, 0.5 * TOP * scale), bold=True)
-        self._offer(canvas, 12 * scale + canvas.text_width(title, bold=True))
-        if self.viewer.costs.state:
-            canvas.text(
-                self.viewer.costs.state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right"
-            )
+        named = 12 * scale + canvas.text_width(title, bold=True)
+        self._offer(canvas, named)
+        state = self.viewer.costs.state
+        if state and right - canvas.text_width(state) > named:
+            canvas.text(state, (right, 0.5 * TOP * scale), colour=theme.faint, anchor="right")
         ghosts = [ghost for ghost in session.ghosts if ghost.of == what.name]
         values = [pane.curves[what.name].value for pane in session.panes] + [ghost.value for ghost in ghosts]
         some = np.concatenate([v for v in values if len(v)] or [np.array([np.nan])])

@@ -132,7 +132,7 @@ class Costs:
 
 @dataclass(frozen=True, eq=False)
 class CostQuestion:
-    """What is the cost of positions on map `number`, which is told once? Without positions: prepare it."""
+    """Request for the cost on map `number`, which is told once. Without positions: prepare it."""
 
     number: int
     environment: Environment | None
@@ -144,7 +144,7 @@ class CostQuestion:
 
 
 class _Sites(NamedTuple):
-    """What is the same in all results on a map."""
+    """Shared part of all results on a map."""
 
     sites: Sites
     corners: Array

@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Report:
-    """What is said about a robot: its name, one short sentence, and why.
+    """Report on a robot: its name, one short sentence, and why.
 
     The vectors sum up to that of the resultant, to which limits and contacts have not been applied.
     """

@@ -71,7 +71,7 @@ class Part:
 
     @property
     def words(self) -> str:
-        """What it begins with."""
+        """First words of the caption."""
         return self.node.words
 
 
@@ -152,7 +152,8 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
             for begin, end, robot in part.touched
         ]
     known = part.begin == 0 or not remembers(setup.law.made())
-    repeatable = known and not part.touched
+    turned = record.steering is not None and bool(record.steering[0].any())
+    repeatable = known and not part.touched and not turned
     return {**said, "repeatable": repeatable} if said or not repeatable else {}
 
 

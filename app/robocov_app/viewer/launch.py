@@ -36,11 +36,12 @@ HEADLESS_FPS = 30
 
 @dataclass
 class Launcher:
-    """How a window is opened.
+    """Launch settings of a window.
 
     `folder`: where things are saved. `theme`, `size`, `scale`: None for what was used last. `also`,
     `without`: names of layers. `headless`: draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever
-    that takes. `laws`: names of controllers to choose from beside the built-in ones.
+    that takes. `served`: draw without a display, but live; nothing is remembered. `laws`: names of
+    controllers to choose from beside the built-in ones.
     """
 
     session: Session
@@ -52,6 +53,7 @@ class Launcher:
     also: frozenset[str] = frozenset()
     without: frozenset[str] = frozenset()
     headless: bool = False
+    served: bool = False
     laws: tuple[str, ...] = ()
     lattice: int = LATTICE
     file: Path | None = None
@@ -64,12 +66,12 @@ class Launcher:
         """Give the window, with settings from before, which are kept; InputError when there is no display."""
         keeper = None
         try:
-            with display(headless=self.headless, otherwise=NO_DISPLAY):
-                file = None if self.headless else settings_file()
+            with display(headless=self._alone, otherwise=NO_DISPLAY):
+                file = None if self._alone else settings_file()
                 settings, trouble = loaded(Settings, file)
                 window = self._opened(settings)
                 window.viewer.say(trouble)
-                if not self.headless and (left := recoverable(autosave_folder())):
+                if not self._alone and (left := recoverable(autosave_folder())):
                     window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
@@ -89,6 +91,11 @@ class Launcher:
                     if bad:
                         sys.stderr.write(f"robocov: {words}\n")
 
+    @property
+    def _alone(self) -> bool:
+        """Whether the window needs no screen, and remembers nothing."""
+        return self.headless or self.served
+
     def _opened(self, settings: Settings) -> Window:
         from robocov_app.render.picture import standard_layers
         from robocov_app.viewer.window import Window
@@ -99,17 +106,17 @@ class Launcher:
             shown = {layer.name for layer in layers} & set(settings.shown)
         self._only_now, self._not_now = self.also - shown, self.without & shown
         shown = (shown | self.also) - self.without
-        scale = self.scale or settings.scale or (1.0 if self.headless else screen_scale())
+        scale = self.scale or settings.scale or (1.0 if self._alone else screen_scale())
         size = self.size or (settings.width, settings.height)
         if self.size is None and self.scale is not None:  # text of that size needs a window of that size
             size = max(size[0], round(SMALLEST[0] * scale)), max(size[1], round(SMALLEST[1] * scale))
-        if self.size is None and not self.headless:
+        if self.size is None and not self._alone:
             size = fitting(size)
         if not self.headless:
             self.session.clock.budget = FRAME_BUDGET
         costs = Costs(self.lattice, direct=self.headless)
         try:
-            kept_in = None if self.headless else autosave_folder()
+            kept_in = None if self._alone else autosave_folder()
             known = self.session, costs, shown, self.folder, self.map_name, self.laws
             viewer = Presenter(*known, kept_in, self.file)
             viewer.theme = self.theme or settings.theme

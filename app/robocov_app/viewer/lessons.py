@@ -123,12 +123,12 @@ class LessonPlayer:
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """Text of the chapter."""
         return self.chapter.text
 
     @property
     def asks(self) -> list[str]:
-        """What is asked or handed over now, line by line."""
+        """Question or task of now, line by line."""
         chapter = self.chapter
         if self.state == "left":
             return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
@@ -149,7 +149,7 @@ class LessonPlayer:
 
     @property
     def seconds(self) -> float:
-        """How long the whole lesson takes at most where nobody answers, s on the wall."""
+        """Longest duration of the lesson where nobody answers, s on the wall."""
         return sum(
             (each.until.step or 0) / 60 / each.speed + READING * (2 if each.question else 1) + 0.5
             for each in self.lesson.chapters
@@ -157,7 +157,7 @@ class LessonPlayer:
 
     @property
     def progress(self) -> float:
-        """How much of the lesson is over, 0 to 1, by chapters."""
+        """Part of the lesson that is over, 0 to 1, by chapters."""
         end = self.chapter.until.step
         part = min(self.session.step_now / end, 1.0) if end else 0.5
         return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)

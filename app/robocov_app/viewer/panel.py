@@ -5,16 +5,13 @@ from itertools import chain, zip_longest
 from pathlib import Path
 
 import numpy as np
-import pygame
 
 from robocov.controllers import controller_kind, short_name
 from robocov.errors import ParameterError
 from robocov_app.render.fonts import shortened
-from robocov_app.render.theme import LIGHT, Theme
 from robocov_app.toolkit.command import Commands
-from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import flat_canvas
-from robocov_app.toolkit.ui import SMALL, Ui
+from robocov_app.toolkit.ui import SMALL, SidePanel, Ui
 from robocov_app.viewer.explain import NOTHING, Line, Report
 from robocov_app.viewer.parameters import Parameter, Pick
 from robocov_app.viewer.presenter import Presenter
@@ -41,32 +38,16 @@ _ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simu
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
 
-class Panel:
-    """Shows what there is, and lets it be edited.
-
-    `titles`: of layers, by their names. `do`: does a command by its name. `tab`: the page that is open.
-    `covered`: something else is drawn in its place. `report`: on the robot that is asked about.
-    """
+class Panel(SidePanel):
+    """Shows what there is, and lets it be edited; `report` is on the robot that is asked about."""
 
     def __init__(
         self, viewer: Presenter, titles: dict[str, str], commands: Commands, do: Callable[[str], None]
     ) -> None:
         self.viewer, self.titles, self._commands, self._do = viewer, titles, commands, do
-        self.tab = TABS[0]
-        self.covered = self.hidden = False
         self.report: Report | None = None
-        self.ui = Ui(self._page, LIGHT)
-        self._drawn: object = None
+        super().__init__(TABS[0])
         self._age = 0.0
-
-    def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Fit another layout and theme."""
-        self.hidden = not layout.panel[2]
-        if self.hidden:
-            self.ui.stop_typing()
-        if theme is not self.ui.theme or layout.scale != self.ui.scale:
-            self.ui = Ui(self._page, theme, layout.scale)
-        self.ui.box, self.ui.stale = pygame.Rect(layout.panel), True
 
     def show_tab(self, name: str) -> None:
         """Turn to a page."""
@@ -84,29 +65,6 @@ class Panel:
         old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
         if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
-
-    def draw(self, screen: pygame.Surface) -> None:
-        """Draw the panel and what hangs over it."""
-        self.ui.draw(screen)
-        self.ui.draw_over(screen)
-
-    @property
-    def typing(self) -> bool:
-        """Whether letters go into a field."""
-        return self.ui.typing
-
-    @property
-    def unfolded(self) -> bool:
-        """Whether a list is open, which may hang over other things."""
-        return self.ui.unfolded
-
-    def stop_typing(self) -> None:
-        """Take the keys away from all fields, and close lists."""
-        self.ui.stop_typing()
-
-    def take(self, event: pygame.event.Event) -> bool:
-        """Give an event to the widgets; return whether one of them took it."""
-        return not self.covered and not self.hidden and self.ui.take(event)
 
     # the page
 

@@ -1,11 +1,11 @@
-"""What the panel's sliders and words set: gains of a controller, limits of the team. Knows no pygame."""
+"""Parameters of the panel's sliders and words: gains of a controller, limits of the team. Knows no pygame."""
 
 import math
 from dataclasses import dataclass, replace
 
 from robocov.controllers.gains import Option
 from robocov.errors import ParameterError, shown
-from robocov.robots import UNITS
+from robocov.robots import KINEMATICS, TRACK_PER_RADIUS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 SPAN = 30.0
@@ -15,6 +15,7 @@ _END = 0.985  # from here on a slider says "no limit" where there may be none
 
 _KINEMATIC = "kinematic limit, the same for every controller"
 _SENSES = "how far the range sensor sees obstacles, from the robot's centre"
+_KINDS = "a point moves in any direction, a unicycle has two driven wheels and has to turn"
 _LIMITS = {
     "max_speed": ("largest speed", _KINEMATIC, (0.1, 10.0)),
     "max_acceleration": ("acceleration", _KINEMATIC, (0.1, 20.0)),
@@ -128,9 +129,10 @@ def gain_parameters(law: ControllerChoice) -> list[Parameter | Pick]:
     return found
 
 
-def limit_parameters(limits: TeamSpec) -> list[Parameter]:
-    """Return a slider for each limit of the team; what it sets, it sets for all robots."""
-    usual, found = TeamSpec(), []
+def limit_parameters(limits: TeamSpec) -> list[Parameter | Pick]:
+    """Return a slider for each limit of the team, and its kinematics; what is set, is set for all robots."""
+    found: list[Parameter | Pick] = []
+    usual, kind = TeamSpec(), KINEMATICS[limits.track_width > 0.0]
     for name, (label, meaning, (low, high)) in _LIMITS.items():
         if name in limits.different:
             label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
@@ -139,13 +141,15 @@ def limit_parameters(limits: TeamSpec) -> list[Parameter]:
         found.append(
             Parameter(f"team.{name}", label, UNITS[name], meaning, value, default, low, high, optional=ranged)
         )
-    return found
+    return [*found, Pick("team.kinematics", "kinematics", _KINDS, kind, KINEMATICS[0], KINEMATICS)]
 
 
-def with_limit(limits: TeamSpec, name: str, value: float | None) -> TeamSpec:
+def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSpec:
     """Return the limits with another value of one; `name` may begin with ``team.``."""
     name = name.removeprefix("team.")
-    number = math.inf if value is None else value
+    if name == "kinematics":
+        name, value = "track_width", TRACK_PER_RADIUS * limits.radius if value == KINEMATICS[1] else 0.0
+    number = math.inf if value is None else float(value)
     # set for all: what robots had of their own is gone
     different = {each: values for each, values in limits.different.items() if each != name}
     return replace(limits, **{name: number}, different=different)

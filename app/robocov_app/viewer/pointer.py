@@ -57,7 +57,7 @@ class Pointer:
         elif taken:
             self._viewer.cursor = None
         elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.stop_typing()
+            self._panel.ui.stop_typing()
             self._pressed(event, now)
         else:
             self._turned(WHEEL ** wheel_notches(event))

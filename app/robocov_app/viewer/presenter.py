@@ -29,7 +29,7 @@ FADE = 12.0  # seconds of path that trajectories show where they fade
 
 
 class Presenter:
-    """What the user does, in terms of the session, and what of it is shown.
+    """The user's actions in terms of the session, and what of it is shown.
 
     `shown`: names of layers. `folder`: where things are saved. `map_name`: a bundled name or a path. `laws`:
     names of controllers to choose from beside the built-in ones. `kept_in`: the folder for unsaved work.
@@ -92,7 +92,7 @@ class Presenter:
 
     @property
     def robots(self) -> int:
-        """How many robots there are in the chosen pane, those that failed with them."""
+        """Number of robots in the chosen pane, those that failed with them."""
         return len(self.numbers)
 
     def parameters(self) -> list[Parameter | Pick]:
@@ -324,7 +324,7 @@ class Presenter:
 
     @property
     def view(self) -> dict[str, object]:
-        """What is shown, and how, for the session's file."""
+        """View settings for the session's file."""
         return {"shown": sorted(self.shown), "theme": self.theme, "map": self.map_name}
 
     def save_session(self, path: Path | None = None) -> None:
@@ -394,7 +394,7 @@ class Presenter:
     def set_parameter(self, name: str, value: Value) -> None:
         """Give a gain of the chosen controller, or with ``team.`` a limit of the team, another value."""
         setup = self.session.setup(self.pane)
-        if name.startswith("team.") and not isinstance(value, str):
+        if name.startswith("team."):
             self.session.set_limits(with_limit(setup.limits, name, value))
         else:
             self.session.set_law(self.pane, setup.law.with_gain(name, value))

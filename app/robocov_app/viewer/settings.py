@@ -1,4 +1,4 @@
-"""What the window remembers from one time to the next, in the user's folder for settings."""
+"""Persistent settings of the window, in the user's folder for settings."""
 
 from typing import Literal
 
@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class Settings(BaseModel):
-    """How the window looks, not what happens in it."""
+    """Appearance of the window, not what happens in it."""
 
     model_config = ConfigDict(extra="ignore", frozen=True)
 

@@ -25,7 +25,7 @@ _RING = 48  # corners of the circle that shows the brush's size
 
 @dataclass(frozen=True)
 class Preview:
-    """What a tool is about to do: a `line` with marks, the obstacle, words beside the last point."""
+    """Preview of a tool's next action: a `line` with marks, the obstacle, words beside the last point."""
 
     line: tuple[Point, ...] = ()
     closed: bool = False
@@ -35,7 +35,7 @@ class Preview:
 
 
 class Tool:
-    """What the mouse does; this one does nothing. Returned words are told.
+    """Mouse tool; this one does nothing. Returned words are told.
 
     `press`: of the left button; `reach` is so many metres as a finger is wide, `number` the robot under the
     cursor. `move`: pressed or not. `finish`: Enter, a double or a right click. `cancel`: Escape; says whether

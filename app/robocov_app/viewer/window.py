@@ -10,10 +10,8 @@ from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
-from robocov_app.toolkit.command import Command, Commands
-from robocov_app.toolkit.command_palette import palette
+from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
-from robocov_app.toolkit.help import draw_keys
 from robocov_app.toolkit.input import OF_THE_MOUSE
 from robocov_app.toolkit.layout import laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
@@ -94,6 +92,12 @@ class Window(BaseWindow):
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
         self.viewer.costs.close()
+
+    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
+        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
+        viewer, self.scale = self.viewer, scale
+        viewer.theme, viewer.panel = theme, viewer.panel if panel is None else panel
+        viewer.version += 1
 
     def update(self, seconds: float) -> None:
         """Let so many seconds pass, for the simulation, its cost and the panel."""

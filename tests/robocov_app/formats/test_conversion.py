@@ -12,7 +12,7 @@ from shapely import MultiPolygon, Polygon, box
 from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.geometry.conversion import Shaping, shaped
 from robocov_app.formats.geometry.passages import roomiest
 from robocov_app.formats.geometry.polygons import bounded, rounded

@@ -14,8 +14,7 @@ from vector_files import square
 from robocov.errors import MapError, ParameterError
 from robocov_app.formats import ForeignMap, ReadOptions
 from robocov_app.formats.files import MAX_VERTICES
-from robocov_app.formats.geometry.enclosing import foreign_map
-from robocov_app.formats.geometry.shapes import Figure, Line, Shapes
+from robocov_app.formats.geometry.shapes import Figure, Line, Shapes, foreign_map
 
 HALL = square(0, 0, 20, 10)
 

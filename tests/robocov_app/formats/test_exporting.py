@@ -87,6 +87,7 @@ def drawn_room(slant: float, things: list[Obstacle]) -> Environment:
     return Environment("drawn", corners, tuple(things))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=50)
 @given(
     st.floats(0, 1.5), st.lists(obstacles, max_size=5), st.sampled_from([0.05, 0.08]),

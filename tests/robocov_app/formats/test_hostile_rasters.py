@@ -150,6 +150,7 @@ def test_they_are_refused(tmp_path: Path) -> None:
         assert memory < MEMORY, name
 
 
+@pytest.mark.slow
 def test_a_good_one_is_not(tmp_path: Path) -> None:
     path = tmp_path / "a.pgm"
     path.write_bytes(pgm(drawn(PLAN)))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robocov.errors import MapError
 from robocov_app.formats import ReadOptions, detect, import_map
-from robocov_app.formats.foreign import ForeignMap
+from robocov_app.formats.base import ForeignMap
 from robocov_app.formats.movingai import IMPORTER
 
 ROWS = ("@@@@@@", "@..GT@", "@S.OW@", "@....@", "@@@@@@")

@@ -83,6 +83,7 @@ def test_what_has_no_area_is_empty() -> None:
         assert enclosed([], rule)[0].is_empty
 
 
+@pytest.mark.slow
 def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
     count = 2000
     angle = np.arange(count) * math.tau / count
@@ -93,6 +94,7 @@ def test_a_ring_may_touch_itself_as_often_as_it_likes() -> None:
     Crossings("hatch").add(shapely.linestrings(parallel))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [800, 3000, 20_000])
 def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
     ring = np.random.default_rng(1).random((count, 2))
@@ -101,6 +103,7 @@ def test_a_tangle_is_refused_before_it_is_unravelled(count: int) -> None:
     Crossings("loose").add([shapely.LinearRing(ring[:200])])
 
 
+@pytest.mark.slow
 def test_crossings_are_those_of_all_shapes_together() -> None:
     angle = np.arange(151) * 75 * math.tau / 151
     star = np.column_stack([np.cos(angle), np.sin(angle)])

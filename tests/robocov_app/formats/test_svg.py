@@ -296,6 +296,7 @@ def test_document_types_that_drawing_programs_write(tmp_path: Path, inside: str)
     assert read(tmp_path, "svg", text, scale=0.01).free.area == pytest.approx(60 - 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "wanted"),
     [

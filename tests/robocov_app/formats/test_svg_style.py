@@ -3,7 +3,7 @@
 import pytest
 
 from robocov.errors import MapError
-from robocov_app.formats.svg.style import (
+from robocov_app.formats.svg.path import (
     INHERITED,
     MOST_TEXT,
     MOST_WORK,
@@ -94,6 +94,7 @@ def test_declarations() -> None:
     assert declarations(" Fill : url(a:b) ;; x ; stroke:red") == {"fill": "url(a:b)", "stroke": "red"}
 
 
+@pytest.mark.slow
 def test_sheets_that_take_for_ever_are_refused() -> None:
     with pytest.raises(MapError, match=rf"plan\.svg: style sheets of over {MOST_TEXT} characters"):
         sheet("*" * (MOST_TEXT + 1))

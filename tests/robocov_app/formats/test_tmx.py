@@ -246,6 +246,7 @@ def test_other_maps_are_refused_by_their_names(tmp_path: Path, orientation: str)
         read(tmp_path, tiles("walls"), head=f'orientation="{orientation}"')
 
 
+@pytest.mark.slow
 def test_too_many_collision_objects_are_refused(tmp_path: Path) -> None:
     corner = '<tile id="3"><objectgroup><object x="0" y="8" width="8" height="8"/></objectgroup></tile>'
     rows = ",".join(["4"] * 150 * 150)

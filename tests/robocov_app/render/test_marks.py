@@ -175,3 +175,19 @@ def test_marks_stay_inside_the_picture_of_the_map():
     assert SIZE[1] - strip > 20
     assert (frame[strip:] == alone[strip:]).all()
     assert (frame[:strip] != alone[:strip]).any()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
+def test_unicycles_have_a_nose_where_they_face(theme):
+    plain = explained(TWO)
+    team = replace(plain.team, track_width=np.array([0.0, 0.16]))
+    painter = Painter(SQUARE, SIZE, theme)
+    without = painter.frame(plain).astype(int)
+    middle = painter.camera.to_pixels(TWO)[1]
+    for heading in (0.0, 0.5 * np.pi, -2.0):
+        seen = replace(plain.now.seen, steering=np.array([[heading, 0.0]] * 2))
+        turned = replace(plain, team=team, snapshot=replace(plain.now, seen=seen))
+        rows, columns = np.nonzero(np.abs(painter.frame(turned) - without).sum(axis=2) > 60)
+        nose = np.array([columns.mean(), rows.mean()]) - middle  # the point robot has none
+        assert 9.0 < np.hypot(*nose) < 18.0
+        assert nose @ [np.cos(heading), -np.sin(heading)] > 0.97 * np.hypot(*nose)

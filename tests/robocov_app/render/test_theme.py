@@ -40,7 +40,7 @@ class TestReadability:
             assert contrast(readable_on(fill), fill) >= 4.0
 
     def test_marks_and_curves_on_the_page(self, theme):
-        marks = [theme.start, theme.final, theme.trajectory, theme.other, theme.velocity]
+        marks = [theme.start, theme.final, theme.trajectory, theme.others[0], theme.velocity]
         marks += [*theme.controllers.values(), *theme.forces.values()]
         for mark in marks:
             assert contrast(mark, theme.background) >= 3.0
@@ -78,7 +78,7 @@ class TestReadability:
         assert theme.start[1] == max(theme.start)
         assert theme.final[2] == max(theme.final)
         assert theme.trajectory[0] == max(theme.trajectory)
-        assert theme.controller("somebody's own") == theme.other
+        assert theme.controller("somebody's own") == theme.others[0]
 
 
 def test_unknown_theme_is_named_with_the_nearest():

@@ -60,14 +60,19 @@ def asked(what: Outcomes, times: dict[int, StepTimes] | None = None) -> dict[str
     return {goal.claim.key.removeprefix("goal-"): goal for goal in found}
 
 
+UNSURE = "met; the interval reaches over the bound"
+
+
 def test_all_goals_are_met_by_who_meets_them():
     found = asked(outcomes())
     assert set(found) == {
         *("gap", "every-map", "not-worse-rapf-default", "not-worse-lloyd", "contacts", "rest", "time"),
         *("step", "real-time"),
     }
-    for goal in found.values():
-        assert (goal.met, goal.words, goal.claim.verdict, goal.claim.part) == (True, "met", "holds", GOALS)
+    for name, goal in found.items():
+        # that none of six maps shows a contact, or all of them rest, is no proof of either
+        words, verdict = ("met", "holds") if name not in ("contacts", "rest") else (UNSURE, "undecided")
+        assert (goal.met, goal.words, goal.claim.verdict, goal.claim.part) == (True, words, verdict, GOALS)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +104,7 @@ def test_steps_are_judged_by_their_own_goals():
 @pytest.mark.parametrize(
     ("changes", "verdict"),
     [
-        ({}, "holds"),
+        ({}, "holds partly"),  # six maps are too few to show that it touches nothing and rests
         ({"ours": 1.02}, "holds partly"),
         ({"contacts": 1.0}, "holds partly"),
         ({"settled": np.nan}, "holds partly"),

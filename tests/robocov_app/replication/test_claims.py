@@ -29,7 +29,7 @@ from robocov_app.replication.outcomes import (
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
 STARTS = ("corner", "centre", "uniform")
-FEW, MANY = 3, 12
+FEW, MANY = 3, 30
 
 
 def scenarios(maps: int, seeds: int = 2) -> tuple[Scenario, ...]:

@@ -61,6 +61,7 @@ def test_starts_are_no_part_of_the_question():
     assert question({}) != Question(to_json(SQUARE), 3, 0.1, 16, 2).digest
 
 
+@pytest.mark.slow
 def test_a_map_without_room_is_named(tmp_path):
     tight = Environment("closet", ((0, 0), (1, 0), (1, 1), (0, 1)), ())
     with pytest.raises(OutputError, match=r"reference of map 'closet': robots: 3 of radius 0\.6 m"):

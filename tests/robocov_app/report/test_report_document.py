@@ -242,6 +242,7 @@ def test_marks_are_those_of_the_plots() -> None:
     assert {style.mark for style in curve_styles(["rapf", "rpf", "lloyd", *"abcde"]).values()} == MARKS.keys()
 
 
+@pytest.mark.slow
 def test_the_replay_explains_obstacles_that_move() -> None:
     cart = CircleObstacle((1, 1), 0.5, "cart", ObstaclePath(((1, 1), (5, 1)), 1.0, "back-and-forth"))
     words = [

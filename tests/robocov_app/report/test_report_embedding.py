@@ -13,6 +13,7 @@ from reported_results import HOSTILE, falling, walk
 
 from robocov.conditions import Conditions
 from robocov.environment import Environment, ObstaclePath, PolygonObstacle
+from robocov.robots import Team
 from robocov_app.figures.styles import curve_styles
 from robocov_app.report.pictures import has_path, lives
 from robocov_app.report.replay import (
@@ -207,3 +208,16 @@ def test_no_name_ends_its_script_element() -> None:
     text = script_json({"name": HOSTILE, "more": "\u2029<&>"})
     assert not set(text) & set("<>&\u2028\u2029")
     assert json.loads(text)["name"] == HOSTILE
+
+
+def test_headings_come_along_where_robots_turn() -> None:
+    run = run_of()
+    assert "headings" not in embedded_run(run, 0, STYLE, 5.0, goals=True)
+    count, n = run.record.positions.shape[:2]
+    angles = np.linspace(0.0, 3.0, count)[:, None] + np.arange(n)
+    turning = Team.homogeneous(n, kinematics="unicycle")
+    record = replace(run.record, team=turning, steering=np.stack([angles, 0.0 * angles], axis=2))
+    data = embedded_run(replace(run, record=record), 0, STYLE, 5.0, goals=True)
+    x, y = read_back(data["headings"], -1.0, 1.0).reshape(data["count"], -1, 2).transpose(2, 0, 1)
+    off = np.angle(np.exp(1j * (np.arctan2(y, x)[[0, -1]] - angles[[0, -1]])))
+    assert np.abs(off).max() < 1e-3

@@ -61,6 +61,7 @@ def test_one_line_says_what_is_wrong(capsys: pytest.CaptureFixture[str]) -> None
     assert said == "--fail: '3@x', but ROBOT@SECONDS, as in 3@20, was wanted"
 
 
+@pytest.mark.slow
 def test_distances_are_shown_of_a_map_that_moves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "x"
     words = "run forklifts --robots 2 --duration 0.4 --lattice 12 --frames --fps 3 --size 320x240"

@@ -19,7 +19,7 @@ from robocov.errors import OutputError, ParameterError
 from robocov.metrics import CostHistory
 from robocov_app.runs.film import frame_rows, iter_frames
 from robocov_app.runs.options import FilmOptions
-from robocov_app.runs.recording import png_bytes, save_film, save_moving_picture
+from robocov_app.runs.recording import encoder, png_bytes, save_film, save_moving_picture
 from robocov_app.viewer.film import Film
 
 
@@ -235,9 +235,16 @@ class TestSaveFilm:
             raise RuntimeError("No ffmpeg exe could be found.")
 
         monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", missing)
-        with pytest.raises(OutputError, match="IMAGEIO_FFMPEG_EXE"):
+        monkeypatch.setenv("PATH", str(tmp_path))
+        with pytest.raises(OutputError, match=r"pip install .robocov\[film\]., or set IMAGEIO_FFMPEG_EXE"):
             save_film(tmp_path / "run.mp4", plain(2))
         assert list(tmp_path.iterdir()) == []
+        # before a run that would be in vain
+        with pytest.raises(OutputError, match="no ffmpeg"):
+            FilmOptions(video=True)
+        (tmp_path / "ffmpeg").write_text("")
+        (tmp_path / "ffmpeg").chmod(0o755)
+        assert encoder() == str(tmp_path / "ffmpeg")
 
     def test_a_folder_that_cannot_be_made_is_named(self, tmp_path):
         (tmp_path / "file").write_text("")

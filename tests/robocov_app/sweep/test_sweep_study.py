@@ -170,3 +170,13 @@ def test_metrics_are_another_task() -> None:
     assert tasks[0].digest != tasks[1].digest
     with pytest.raises(ParameterError, match="metrics: 1, but true or false was wanted"):
         small_study(metrics=1)
+
+
+def test_kinematics_are_swept_as_words() -> None:
+    study = small_study(kinematics=["point", "unicycle"], turning_rate=2.0)
+    assert study.swept == ("kinematics",)
+    assert [team_of(2, team).track_width[1] for team in study.teams] == [0.0, pytest.approx(0.16)]
+    assert all(team_of(1, team).turning_rate[0] == 2.0 for team in study.teams)
+    assert not {"kinematics", "track_width", "turning_rate"} & set(small_study().teams[0])
+    with pytest.raises(ParameterError, match=r"team.kinematics: 'car', but point or unicycle was wanted"):
+        small_study(kinematics="car")

@@ -13,10 +13,8 @@ from driven_window import opened
 from robocov.errors import InputError
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.toolkit import clipboard
-from robocov_app.toolkit.command import Command, Commands, Takes
-from robocov_app.toolkit.command_palette import palette
+from robocov_app.toolkit.command import Command, Commands, Menu, Takes, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Question, file_choice
-from robocov_app.toolkit.menu import Menu
 from robocov_app.toolkit.ui import Ui
 
 KEYS = {"return": pygame.K_RETURN, "tab": pygame.K_TAB, "escape": pygame.K_ESCAPE, "left": pygame.K_LEFT}
@@ -142,13 +140,13 @@ def test_lists_drop_down_over_what_is_below(page: Page) -> None:
     assert found is not None
     item = found.item(found.chosen + 1)
     page.at(*item.center)
-    assert page.word == "c" and not page.ui.unfolded and page.tab == "one"
+    assert page.word == "c" and page.ui.open_list is None and page.tab == "one"
     page.press("menu", "word")
     page.keys("up", "return")
     assert page.word == "b"
     page.press("menu", "word")
     page.press("button", "Go")  # closes the list, and no more
-    assert page.pressed == 0 and not page.ui.unfolded
+    assert page.pressed == 0 and page.ui.open_list is None
 
 
 def test_tab_walks_and_keys_press(page: Page) -> None:

@@ -183,6 +183,7 @@ def test_a_saved_run_is_looked_at_again_and_gone_on_from(tmp_path: Path) -> None
     assert pane.simulation.conditions == BAD.of_robots_that_stay()
 
 
+@pytest.mark.slow
 def test_where_obstacles_move_the_cost_is_told_as_elsewhere() -> None:
     for costs in (Costs(8, direct=True), Costs(8)):
         costs.environment(HALL)

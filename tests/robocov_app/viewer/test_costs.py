@@ -358,6 +358,7 @@ def test_another_process_knows_where_obstacles_are(worker_costs):
         assert known.field.largest == known.result.distances.max()
 
 
+@pytest.mark.slow
 def test_a_map_without_a_cost_is_said():
     costs = Costs(1)
     try:

@@ -74,6 +74,7 @@ def test_frames_without_a_display(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert not np.array_equal(frames[0], frames[2])
 
 
+@pytest.mark.slow
 def test_the_same_words_give_the_same_frames_bit_for_bit(tmp_path: Path) -> None:
     words = ("--controllers", "rapf", "rpf", "--robots", "3", "--show", "scan", "distances", "--seed", "4")
     first = frames_of(tmp_path / "first", *words)

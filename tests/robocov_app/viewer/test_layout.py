@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.toolkit.layout import SMALLEST, Box, Layout, inside, laid_out, largest_scale
+from robocov_app.toolkit.layout import SMALLEST, UPRIGHT, Box, Layout, inside, laid_out, largest_scale
 
 WIDTHS, HEIGHTS = st.integers(900, 3840), st.integers(600, 2160)
 SCALES = st.floats(1.0, 3.0)
@@ -53,7 +53,8 @@ def test_panes_are_equal_in_the_arena_and_beside_each_other(layout: Layout) -> N
 @given(layouts())
 def test_there_is_room_for_what_is_written_at_that_scale(layout: Layout) -> None:
     width, height = layout.size
-    assert width / layout.scale >= SMALLEST[0] and height / layout.scale >= SMALLEST[1]
+    least = SMALLEST if width >= height else UPRIGHT
+    assert width / layout.scale >= least[0] and height / layout.scale >= least[1]
     assert layout.panel[2] in (0, round(320 * layout.scale))
     assert layout.status[3] == layout.track[3] == round(26 * layout.scale)
 

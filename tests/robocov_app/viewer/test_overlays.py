@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.render.fonts import text_width
-from robocov_app.toolkit import help as keys_page
+from robocov_app.toolkit import command as keys_page
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.viewer.commands import GROUPS
 from robocov_app.viewer.film import pixels

@@ -16,7 +16,7 @@ from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 LAWS = [ControllerChoice("rapf"), ControllerChoice("rpf"), ControllerChoice("lloyd")]
 GAINS = [each for law in LAWS for each in gain_parameters(law)]
-ALL = [each for each in GAINS if isinstance(each, Parameter)] + limit_parameters(TeamSpec())
+ALL = [each for each in [*GAINS, *limit_parameters(TeamSpec())] if isinstance(each, Parameter)]
 
 
 class Odd:
@@ -70,9 +70,19 @@ def test_gains_that_are_words_have_all_of_them():
     assert near.read("on") == "on" and near.read("onc") == "once"
 
 
+def test_kinematics_are_a_track_width():
+    unicycle = with_limit(TeamSpec(radius=0.2), "team.kinematics", "unicycle")
+    assert unicycle.team(2).track_width.tolist() == [pytest.approx(0.32)] * 2
+    assert [each.value for each in limit_parameters(unicycle) if isinstance(each, Pick)] == ["unicycle"]
+    assert with_limit(unicycle, "kinematics", "point") == TeamSpec(radius=0.2)
+
+
 def test_every_limit_but_the_mass_has_its_slider():
     names = [each.name for each in limit_parameters(TeamSpec())]
-    assert {name.removeprefix("team.") for name in names} == set(UNITS) - {"mass"}
+    of_unicycles = {"track_width", "turning_rate"}  # as the kinematics have them
+    assert {name.removeprefix("team.") for name in names} == set(UNITS) - {"mass"} - of_unicycles | {
+        "kinematics"
+    }
     for each in limit_parameters(TeamSpec(sensing_range=math.inf, radius=0.3)):
         if each.name == "team.sensing_range":
             assert (each.value, each.default, each.optional) == (None, 3.0, True)

@@ -10,6 +10,7 @@ from touched_run import (
     RPF,
     all_told,
     begun,
+    positions_of,
     robots_of,
     stepped,
     too_deep,
@@ -19,7 +20,9 @@ from touched_run import (
 from robocov.environment import CircleObstacle, Environment
 from robocov.errors import ParameterError, StartError
 from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.pane import resumed
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
+from robocov_app.viewer.session.session import Session
 
 # beginning anew
 
@@ -195,3 +198,23 @@ def test_larger_robots_make_room_for_each_other():
     apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
     assert apart[np.triu_indices(6, 1)].min() >= 0.6
     assert too_deep(session) <= 0.0
+
+
+def test_unicycles_go_on_from_any_moment_bit_for_bit() -> None:
+    session = begun(RAPF, limits=TeamSpec(track_width=0.16))
+    stepped(session, 60)
+    wanted, steering = positions_of(session), session.panes[0].simulation.steering
+    again = Session(session.document.nodes[0].scenario)
+    stepped(again, 60)
+    assert [each.tobytes() for each in positions_of(again)] == [each.tobytes() for each in wanted]
+    state = session.panes[0].state()
+    going_on = resumed(state, session.history.dt, 60)
+    session.panes[0].simulation.step()
+    going_on.step()
+    assert going_on.positions.tobytes() == session.panes[0].simulation.positions.tobytes()
+    assert going_on.steering is not None and steering is not None
+    assert (going_on.steering != steering).any()
+    # who stays keeps its heading when another one leaves
+    now = session.panes[0].simulation.steering
+    session.fail_robot(1)
+    assert now is not None and (session.panes[0].simulation.steering == now[1:]).all()

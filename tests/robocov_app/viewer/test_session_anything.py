@@ -221,6 +221,7 @@ class Anything(RuleBasedStateMachine):
             assert too_deep(self.session) < 2e-3
 
 
+@pytest.mark.slow
 def test_whatever_users_do_all_stays_in_order():
     run_state_machine_as_test(Anything, settings=settings(max_examples=25, stateful_step_count=25))
 

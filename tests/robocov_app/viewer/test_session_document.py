@@ -99,6 +99,7 @@ def again(session: Session) -> Session:
     return Session.opened(saved)
 
 
+@pytest.mark.slow
 @given(touches, st.sampled_from([(RAPF,), (LLOYD, RAPF), (ATLAS,)]), st.booleans())
 @settings(max_examples=40)
 def test_every_story_is_made_again_bit_for_bit(story, laws, moving):
@@ -228,6 +229,20 @@ def test_branches_are_a_tree_that_can_be_walked() -> None:
     session.look_at(5 / 60)
     session.set_law(session.panes[0], LLOYD)
     assert len(session.branches) == 3, "nothing is lost by a touch in the past"
+
+
+def test_branches_of_a_file_are_told_before_anybody_has_been_there(tmp_path: Path) -> None:
+    session = stepped(begun(RAPF), 10)
+    session.fail_robot(1)
+    with_curves(session, 20)
+    session.undo()
+    session.add_robot((3.0, 3.0))
+    with_curves(session, 20)
+    path = tmp_path / "story.robocov"
+    save_session(path, session.document, session.head, session.step_now, {})
+    opened = Session.opened(load_session(path))
+    told = [branch.told(opened.scenario.dt) for branch in opened.branches]
+    assert sorted(told) == ["0.5 s", "0.5 s · 2.517 m"]
 
 
 def test_a_long_way_back_is_made_in_slices(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -71,11 +71,11 @@ def test_a_start_that_an_obstacle_covers_stays_in_the_menu_until_another_is_chos
 
 def test_a_menu_is_closed_by_a_click_elsewhere_and_that_click_does_nothing_else(driver: Driver) -> None:
     driver.click(*driver.widget("menu", "map").rect.center)
-    assert driver.window.panel.unfolded
+    assert driver.window.panel.ui.open_list is not None
     camera = driver.window.canvas._painters[0].camera
     driver.click_at(MIDDLE)
     driver.settle()
-    assert not driver.window.panel.unfolded
+    assert driver.window.panel.ui.open_list is None
     assert driver.window.canvas._painters[0].camera == camera and driver.viewer.map_name == "hall"
 
 
@@ -84,7 +84,7 @@ def test_escape_closes_a_menu_and_nothing_else(driver: Driver) -> None:
     driver.click(*driver.widget("menu", "map").rect.center)
     driver.key("escape")
     driver.settle()
-    assert not driver.window.panel.unfolded and driver.viewer.tool.name == "polygon"
+    assert driver.window.panel.ui.open_list is None and driver.viewer.tool.name == "polygon"
 
 
 def test_an_open_menu_lies_over_what_is_below_it(driver: Driver) -> None:
@@ -129,10 +129,10 @@ def test_the_speed_slider_rests_on_speeds(driver: Driver) -> None:
 
 def test_a_value_that_is_typed_replaces_the_old_one_with_enter(driver: Driver) -> None:
     driver.write("k_rep", "1.25")
-    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.typing
+    assert driver.session.panes[0].law.value("k_rep") != 1.25 and driver.window.panel.ui.typing
     driver.key("return")
     assert driver.session.panes[0].law.value("k_rep") == 1.25
-    assert not driver.window.panel.typing
+    assert not driver.window.panel.ui.typing
     assert driver.widget("slider", "k_rep").value > 0.5
 
 

@@ -93,6 +93,7 @@ def test_a_file_that_is_none_is_refused_and_all_stays(tmp_path: Path) -> None:
     assert viewer.session is before
 
 
+@pytest.mark.slow
 def test_a_click_on_a_ghost_curve_enters_its_branch(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.session.playing = True

@@ -131,6 +131,7 @@ function drawArena(canvas, run, time, look, show) {
   const radii = drawnRadii(run, places, states, frame, Math.max(7, Math.min(9.5, canvas.clientWidth / 40)));
   if (show.goals && run.goals) drawGoals(context, run.placesAt(time, run.goals), places, radii, frame, look);
   drawFailed(context, run, places, states, radii, frame, look);
+  if (run.headings) drawNoses(context, run, time, places, states, radii, frame, look);
   drawRobots(context, run, places, states, radii, frame, look);
 }
 
@@ -298,6 +299,23 @@ function drawFailed(context, run, places, states, radii, frame, look) {
     context.fillStyle = look.ink;
     context.font = `700 11px ${FONT}`;
     context.fillText(String(run.numbers[i]), x + radius + 3, y);
+  }
+}
+
+/** Where unicycles face, under their discs. */
+function drawNoses(context, run, time, places, states, radii, frame, look) {
+  const vectors = run.headings.at(run.path || time >= run.end ? time : 0);
+  for (let i = 0; i < run.robots; i += 1) {
+    if (states[i] !== WORKS || Number.isNaN(vectors[2 * i])) continue;
+    const angle = Math.atan2(2 * vectors[2 * i + 1] - 1, 2 * vectors[2 * i] - 1);
+    const [x, y] = [frame.x(places[2 * i]), frame.y(places[2 * i + 1])];
+    context.beginPath();
+    for (const [far, side] of [[1.65, 0], [1, 0.5], [1, -0.5]]) {
+      context.lineTo(x + far * radii[i] * Math.cos(angle + side), y - far * radii[i] * Math.sin(angle + side));
+    }
+    context.closePath();
+    context.fillStyle = look.ink;
+    context.fill();
   }
 }
 

@@ -85,6 +85,7 @@ class Run {
     Object.assign(this, data, { plan, robots: data.numbers.length });
     this.where = new Series(data.positions, 2 * this.robots, data.step, data.count, data.end);
     this.goals = data.goals && new Series(data.goals, 2 * this.robots, data.step, data.count, data.end);
+    this.headings = data.headings && new Series(data.headings, 2 * this.robots, data.step, data.count, data.end);
     this.range = data.cost;
     this.cost = data.cost && new Series(data.cost.values, 1, data.cost.step, data.cost.count, data.end);
     this.lives = data.lives ?? Array.from({ length: this.robots }, () => [0, null]);

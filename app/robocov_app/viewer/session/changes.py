@@ -78,7 +78,7 @@ class _Change:
 
 @dataclass(frozen=True)
 class OfRobot(_Change):
-    """What is done to a robot."""
+    """Change to a robot."""
 
     robot: Robot
 

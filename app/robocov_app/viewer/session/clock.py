@@ -9,13 +9,13 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Simulated seconds per second; infinite for as fast as it goes."""
 
 LONGEST_FRAME = 0.1
-"""What a frame took beyond so many seconds is not made up for."""
+"""Longest frame, s: what it took beyond is not made up for."""
 
 FRAME_BUDGET = 0.008
 """So many seconds of a frame a window that people look at gives to the steps of the simulation."""
 
 _PATIENT = 16.0
-"""Where no time runs out, "as fast as it goes" is a speed like any other: this one."""
+"""Speed of "as fast as it goes" where no time runs out."""
 
 
 def speed_words(speed: float) -> str:

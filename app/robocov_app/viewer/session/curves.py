@@ -112,7 +112,7 @@ class Ghost:
 
 
 class Plotted(NamedTuple):
-    """What can be plotted. `title`, `short`: as people call it."""
+    """Plottable quantity. `title`, `short`: as people call it."""
 
     name: str
     title: str

@@ -1,4 +1,4 @@
-"""What a controller saw and decided in a state of the past, for the layers and the inspector."""
+"""Replay of a controller's past observations and decisions, for the layers and the inspector."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class DecisionReplay:
 
 
 class _Explaining:
-    """What states of the same circumstances have in common."""
+    """Shared part of states of the same circumstances."""
 
     def __init__(self, setup: PaneSetup, dt: float) -> None:
         self._region, self._density = setup.solid.region, setup.solid.density
@@ -67,6 +67,7 @@ class _Explaining:
             time=time,
             max_speeds=self._team.max_speed,
             density=self._density,
+            steering=state.steering,
         )
         if self._perception is not None:
             inbox = self._perception.begin() if state.inbox is None else state.inbox

@@ -88,7 +88,9 @@ class Branch(NamedTuple):
         for pane, what in sorted(self.node.curves):
             if what == "distance":
                 value = self.node.curves[pane, what].at(self.end * dt)
-                words.append(f"{self.node.controllers[pane].label} {value:.3f} m")
+                # of a file that was opened the controllers are known once it has been run
+                law = self.node.controllers.get(pane)
+                words.append(f"{law.label} {value:.3f} m" if law else f"{value:.3f} m")
         return " · ".join(words)
 
 

@@ -76,7 +76,7 @@ class BundledMapModel(_Model):
 
 
 class ConditionModel(_Model):
-    """What is waited for: one of these."""
+    """Condition that is waited for: one of these."""
 
     step: Step | None = Field(None, description="A step of the simulation")
     settled: Literal[True] | None = Field(None, description="No robot gets anywhere any more")
@@ -146,7 +146,7 @@ class SessionModel(_Model, title="robocov session"):
 
 @dataclass(frozen=True, eq=False)
 class SavedSession:
-    """What a session file holds. `step`: the present. `view`: what is shown, and how."""
+    """Content of a session file. `step`: the present. `view`: what is shown, and how."""
 
     document: Document
     head: Node

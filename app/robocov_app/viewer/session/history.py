@@ -44,7 +44,7 @@ MOST_ROWS = 4096
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """What stays as it is from one touch to the next.
+    """Setup of a pane, which stays from one touch to the next.
 
     `environment`: the map as it is, without robots that failed. `numbers`, (n,) int: what people call the
     robots that work, in the order of the rows. `failed`, (x, y) m each: robots that stand where they failed.
@@ -87,7 +87,8 @@ class State(NamedTuple):
 
     `positions`, `velocities`: (n, 2) m and m/s. `memory`: what the controller remembered; None where it can
     do without. `recorded`: what was decided then, where it comes from a record. `inbox`: the messages that
-    the robots had; None where they know the others as they are.
+    the robots had; None where they know the others as they are. `steering`: heading and turning rate of
+    unicycles, (n, 2) rad and rad/s; None in a team of points.
     """
 
     setup: PaneSetup
@@ -96,6 +97,7 @@ class State(NamedTuple):
     memory: Any
     recorded: Decision | None = None
     inbox: Inbox | None = None
+    steering: Array | None = None
 
 
 class Moment(NamedTuple):
@@ -129,7 +131,7 @@ class History:
         self._sizes: list[int] = []
         self._bytes = 0
         self.thinned = 0
-        """How many moments are gone."""
+        """Number of moments that are gone."""
 
     def __len__(self) -> int:
         return len(self._moments)
@@ -235,6 +237,7 @@ def _size(moment: Moment) -> int:
         + state.velocities.nbytes
         + _bytes_of(state.memory)
         + _bytes_of(state.inbox)
+        + _bytes_of(state.steering)
         for state in moment.states.values()
     )
 

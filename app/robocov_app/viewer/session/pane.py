@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from robocov_app.viewer.session.scenario import ControllerChoice
 
 SENSED_EVERY = 3
-"""What is sensed is noted at every so many steps."""
+"""Steps between notes of what is sensed."""
 
 
 class Continuation(NamedTuple):
-    """How a pane is to go on. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
+    """Continuation of a pane. `positions`, `velocities`, (n, 2) m and m/s: by default the present ones."""
 
     setup: PaneSetup
     positions: Array | None = None
@@ -57,7 +57,7 @@ class Pane:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """What people call the robots that work, row by row."""
+        """Displayed numbers of the robots that work, row by row."""
         return self.setup.numbers
 
     @property
@@ -87,7 +87,9 @@ class Pane:
         simulation = self.simulation
         # who wrote a controller may have it change what it remembers
         memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
-        return State(self.setup, simulation.positions, simulation.velocities, memory, inbox=simulation.inbox)
+        moving = simulation.positions, simulation.velocities
+        inbox, steering = simulation.inbox, simulation.steering
+        return State(self.setup, *moving, memory, inbox=inbox, steering=steering)
 
     def changed(self, wanted: Continuation) -> Simulation:
         """Return the simulation that goes on from here as wanted; the pane stays as it is.
@@ -102,7 +104,13 @@ class Pane:
         controller = None if goes_on else setup.law.made()
         if self._only_weighed(wanted):
             return old.with_density(environment)
-        make = partial(old.changed, environment=environment, controller=controller, team=team)
+        # who stays keeps what is its own
+        found = [self.row(number) for number in setup.numbers]
+        rows = np.array([-1 if row is None else row for row in found], dtype=np.intp)
+        steering = None if old.steering is None else np.where(rows[:, None] < 0, 0.0, old.steering[rows])
+        make = partial(
+            old.changed, environment=environment, controller=controller, team=team, steering=steering
+        )
         positions = old.positions if wanted.positions is None else wanted.positions
         velocities = old.velocities if wanted.velocities is None else wanted.velocities
         try:
@@ -112,9 +120,7 @@ class Pane:
             moved = np.hypot(*(placed - positions).T) > 1e-3
             changed = make(positions=placed, velocities=np.where(moved[:, None], 0.0, velocities))
         if old.inbox is not None and setup.numbers != self.numbers:
-            # who stays keeps the messages of who stays
-            rows = [-1 if self.row(number) is None else self.row(number) for number in setup.numbers]
-            changed = changed.remembering(changed.memory, old.inbox.rearranged(np.array(rows, dtype=np.intp)))
+            changed = changed.remembering(changed.memory, old.inbox.rearranged(rows))
         return changed
 
     def _only_weighed(self, wanted: Continuation) -> bool:
@@ -145,11 +151,14 @@ class Pane:
         self.trail, self.starts = trail, starts
 
 
-def _spec(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None) -> RunSpec:
+def _spec(
+    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None, steering: Array | None = None
+) -> RunSpec:
     law, conditions = setup.law, setup.conditions
     return RunSpec(
         setup.solid, law.name, law.gains,
-        team=setup.team, positions=positions, velocities=velocities, dt=dt, conditions=conditions,
+        team=setup.team, positions=positions, velocities=velocities, steering=steering, dt=dt,
+        conditions=conditions,
     )  # fmt: skip
 
 
@@ -161,7 +170,7 @@ def begun(setup: PaneSetup, positions: Array, dt: float, velocities: Array | Non
 def resumed(state: State, dt: float, step: int) -> Simulation:
     """Return the simulation that goes on from a state; ParameterError when its controller is gone."""
     setup = state.setup
-    spec = _spec(setup, state.positions, dt, state.velocities)
+    spec = _spec(setup, state.positions, dt, state.velocities, state.steering)
     simulation = spec.simulation(setup.law.made(), steps=step, resumed=True)
     if state.memory is not None or state.inbox is not None:
         memory = simulation.memory if state.memory is None else state.memory

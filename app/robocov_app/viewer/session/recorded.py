@@ -64,7 +64,7 @@ class LostController(ControllerChoice):
 
 @dataclass(frozen=True)
 class _StandIn(LostController):
-    """What holds the place of a lost controller at the end of its run, until somebody wants to go on."""
+    """Placeholder of a lost controller at the end of its run, until somebody wants to go on."""
 
     def made(self) -> Controller:
         return _Nobody(self)
@@ -228,7 +228,9 @@ def _states_of(record: Record, cast: PaneSetup) -> list[State]:
     ):
         rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
         decision = Decision(forces[k][rows], None if nowhere[k] else goals[k][rows])
-        states.append(State(there, positions[k][rows], velocities[k][rows], memory, decision))
+        steering = None if record.steering is None else record.steering[k][rows]
+        moving = positions[k][rows], velocities[k][rows]
+        states.append(State(there, *moving, memory, decision, steering=steering))
     return states
 
 

@@ -1,4 +1,4 @@
-"""What a run begins with: map, controllers, team and starts; and how these stand in session files."""
+"""Scenario of a run: map, controllers, team and starts; and how these stand in session files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from robocov.controllers.base import Controller
 from robocov.controllers.gains import Gain, Option, Value, value_text
 from robocov.environment import Environment
 from robocov.errors import ParameterError, RobocovError, shown
-from robocov.robots import UNITS, Team
+from robocov.robots import TURNING_RATE, UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
 MOST_ROBOTS = 1000
@@ -120,7 +120,7 @@ class ControllerChoice:
 
     @cached_property
     def known(self) -> dict[str, Gain | Option]:
-        """What is known of its gains, by name."""
+        """Known gains of the controller, by name."""
         return gains_of(controller_kind(self.name))
 
     def value(self, gain: str) -> Value:
@@ -158,7 +158,7 @@ def _said(value: Value) -> str:
 
 @dataclass(frozen=True)
 class TeamSpec:
-    """What each robot is and can do, as `Team` has it; SI units, infinite for no limit.
+    """Properties of each robot, as `Team` has them; SI units, infinite for no limit.
 
     `different`: values of single robots, by parameter and number.
     """
@@ -172,6 +172,8 @@ class TeamSpec:
     viscosity: Limit = 2.0
     sensing_range: Limit = 3.0
     communication_range: Limit = np.inf
+    track_width: Limit = 0.0
+    turning_rate: Limit = TURNING_RATE
     different: Mapping[str, Mapping[int, Limit]] = field(default_factory=dict)
 
     def team(self, robots: int | Sequence[int]) -> Team:
@@ -206,12 +208,13 @@ Limits: TypeAlias = Annotated[TeamSpec, WrapSerializer(lambda team, plain: _fill
 
 
 def _filled(plain: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in plain.items() if value != {}}
+    usual = {"different": {}, "track_width": 0.0, "turning_rate": TURNING_RATE}  # as in older files
+    return {key: value for key, value in plain.items() if value != usual.get(key)}
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What a run begins with; immutable.
+    """Scenario of a run; immutable.
 
     `laws`: one for each pane. `start`: named start of the map, its first by default. `seed`: of the starts.
     `dt`, s: control period. `given`, (n, 2) m, `moving`, (n, 2) m/s: starts from elsewhere, as a saved run.

@@ -55,7 +55,7 @@ _SLICE = 0.03
 
 
 class Session:
-    """What is going on in the window; StartError, ParameterError when the scenario cannot be begun.
+    """Session of the window; StartError, ParameterError when the scenario cannot be begun.
 
     What touches it goes on from the moment that is looked at; what cannot be is refused, and nothing has
     changed then. `head`: where in the document the present is. `recorded_until`, s: up to there the run is a
@@ -118,7 +118,7 @@ class Session:
 
     @property
     def scenario(self) -> Scenario:
-        """What the run began with; controllers, gains, limits and the map as they were last chosen."""
+        """The scenario of the run; controllers, gains, limits and the map as they were last chosen."""
         return self._run.scenario
 
     @property
@@ -153,7 +153,7 @@ class Session:
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """What people call the robots that work, in the first pane."""
+        """Displayed numbers of the robots that work, in the first pane."""
         return self.setup(self.panes[0]).numbers
 
     @property
@@ -180,7 +180,7 @@ class Session:
 
     @property
     def _number(self) -> int:
-        """Which moment is looked at."""
+        """Index of the moment that is looked at."""
         return len(self.history) - 1 if self._cursor is None else self._cursor
 
     def _state(self, pane: Pane) -> State:
@@ -216,7 +216,7 @@ class Session:
 
     @property
     def events(self) -> list[Event]:
-        """What has happened on the way to the present, in order."""
+        """Events on the way to the present, in order."""
         limits, found = self.document.limits(self.head, self._run.step), []
         for node in self.document.path(self.head):
             happened = [] if node.scenario is not None else [(node.at, node.kind, node.words)]

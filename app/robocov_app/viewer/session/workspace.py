@@ -1,4 +1,4 @@
-"""What is saved of the session that is open, and what is kept aside of it: no work is lost."""
+"""Saved and autosaved state of the open session: no work is lost."""
 
 from collections.abc import Collection, Mapping
 from datetime import datetime
@@ -27,7 +27,7 @@ class Recovered(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What to offer."""
+        """Words of the offer."""
         where = "never saved" if self.path is None else f"not saved to {self.path.name}"
         touches = "1 touch" if self.touches == 1 else f"{self.touches} touches"
         return f"a session of {self.when:%H:%M}, {touches}, {where}"
