@@ -12,10 +12,10 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law
 from robocov.controllers.driving import approach, drive
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.controllers.sampled_cells import centroids, own_samples
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.robots import Team
+from robocov.voronoi.sampled_cells import centroids, own_samples
 
 _SAMPLES = 40  # places along a side of the region at which densities are estimated
 _SQUARES = 20  # squares along a side of which one measurement each is kept

@@ -13,8 +13,8 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
 from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import choice, gain, response_time_gain
-from robocov.controllers.sight import View, behind, importance, joined, last_view, smaller_steps, windows
 from robocov.observation import Decision, Observations, Scanning, headings
+from robocov.observation.sight import View, behind, importance, joined, last_view, smaller_steps, windows
 
 _RINGS = 10  # places along each ray at which the integrals are sampled
 _SETTLED = 2.0  # seconds in which a robot that is at an optimum

@@ -16,13 +16,13 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law
 from robocov.controllers.driving import approach, avoid, drive
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.sampled_cells import centroids, own_samples
 from robocov.environment import Environment
 from robocov.errors import ParameterError
 from robocov.observation import Decision, Observations
 from robocov.observation.region import Region
 from robocov.optimum import nearest_inside
 from robocov.robots import Team
+from robocov.voronoi.sampled_cells import centroids, own_samples
 
 _ROUNDS = 12  # times that pieces of walls are halved which are no edges of the mesh yet
 _GRID = 1e-6  # metres to which vertices of the mesh are rounded

@@ -9,8 +9,8 @@ from robocov.compiled import kernel
 from robocov.controllers.base import Law, Memory
 from robocov.controllers.driving import approach, avoid, drive, last_returns, summed, with_nearest
 from robocov.controllers.gains import gain, response_time_gain
-from robocov.controllers.sight import View, behind, importance, joined, last_view, smaller_steps, windows
 from robocov.observation import Decision, Observations, Scanning, headings
+from robocov.observation.sight import View, behind, importance, joined, last_view, smaller_steps, windows
 
 _RINGS = 12  # places along each ray at which the integrals are sampled
 _PARTS = np.append((np.arange(_RINGS) + 0.5) / _RINGS, 1.0)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Diffeomorphism, Lloyd
 from robocov.controllers.diffeomorphism import Chart
-from robocov.controllers.sampled_cells import centroids, own_samples
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle, WallObstacle
 from robocov.errors import ParameterError
@@ -17,6 +16,7 @@ from robocov.observation import Observations
 from robocov.observation.neighbours import Neighbours
 from robocov.robots import Team
 from robocov.simulation import Simulation
+from robocov.voronoi.sampled_cells import centroids, own_samples
 
 PENTAGON = Environment("pentagon", ((0, 0), (10, -1), (12, 6), (5, 9), (-1, 5)))
 BLOCK = PolygonObstacle(((3, 3), (6, 3.5), (5, 6)))

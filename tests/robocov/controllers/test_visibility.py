@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Boosting, Visibility
 from robocov.controllers.boosting import Climb, Mode, undetected
-from robocov.controllers.sight import View, smaller_steps, windows
 from robocov.controllers.visibility import in_charge
 from robocov.density import Gaussian, Gaussians
 from robocov.environment import Environment, PolygonObstacle
 from robocov.observation import Observations, headings
 from robocov.observation.neighbours import Neighbours
 from robocov.observation.region import Region
+from robocov.observation.sight import View, smaller_steps, windows
 from robocov.robots import Team
 from robocov.simulation import Simulation
 
