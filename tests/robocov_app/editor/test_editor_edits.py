@@ -343,8 +343,8 @@ def test_groups_locks_and_what_is_hidden_are_kept_in_the_map(sketch):
     assert not in_box(unseen, (-50.0, -50.0), (50.0, 50.0)).items and not Selection.all(unseen).items
     assert parse_sketch(sketch_text(unseen), "again") == unseen
     assert Sketch.from_environment(unseen.environment()) == unseen
-    shown = properties.hidden(unseen, Selection.of(1, 2), False)
-    assert shown.sketch == held.sketch and shown.words == "2 obstacles shown"
+    shown = properties.released(unseen)
+    assert shown.sketch == change.sketch and shown.words == "3 obstacles unlocked and shown"
     apart = properties.ungrouped(held.sketch, Selection.of(0, 1, 2))
     assert not any(item.group for item in apart.sketch.obstacles)
     for deed, words in [

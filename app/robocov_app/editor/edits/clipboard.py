@@ -19,7 +19,6 @@ FORMAT = "robocov-clipboard"  # what the copied text says that it is
 
 
 def copied(sketch: Sketch, selection: Selection) -> str:
-    """Return the text that stands for what is selected: obstacles with notes, starts, the boundary."""
     part = Sketch(
         name=sketch.name,
         boundary=sketch.boundary if selection.boundary else None,

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import LineString
+from shapely import LineString, MultiPoint
 from shapely.ops import substring
 
 from robocov import environment as env
@@ -20,21 +20,20 @@ from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
 _LONGEST_NAME = 100
+_LONGEST_TEXT = 10_000
 
 
 def drawn(sketch: Sketch, shape: Obstacle) -> Change:
-    """Put a new obstacle on top, and select it."""
     after, keys = sketch.added([shape])
     return Change(after, Selection.of(*keys), f"{kind_and_name(shape)} drawn")
 
 
 def polygon_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Put a polygon down; it may cross itself, which `problems` will say."""
+    """Put a polygon down; it may cross itself, which `validation` will say."""
     return drawn(sketch, env.PolygonObstacle(_outline(points, "a polygon")))
 
 
 def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
-    """Put the rectangle with two opposite corners down."""
     low, high = ring_near(np.array([np.minimum(a, b), np.maximum(a, b)]))
     if min(high[0] - low[0], high[1] - low[1]) < SHORTEST:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
@@ -42,14 +41,12 @@ def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
 
 
 def circle_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Put a circle down."""
     return drawn(sketch, env.CircleObstacle(point_near(center), _radius(radius, "a circle")))
 
 
 def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
-    """Put a wall down."""
-    line = distinct(ring_near(np.array(points, dtype=float).reshape(-1, 2)), closed=False)
-    if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
+    line = distinct(ring_near(points), closed=False)
+    if len(line) < 2 or LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
     if not SMALLEST <= width <= LARGEST:
         raise MapError(f"a wall's width is at least {1000 * SMALLEST:g} mm")
@@ -57,32 +54,27 @@ def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
 
 
 def boundary_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Draw the boundary, in place of the one that there was."""
     words = "boundary drawn" if sketch.boundary is None else "boundary drawn anew"
     after = replace(sketch, boundary=_outline(points, "a boundary"))
     return Change(after, Selection(boundary=True), words)
 
 
 def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Add a start that is a disc."""
-    return start_added(sketch, env.DiscStart(point_near(center), _radius(radius, "a start")))
+    return _start_added(sketch, env.DiscStart(point_near(center), _radius(radius, "a start")))
 
 
 def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Add a start of given places."""
-    places = tuple(dict.fromkeys(ring_near(np.array(points, dtype=float).reshape(-1, 2))))
+    places = tuple(dict.fromkeys(ring_near(points)))
     if not places:
         raise MapError("a start needs a place for a robot at least")
-    return start_added(sketch, env.PointsStart(places))
+    return _start_added(sketch, env.PointsStart(places))
 
 
 def anywhere_added(sketch: Sketch) -> Change:
-    """Add a start anywhere in the free space."""
-    return start_added(sketch, env.UniformStart())
+    return _start_added(sketch, env.UniformStart())
 
 
-def start_added(sketch: Sketch, spec: StartSpec) -> Change:
-    """Add a start with a free name."""
+def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     name = free_name(sketch, "start")
     return Change(sketch.with_start(name, spec), Selection.of(name), f"start “{name}” added")
 
@@ -93,9 +85,7 @@ def free_name(sketch: Sketch, name: str) -> str:
     >>> free_name(Sketch(starts=(("start", env.UniformStart()),)), "start")
     'start 2'
     """
-    taken = {each for each, _ in sketch.starts}
-    stem = re.sub(r" \d+$", "", name)
-    count = 2
+    taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
     while name in taken:
         name = f"{stem} {count}"
         count += 1
@@ -104,7 +94,7 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 def label_of(name: str) -> str:
     """Return a name as maps can have it."""
-    name = encodable(" ".join(name.split()))
+    name = _encodable(" ".join(name.split()))
     if len(name) > _LONGEST_NAME:
         raise MapError(f"a name has at most {_LONGEST_NAME} characters")
     if any(ord(char) < 32 or ord(char) == 127 for char in name):
@@ -112,14 +102,21 @@ def label_of(name: str) -> str:
     return name
 
 
-def encodable(text: str) -> str:
+def text_of(text: str, what: str) -> str:
+    """Return a note or a description as maps can have it."""
+    if len(text) > _LONGEST_TEXT:
+        raise MapError(f"{what} has at most {_LONGEST_TEXT} characters")
+    return _encodable(text.strip())
+
+
+def _encodable(text: str) -> str:
     """Return text without halves of characters, which no file could hold."""
     return text.encode("utf-8", "ignore").decode("utf-8")
 
 
 def _outline(points: Sequence[Point], what: str) -> Ring:
-    ring = distinct(ring_near(np.array(points, dtype=float).reshape(-1, 2)))
-    if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
+    ring = distinct(ring_near(points))
+    if len(ring) < 3 or MultiPoint(ring).convex_hull.area < SHORTEST**2:
         raise MapError(f"{what} needs three corners that enclose something")
     return ring
 
@@ -131,7 +128,7 @@ def _radius(radius: float, what: str) -> float:
 
 
 def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
-    """Return the wall within `reach` metres of a point, the topmost."""
+    """Return the topmost wall within `reach` metres of a point."""
     keys = obstacles_at(sketch, point, reach)
     return next((key for key in keys if isinstance(sketch.item(key).shape, env.WallObstacle)), None)
 
@@ -139,19 +136,16 @@ def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
 def door_at(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
     """Return both sides of a door whose middle is as near to a point as the wall allows."""
     line = _line(sketch, key)
-    a, b = map(line.interpolate, _span(line, point, min(width, line.length)))
-    return (float(a.x), float(a.y)), (float(b.x), float(b.y))
+    a, b = _span(line, point, min(width, line.length))
+    return _along(line, a), _along(line, b)
 
 
 def on_wall(sketch: Sketch, key: int, point: Point) -> Point:
-    """Return the place on a wall's line that is nearest to a point."""
     line = _line(sketch, key)
-    place = line.interpolate(line.project(shapely.Point(point)))
-    return float(place.x), float(place.y)
+    return _along(line, line.project(shapely.Point(point)))
 
 
 def door_width(width: float) -> float:
-    """Return the width of a door, m; MapError where it is none."""
     if not SHORTEST <= width <= LARGEST:
         raise MapError(f"a door's width is at least {100 * SHORTEST:g} cm")
     return width
@@ -173,20 +167,15 @@ def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     return _opened(sketch, key, begin, end)
 
 
-def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
-    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
-    return middle - width / 2, middle + width / 2
-
-
 def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
     """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
     line, wall = _line(sketch, key), sketch.item(key).shape
     assert isinstance(wall, env.WallObstacle)
-    pieces = []
-    for low, high in ((0.0, begin), (end, line.length)):
-        if high - low >= SMALLEST:
-            points = tuple(map(rounded, substring(line, low, high).coords))
-            pieces.append(replace(wall, points=points))
+    pieces = [
+        replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
+        for low, high in ((0.0, begin), (end, line.length))
+        if high - low >= SMALLEST
+    ]
     if not pieces:
         raise MapError(f"nothing would be left of the {display_name(sketch, key)}")
     words = f"door of {end - begin:.3g} m opened in {display_name(sketch, key)}"
@@ -198,3 +187,13 @@ def _line(sketch: Sketch, key: int) -> LineString:
     if not isinstance(wall, env.WallObstacle) or len(set(wall.points)) < 2:
         raise MapError("doors are opened in walls")
     return LineString(wall.points)
+
+
+def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
+    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
+    return middle - width / 2, middle + width / 2
+
+
+def _along(line: LineString, length: float) -> Point:
+    ((x, y),) = line.interpolate(length).coords
+    return x, y

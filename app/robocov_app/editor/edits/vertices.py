@@ -1,5 +1,6 @@
 """Edits of vertices: moved, inserted, deleted, cut off, left out, straightened; walls joined and split."""
 
+import cmath
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
@@ -15,7 +16,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
+from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import (
     Change,
     Edge,
@@ -33,6 +34,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
 
+_Disc: TypeAlias = env.CircleObstacle | env.DiscStart
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
@@ -47,7 +49,6 @@ def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 
 def put(sketch: Sketch, places: Mapping[Vertex, Point]) -> Change:
-    """Put vertices at places, m: as typed, or dragged."""
     selection = Selection(vertices=frozenset(places))
     return Change(with_places(sketch, places), selection, f"{selection.words(sketch)} moved")
 
@@ -59,37 +60,29 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
         place_of(sketch, vertex)
         by_owner[vertex.of][vertex] = place
     for owner, moves in by_owner.items():
-        if isinstance(owner, str):
-            spec = sketch.start(owner)
-            if isinstance(spec, env.DiscStart):
-                sketch = sketch.with_start(owner, env.DiscStart(*_with_rim(spec, moves)))
-                continue
-        elif owner != BOUNDARY:
-            shape = sketch.item(owner).shape
-            if isinstance(shape, env.CircleObstacle):
-                center, radius = _with_rim(shape, moves)
-                sketch = sketch.with_shapes({owner: replace(shape, center=center, radius=radius)})
-                continue
+        thing = sketch.thing(owner)
+        if isinstance(thing, env.CircleObstacle | env.DiscStart):
+            sketch = sketch.with_thing(owner, _with_rim(thing, moves))
+            continue
         rings = [list(ring) for ring in ring_points(sketch, owner)]
-        for vertex, place in zip(moves, ring_near(np.array(list(moves.values()))), strict=True):
+        for vertex, place in zip(moves, ring_near(list(moves.values())), strict=True):
             rings[vertex.ring][vertex.index] = place
         sketch = with_rings(sketch, owner, rings)
     return sketch
 
 
-def _with_rim(disc: env.CircleObstacle | env.DiscStart, moves: Mapping[Vertex, Point]) -> tuple[Point, float]:
-    by_index = {vertex.index: place for vertex, place in moves.items()}
-    place = point_near(by_index[min(by_index)])
-    if 0 in by_index:
-        return place, disc.radius
+def _with_rim(disc: _Disc, moves: Mapping[Vertex, Point]) -> _Disc:
+    first = min(moves, key=lambda vertex: vertex.index)
+    place = point_near(moves[first])
+    if first.index == 0:
+        return replace(disc, center=place)
     radius = tenths(math.dist(disc.center, place))
     if radius < SMALLEST:
         raise MapError("a circle needs a radius: drag its rim away from its centre")
-    return disc.center, radius
+    return replace(disc, radius=radius)
 
 
 def inserted(sketch: Sketch, edge: Edge) -> Change:
-    """Insert a vertex at the point of an edge; it is selected then."""
     rings = [list(ring) for ring in ring_points(sketch, edge.of)]
     closed = {number: is_closed for number, _, is_closed in rings_of(sketch, edge.of)}
     if edge.ring not in closed or not 0 <= edge.index < len(rings[edge.ring]) - (not closed[edge.ring]):
@@ -124,20 +117,15 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
         tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ()))
         for number, ring in enumerate(ring_points(sketch, owner))
     ]
-    if owner == BOUNDARY:
-        if len(rings[0]) < 3:
-            raise MapError("the boundary needs three corners at least")
-        return with_rings(sketch, owner, rings)
-    if isinstance(owner, str):
-        if not isinstance(sketch.start(owner), env.PointsStart):
-            raise MapError("the points of a disc cannot be deleted: delete the start itself")
-        if rings[0]:
-            return with_rings(sketch, owner, rings)
-        return replace(sketch, starts=tuple(pair for pair in sketch.starts if pair[0] != owner))
-    shape = sketch.item(owner).shape
-    if isinstance(shape, env.CircleObstacle):
+    thing = sketch.thing(owner)
+    if isinstance(thing, env.DiscStart):
+        raise MapError("the points of a disc cannot be deleted: delete the start itself")
+    if isinstance(thing, env.CircleObstacle):
         raise MapError("the points of a circle cannot be deleted: delete the circle itself")
-    if len(rings[0]) < (2 if isinstance(shape, env.WallObstacle) else 3):
+    least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
+    if owner == BOUNDARY and len(rings[0]) < least:
+        raise MapError("the boundary needs three corners at least")
+    if len(rings[0]) < least:
         return sketch.without({owner})
     # a hole goes that has too few left, but one that was broken before and is not touched stays
     kept = [ring for k, ring in enumerate(rings) if k == 0 or k not in gone or len(ring) >= 3]
@@ -145,7 +133,6 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
 
 
 def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
-    """Take a hole of a polygon away."""
     shape = sketch.item(key).shape
     if not isinstance(shape, env.PolygonObstacle) or not 1 <= ring <= len(shape.holes):
         raise MapError("there is no such hole")
@@ -154,19 +141,16 @@ def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
     return Change(after, Selection.of(key), f"hole of {display_name(sketch, key)} filled")
 
 
-# corners cut off and rounded
-
-
 def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
     """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none."""
-    if not (math.isfinite(length) and length > 0.0):
+    if not 0.0 < length < math.inf:
         raise MapError("a bevel needs a length above 0 m")
     return _cut(sketch, selection, lambda turn: (length, 1), "bevelled")
 
 
 def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
-    if not (math.isfinite(radius) and radius > 0.0):
+    if not 0.0 < radius < math.inf:
         raise MapError("a radius above 0 m was wanted")
 
     def cut(turn: float) -> tuple[float, int]:
@@ -180,13 +164,13 @@ def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Chan
     after, count = sketch, 0
     for owner, by_ring in _by_ring(sketch, selection.vertices).items():
         rings = list(ring_points(sketch, owner))
-        closed = {number: is_closed for number, _, is_closed in rings_of(sketch, owner)}
-        for number in by_ring.keys() & closed.keys():
-            cuts = _cuts(rings[number], by_ring[number], closed[number], wanted)
-            rings[number] = _without_corners(rings[number], cuts, closed[number])
-            count += len(cuts)
-        if closed:
-            after = with_rings(after, owner, rings)
+        for number, ring, closed in rings_of(sketch, owner):
+            cuts = _cuts(ring, by_ring[number], closed, wanted)
+            arcs = [_arc(ring, k, *cuts[k]) if k in cuts else [ring[k]] for k in range(len(ring))]
+            if cuts:
+                rings[number] = distinct(ring_near(np.concatenate(arcs)), closed=closed)
+                count += len(cuts)
+                after = with_rings(after, owner, rings)
     if not count:
         raise MapError("select corners first, of polygons, walls or the boundary")
     words = f"{count} corners {words}" if count > 1 else f"corner {words}"
@@ -195,67 +179,39 @@ def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Chan
 
 def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int, tuple[float, int]]:
     """Return length and segments for those of the indices that are corners."""
-    points = np.array(ring)
-    cuts = {}
+    cuts, count = {}, len(ring)
     for k in sorted(indices):
-        turn = 0.0 if not closed and k in (0, len(ring) - 1) else _turn(points, k)
+        before, at, after = (complex(*ring[i % count]) for i in (k - 1, k, k + 1))
+        # either way; 0 where an edge has no length
+        turn = abs(cmath.phase((after - at) * (at - before).conjugate()))
+        if not closed and k in (0, count - 1):
+            continue
         if turn > math.pi - _STRAIGHT:
             raise MapError("a corner that turns right back cannot be cut off")
         if turn >= _STRAIGHT:
             cuts[k] = wanted(turn)
-    count = len(ring)
     for k, (length, _) in cuts.items():
         for other in ((k - 1) % count, (k + 1) % count):
             edge = math.dist(ring[k], ring[other])
             taken = length + (cuts[other][0] if other in cuts else 0.0)
             if taken > edge + 1e-9:
                 more = " for the corners at both ends" if other in cuts else ""
-                raise MapError(
-                    f"that takes {tenths(taken):g} m of an edge that is {tenths(edge):g} m long{more}: "
-                    f"less was wanted"
-                )
+                found = f"that takes {tenths(taken):g} m of an edge that is {tenths(edge):g} m long{more}"
+                raise MapError(f"{found}: less was wanted")
     return cuts
 
 
-def _turn(points: Array, k: int) -> float:
-    """Return by how many radians a ring turns at a vertex, either way; 0 where an edge has no length."""
-    before = points[k] - points[k - 1]
-    after = points[(k + 1) % len(points)] - points[k]
-    cross = before[0] * after[1] - before[1] * after[0]
-    return abs(math.atan2(float(cross), float(before @ after)))
-
-
-def _without_corners(ring: Ring, cuts: Mapping[int, tuple[float, int]], closed: bool) -> Ring:
-    points = np.array(ring)
-    new = [
-        _arc(points[k - 1], points[k], points[(k + 1) % len(ring)], *cuts[k])
-        if k in cuts
-        else points[k : k + 1]
-        for k in range(len(ring))
-    ]
-    return distinct(ring_near(np.concatenate(new)), closed=closed)
-
-
-def _arc(before: Array, corner: Array, after: Array, length: float, segments: int) -> Array:
-    """Return the (segments + 1, 2) points of the arc that touches both edges so far from the corner."""
-    back, on = before - corner, after - corner
-    back, on = back / np.hypot(*back), on / np.hypot(*on)
-    first, last = corner + length * back, corner + length * on
-    if segments == 1:
-        return np.array([first, last])
+def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
+    """Return the (segments + 1, 2) points of the arc that touches both edges so far from a corner."""
+    before, corner, after = (complex(*ring[i % len(ring)]) for i in (k - 1, k, k + 1))
+    back, on = (before - corner) / abs(before - corner), (after - corner) / abs(after - corner)
     # the centre is where the normals at both ends meet: on the bisector
-    half = math.acos(float(np.clip(back @ on, -1.0, 1.0))) / 2.0
-    bisector = (back + on) / np.hypot(*(back + on))
-    center = corner + bisector * (length / math.cos(half))
-    spoke, end = first - center, last - center
-    sweep = math.atan2(float(spoke[0] * end[1] - spoke[1] * end[0]), float(spoke @ end))
-    angle = np.linspace(0.0, sweep, segments + 1)
-    cos, sin = np.cos(angle), np.sin(angle)
-    turned = np.column_stack([cos * spoke[0] - sin * spoke[1], sin * spoke[0] + cos * spoke[1]])
-    return np.asarray(center + turned)
-
-
-# walls
+    half = cmath.phase(on / back) / 2.0
+    bisector = (back + on) / abs(back + on)
+    center = corner + length / math.cos(half) * bisector
+    spoke, end = length * back + corner - center, length * on + corner - center
+    points = center + spoke * np.exp(1j * np.linspace(0.0, cmath.phase(end / spoke), segments + 1))
+    return np.column_stack([points.real, points.imag])
 
 
 def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
@@ -283,7 +239,7 @@ def split(sketch: Sketch, vertex: Vertex) -> Change:
 
 def joined(sketch: Sketch, selection: Selection) -> Change:
     """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
-    items = [item for item in sketch.obstacles if item.key in selection.items]
+    items = selection.items_in(sketch)
     shapes = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
     if len(shapes) < 2 or len(shapes) < len(items):
         raise MapError("select two or more walls to join, and nothing else")
@@ -303,12 +259,9 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
 
 def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
     """Return the gap between two lines, m, and the line that they make where their ends are nearest."""
-    ways = []
-    for a in (chain, chain[::-1]):
-        for b in (line, line[::-1]):
-            gap = math.dist(a[-1], b[0])
-            ways.append((gap, (*a, *(b[1:] if gap <= _SAME else b))))
-    return min(ways, key=lambda way: way[0])
+    ways = [(math.dist(a[-1], b[0]), a, b) for a in (chain, chain[::-1]) for b in (line, line[::-1])]
+    gap, a, b = min(ways, key=lambda way: way[0])
+    return gap, (*a, *(b[1:] if gap <= _SAME else b))
 
 
 def _wall(sketch: Sketch, vertex: Vertex) -> tuple[int, env.WallObstacle]:
@@ -325,18 +278,13 @@ _STEPS = 12  # tolerances that are tried, each half of the one before, until not
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
-    if not (math.isfinite(tolerance) and 0.0 <= tolerance <= LARGEST):
+    if not 0.0 <= tolerance <= LARGEST:
         raise MapError("a tolerance of 0 m or more was wanted")
-    after, before = sketch, 0
-    for owner in _owners(sketch, selection):
-        rings = ring_points(sketch, owner)
-        fewer = _simpler(rings, tolerance, closed=rings_of(sketch, owner)[0][2])
-        before += sum(map(len, rings)) - sum(map(len, fewer))
-        if fewer != rings:
-            after = with_rings(after, owner, fewer)
-    if not before:
+    after, changed = _redrawn(sketch, selection, lambda rings, closed: _simpler(rings, tolerance, closed))
+    count = sum(len(old) - len(new) for old, new in changed)
+    if not count:
         raise MapError("no vertex can be left out at that tolerance")
-    words = "1 vertex left out" if before == 1 else f"{before} vertices left out"
+    words = "1 vertex left out" if count == 1 else f"{count} vertices left out"
     return Change(after, selection.without_vertices(), words)
 
 
@@ -344,50 +292,50 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
     """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
     if not 0.0 < degrees <= 30.0:
         raise MapError("an angle of up to 30 degrees was wanted")
-    after, count = sketch, 0
-    for owner in _owners(sketch, selection):
-        rings = []
-        for _, points, closed in rings_of(sketch, owner):
-            rings.append(_straight(points, degrees, closed=closed))
-            count += rings[-1] != points
-        if any(new != old for new, old in zip(rings, ring_points(sketch, owner), strict=True)):
-            after = with_rings(after, owner, rings)
-    if not count:
+
+    def straight(rings: tuple[Ring, ...], closed: bool) -> tuple[Ring, ...]:
+        return tuple(_straight(ring, degrees, closed) for ring in rings)
+
+    after, changed = _redrawn(sketch, selection, straight)
+    if not changed:
         raise MapError(f"no edge is within {degrees:g} degrees of level or upright, and not so already")
-    return Change(after, selection.without_vertices(), f"{counted(count, 'outline')} straightened")
+    return Change(after, selection.without_vertices(), f"{counted(len(changed), 'outline')} straightened")
 
 
-def _owners(sketch: Sketch, selection: Selection) -> list[Owner]:
+def _redrawn(
+    sketch: Sketch, selection: Selection, redraw: Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]
+) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
+    """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
     everything = not (selection.items or selection.boundary)
-    owners: list[Owner] = [
-        item.key
-        for item in sketch.obstacles
-        if (everything or item.key in selection.items) and rings_of(sketch, item.key)
-    ]
-    if selection.boundary and sketch.boundary is not None:
-        owners.append(BOUNDARY)
-    if not owners:
+    owners = [key for key in sketch.places if everything or key in selection.items]
+    owners += [BOUNDARY] if selection.boundary else []
+    outlines = {owner: found for owner in owners if (found := rings_of(sketch, owner))}
+    if not outlines:
         raise MapError("select polygons, walls or the boundary first")
-    return owners
+    after, changed = sketch, []
+    for owner, ((_, _, closed), *_) in outlines.items():
+        rings = ring_points(sketch, owner)
+        new = redraw(rings, closed)
+        changed += [pair for pair in zip(rings, new, strict=True) if pair[0] != pair[1]]
+        after = with_rings(after, owner, new) if new != rings else after
+    return after, changed
 
 
-def _simpler(rings: tuple[Ring, ...], tolerance: float, *, closed: bool) -> tuple[Ring, ...]:
+def _simpler(rings: tuple[Ring, ...], tolerance: float, closed: bool) -> tuple[Ring, ...]:
     """Return the rings of one thing with fewer vertices; the vertices that stay are the same."""
-    sound = _is_sound(rings, closed=closed)
+
+    def is_sound(rings: tuple[Ring, ...]) -> bool:
+        return not closed or (min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid))
+
+    sound = is_sound(rings)
     for step in range(_STEPS):
-        fewer = tuple(_fewer(ring, tolerance / 2**step, closed=closed) for ring in rings)
-        if _is_sound(fewer, closed=closed) >= sound:
+        fewer = tuple(_fewer(ring, tolerance / 2**step, closed) for ring in rings)
+        if is_sound(fewer) >= sound:
             return fewer
     return rings
 
 
-def _is_sound(rings: tuple[Ring, ...], *, closed: bool) -> bool:
-    if not closed:
-        return True
-    return min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid)
-
-
-def _fewer(ring: Ring, tolerance: float, *, closed: bool) -> Ring:
+def _fewer(ring: Ring, tolerance: float, closed: bool) -> Ring:
     if len(set(ring)) < (4 if closed else 3):
         return ring
     if not closed:
@@ -395,18 +343,16 @@ def _fewer(ring: Ring, tolerance: float, *, closed: bool) -> Ring:
     # begin at a vertex that stays: the one farthest from the middle is a corner of the hull
     points = np.array(ring)
     first = int(np.hypot(*(points - points.mean(axis=0)).T).argmax())
-    turned = np.roll(points, -first, axis=0)
-    line = LineString(np.concatenate([turned, turned[:1]])).simplify(tolerance, preserve_topology=False)
-    kept = [(float(x), float(y)) for x, y in line.coords[:-1]]
-    if len(set(kept)) < 3 or not shapely.MultiPoint(kept).convex_hull.area > 0.0:
+    line = LineString([*ring[first:], *ring[: first + 1]]).simplify(tolerance, preserve_topology=False)
+    kept = set(line.coords)
+    if len(kept) < 3 or not shapely.MultiPoint(list(kept)).convex_hull.area > 0.0:
         return ring
     # in the order in which they were
-    there = set(kept)
-    return tuple(point for point in ring if point in there)
+    return tuple(point for point in ring if point in kept)
 
 
-def _straight(ring: Ring, degrees: float, *, closed: bool) -> Ring:
-    points = np.array(ring, dtype=float).reshape(-1, 2)
+def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:
+    points = as_array(ring)
     if len(points) < 2:
         return ring
     edges = np.roll(points, -1, axis=0) - points
@@ -430,7 +376,7 @@ def _runs(flat: BoolArray) -> list[list[int]]:
     count = len(flat)
     if flat.all():
         return []
-    first = int(np.flatnonzero(~flat)[0]) + 1
+    first = int(flat.argmin()) + 1
     runs: list[list[int]] = []
     for k in (np.arange(first, first + count) % count).tolist():
         if not flat[k]:

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import count
+from itertools import count, islice
 from typing import Annotated, Any, ClassVar
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -34,7 +34,6 @@ class Background:
     shown: bool = True
 
     def place_of(self, pixel: Point) -> Point:
-        """Return where a pixel lies on the map, m."""
         x, y = pixel[0] * self.scale, (self.pixels[1] - pixel[1]) * self.scale
         cos, sin = cos_sin(self.turn)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
@@ -47,7 +46,6 @@ class Background:
         return left, right, self.place_of((width, 0)), self.place_of((0, 0))
 
     def document(self) -> dict[str, Any]:
-        """Return it as it stands in a map."""
         held = asdict(self) | {"pixels": list(self.pixels), "corner": [_short(each) for each in self.corner]}
         return held | {name: _short(held[name]) for name in ("scale", "turn", "opacity")}
 
@@ -68,31 +66,28 @@ _ADAPTER = TypeAdapter(Background)
 
 def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
     """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
-    if min(pixels) < 1 or pixels[0] * pixels[1] > MOST_PIXELS:
-        raise MapError(
-            f"the picture has {pixels[0]} x {pixels[1]} pixels: "
-            f"1 to {MOST_PIXELS // 1_000_000} million pixels were wanted"
-        )
+    if min(pixels) < 1 or math.prod(pixels) > MOST_PIXELS:
+        wanted = f"1 to {MOST_PIXELS // 1_000_000} million pixels were wanted"
+        raise MapError(f"the picture has {pixels[0]} x {pixels[1]} pixels: {wanted}")
     return Background(path, pixels, width / pixels[0])
 
 
 def to_scale(background: Background, a: Point, b: Point, metres: float) -> Background:
     """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
-    apart = math.dist(a, b)
     if not (math.isfinite(metres) and metres > 0.0):
         raise MapError("the length between the two points must be above 0 m")
-    _require_apart(background, apart)
-    factor = metres / apart
+    _require_apart(background, a, b)
+    factor = metres / math.dist(a, b)
     if not 1e-6 <= background.scale * factor <= 1e3:
         raise MapError(f"a pixel would be {background.scale * factor:.3g} m wide: is {metres:g} m right?")
-    corner = background.corner
-    moved = a[0] + factor * (corner[0] - a[0]), a[1] + factor * (corner[1] - a[1])
+    x, y = background.corner
+    moved = a[0] + factor * (x - a[0]), a[1] + factor * (y - a[1])
     return replace(background, scale=background.scale * factor, corner=moved)
 
 
 def levelled(background: Background, a: Point, b: Point) -> Background:
     """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
-    _require_apart(background, math.dist(a, b))
+    _require_apart(background, a, b)
     return turned(background, angle_to_level(a, b), a)
 
 
@@ -104,8 +99,8 @@ def turned(background: Background, degrees: float, about: Point) -> Background:
     return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
 
 
-def _require_apart(background: Background, apart: float) -> None:
-    if apart < 2 * background.scale:
+def _require_apart(background: Background, a: Point, b: Point) -> None:
+    if math.dist(a, b) < 2 * background.scale:
         raise MapError("click two points of the picture that are farther apart")
 
 
@@ -131,13 +126,10 @@ def annotated(
     """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():
-        entries = []
         for k in sorted(marks):
             of = {"obstacle": k} if names[k] is None else {"obstacle": k, "name": names[k]}
-            held = {name: marks[k][name] for name in kept if name in marks[k]}
-            entries += [{**of, **held}] if held else []
-        if entries:
-            ours[key] = entries
+            if held := {name: marks[k][name] for name in kept if name in marks[k]}:
+                ours.setdefault(key, []).append({**of, **held})
     if background is not None:
         ours["background"] = background.document()
     if not ours:
@@ -150,11 +142,11 @@ def taken_apart(
     extra: Mapping[str, Any], names: Sequence[str | None]
 ) -> tuple[dict[int, dict[str, Any]], Background | None, dict[str, Any]]:
     """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
-    for home, _ in zip(_homes(), range(len(extra) + 1), strict=False):
+    for home in islice(_homes(), len(extra) + 1):
         held = extra.get(home)
         if not isinstance(held, dict) or _is_free(held):
             continue
-        background = Background.of_document(held["background"]) if "background" in held else None
+        background = Background.of_document(held.get("background"))
         sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
         if not sound or ("background" in held and background is None):
             continue
@@ -176,8 +168,7 @@ def taken_apart(
 
 def _homes() -> Iterator[str]:
     yield _HOME
-    for k in count(2):
-        yield f"{_HOME} {k}"
+    yield from (f"{_HOME} {k}" for k in count(2))
 
 
 def _is_free(held: object) -> bool:
@@ -198,10 +189,9 @@ def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
 
 def _obstacle_of(entry: Mapping[str, Any], names: Sequence[str | None]) -> int | None:
     """Return the place of the obstacle that an entry is about; None if it is gone."""
-    k, name = int(entry["obstacle"]), entry.get("name")
-    if 0 <= k < len(names) and names[k] == name:
-        return k
-    if name is not None and names.count(name) == 1:
+    k, name = entry["obstacle"], entry.get("name")
+    there = 0 <= k < len(names)
+    if not (there and names[k] == name) and name is not None and names.count(name) == 1:
         return names.index(name)
     # it may have got a name, or lost it
-    return k if 0 <= k < len(names) and (name is None or names[k] is None) else None
+    return k if there and (name is None or names[k] in (None, name)) else None

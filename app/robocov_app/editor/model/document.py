@@ -24,8 +24,7 @@ from robocov_app.toolkit.autosave import Autosaver
 
 @dataclass
 class _Step:
-    before: Sketch
-    selected_before: Selection
+    before: Change  # with the words of `after`, as undoing says them
     after: Change
     drag: Hashable | None
 
@@ -43,46 +42,45 @@ class History:
 
     def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
         """Take a change, merged with the last of the same `drag`; return whether it changed anything."""
-        before, selected = self.sketch, self.selection
-        last = self._done[-1] if self._done else None
-        merges = drag is not None and not self._broken and last is not None and last.drag == drag
-        self._broken = False
-        self.selection = change.selection
-        if change.sketch == before:
+        before, done = Change(self.sketch, self.selection, change.words), self._done
+        merges = drag is not None and not self._broken and bool(done) and done[-1].drag == drag
+        self._broken, self.selection = False, change.selection
+        if change.sketch == self.sketch:
             return False
-        if merges and last is not None:
-            self._done.pop()
-            before, selected = last.before, last.selected_before
-        self.sketch = change.sketch
-        self._undone = []
-        if change.sketch != before:
-            self._done.append(_Step(before, selected, change, drag))
+        if merges:
+            before = replace(done.pop().before, words=change.words)
+        self.sketch, self._undone = change.sketch, []
+        if change.sketch != before.sketch:
+            done.append(_Step(before, change, drag))
         return True
 
     def undo(self) -> Change | None:
         """Take the newest change back; return what was there before, in the words of what was taken back."""
         if not self._done:
             return None
-        step = self._done.pop()
-        self._undone.append(step)
-        return self._now(Change(step.before, step.selected_before, step.after.words))
+        self._undone.append(self._done.pop())
+        return self._go_to(self._undone[-1].before)
 
     def redo(self) -> Change | None:
         """Do again what was undone last; None if there is nothing."""
         if not self._undone:
             return None
-        step = self._undone.pop()
-        self._done.append(step)
-        return self._now(step.after)
+        self._done.append(self._undone.pop())
+        return self._go_to(self._done[-1].after)
+
+    def _go_to(self, state: Change) -> Change:
+        self.sketch, self.selection = state.sketch, state.selection
+        self._broken = True
+        return state
 
     def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
         """Change the sketch as it is and at every step, without a step of its own."""
         steps = [*self._done, *self._undone]
-        sketches = [self.sketch, *(step.before for step in steps), *(step.after.sketch for step in steps)]
+        sketches = [self.sketch, *(state.sketch for step in steps for state in (step.before, step.after))]
         # the same sketch stays the same in all steps
-        new = {id(sketch): change(sketch) for sketch in {id(each): each for each in sketches}.values()}
+        new = {id(sketch): change(sketch) for sketch in sketches}
         for step in steps:
-            step.before = new[id(step.before)]
+            step.before = replace(step.before, sketch=new[id(step.before.sketch)])
             step.after = replace(step.after, sketch=new[id(step.after.sketch)])
         self.sketch = new[id(self.sketch)]
 
@@ -101,7 +99,6 @@ class History:
         self._broken = True
 
     def mark_saved(self) -> None:
-        """Remember that a file holds what is there now."""
         self._saved = self.sketch
         self._broken = True
 
@@ -113,11 +110,6 @@ class History:
     def unsaved(self) -> bool:
         """Whether something would be lost; undoing back to what was saved makes it false again."""
         return self._saved is not self.sketch and self._saved != self.sketch
-
-    def _now(self, change: Change) -> Change:
-        self.sketch, self.selection = change.sketch, change.selection
-        self._broken = True
-        return change
 
 
 KIND = "robocov-draft"
@@ -149,7 +141,6 @@ class Autosave:
 
 
 def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
-    """Return what is kept of a map."""
     file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
     return {"disk": file, "sketch": draft_document(sketch)}
 
@@ -160,7 +151,6 @@ def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
 
 
 def opened_elsewhere(folder: Path | None, path: Path) -> bool:
-    """Return whether another editor has this file open."""
     return autosave.opened_elsewhere(folder, KIND, path)
 
 
@@ -173,9 +163,11 @@ def _autosave(record: autosave.Record) -> Autosave | None:
     with suppress(MapError):
         if path is not None and read_bytes(path) == sketch_text(sketch).encode():
             return None
+    known = None
     try:
-        size, changed = disk["stamp"] if disk is not None else (0, 0)
-        known = OnDisk(path, str(disk["digest"]), (int(size), int(changed))) if disk and path else None
+        if disk is not None and path is not None:
+            size, changed = map(int, disk["stamp"])
+            known = OnDisk(path, str(disk["digest"]), (size, changed))
     except (TypeError, ValueError, KeyError) as error:
         raise MapError(f"{record.folder}: is no whole {KIND}: {error}") from None
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
@@ -196,6 +188,10 @@ class OnDisk:
     digest: str  # SHA-256 of its content
     stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
 
+    @classmethod
+    def of(cls, path: Path, content: bytes, stamp: tuple[int, int] | None) -> OnDisk:
+        return cls(path, sha256(content).hexdigest(), stamp or (-1, 0))
+
 
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
     """Return the sketch in a map file, which may be a draft, and what the file was like."""
@@ -203,7 +199,7 @@ def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
     # the stamp of before: what changes while it is read is noticed at the next look
     stamp = _stamp(path)
     content = read_bytes(path)
-    return parse_sketch(content, str(path), path.parent), OnDisk(path, _digest(content), stamp or (-1, 0))
+    return parse_sketch(content, str(path), path.parent), OnDisk.of(path, content, stamp)
 
 
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
@@ -211,14 +207,15 @@ def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, ov
     path = path.absolute()
     text = sketch_text(sketch).encode()
     writable(path)
-    if not over and (before is None or before.path != path) and _stamp(path) is not None:
+    ours = before if before is not None and before.path == path else None
+    if not over and ours is None and _stamp(path) is not None:
         raise ChangedError(f"{one_line(path)}: there is such a file already")
-    if not over and before is not None and before.path == path and state_of(before) == "changed":
+    if not over and ours is not None and state_of(ours) == "changed":
         what = "has been changed by something else since it was opened or saved here"
         raise ChangedError(f"{one_line(path)}: {what}")
     with written(path) as part:
         part.write_bytes(text)
-    return OnDisk(path, _digest(text), _stamp(path) or (-1, 0))
+    return OnDisk.of(path, text, _stamp(path))
 
 
 def state_of(before: OnDisk) -> State:
@@ -232,7 +229,7 @@ def state_of(before: OnDisk) -> State:
         content = read_bytes(before.path)
     except MapError:
         return "changed" if _stamp(before.path) else "gone"
-    return "same" if _digest(content) == before.digest else "changed"
+    return "same" if sha256(content).hexdigest() == before.digest else "changed"
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
@@ -241,10 +238,6 @@ def _stamp(path: Path) -> tuple[int, int] | None:
     except (OSError, ValueError):
         return None
     return status.st_size, status.st_mtime_ns
-
-
-def _digest(content: bytes) -> str:
-    return sha256(content).hexdigest()
 
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
@@ -268,9 +261,10 @@ class Document:
         stem: str = "",
     ) -> None:
         self.history = History(sketch, saved=saved)
-        self.path, self.disk, self.stem = path, disk, stem
+        self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
         self.state: State = "same"
         self._autosaver = Autosaver(drafts, KIND, path, resumed)
+        self.flush, self.close = self._autosaver.flush, self._autosaver.close
         self._kept: Sketch | None = sketch if saved else None
         self._looked = 0.0
         self._over = False
@@ -291,22 +285,19 @@ class Document:
 
     @classmethod
     def recovered(cls, autosave: Autosave, drafts: Path | None) -> Document:
-        """Return work that was left behind, unsaved still."""
-        sketch = autosave.sketch()
-        return cls(sketch, drafts, autosave.path, autosave.disk, resumed=autosave.folder, saved=False)
+        return cls(
+            autosave.sketch(), drafts, autosave.path, autosave.disk, resumed=autosave.folder, saved=False
+        )
 
     @property
     def unsaved(self) -> bool:
-        """Whether something would be lost."""
         return self.history.unsaved
 
     @property
     def title(self) -> str:
-        """Its file's name, or else its own."""
         return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
     def suggested(self, folder: Path) -> Path:
-        """Return where it would be saved."""
         if self.path is not None:
             return self.path
         stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
@@ -318,14 +309,12 @@ class Document:
 
     def spoils(self, path: Path) -> bool:
         """Return whether saving there would replace a valid map by one that cannot run."""
-        try:
+        with suppress(MapError):
             load_map(_with_suffix(path))
-        except MapError:
-            return False
-        try:
-            self.history.sketch.environment()
-        except MapError:
-            return True
+            try:
+                self.history.sketch.environment()
+            except MapError:
+                return True
         return False
 
     def save(self, path: Path, *, over: bool = False) -> str:
@@ -338,7 +327,7 @@ class Document:
         self.disk = write_sketch(named, path, before, over=over or (self._over and path == self.path))
         if named is not self.history.sketch:
             self.history.replace_all(lambda sketch: sketch.named(path.stem))
-        self.path, self.state, self._over = path, "same", False
+        self.path = path
         self._settle()
         return f"saved: {path}"
 
@@ -363,18 +352,16 @@ class Document:
         if self.disk is None or now - self._looked < _LOOKED_AGAIN:
             return "same"
         self._looked = now
-        state = state_of(self.disk)
-        news, self.state = state != self.state, state
-        if news and state != "same":
-            self.history.mark_unsaved()
-            return state
-        return "same"
+        before, self.state = self.state, state_of(self.disk)
+        if self.state in ("same", before):
+            return "same"
+        self.history.mark_unsaved()
+        return self.state
 
     def reload(self) -> None:
         """Take the document as its file is now; that is an edit, which can be undone."""
         assert self.path is not None
         sketch, self.disk = read_sketch(self.path)
-        self.state, self._over = "same", False
         self.history.do(Change(sketch, Selection(), "read again from the file"))
         self._settle()
 
@@ -382,15 +369,8 @@ class Document:
         """Take no notice of what is on the disk: saving replaces it."""
         self._over = True
 
-    def flush(self) -> None:
-        """Wait until the autosave is on the disk."""
-        self._autosaver.flush()
-
-    def close(self, *, discard: bool) -> None:
-        """End; discard what was kept aside, or leave it to be offered at the next start."""
-        self._autosaver.close(discard=discard)
-
     def _settle(self) -> None:
+        self.state, self._over = "same", False
         self.history.mark_saved()
         self._kept = self.history.sketch
         self._autosaver.settle(self.path)

@@ -1,5 +1,6 @@
 """Measurements of a sketch: free area, parts, narrowest gap, and where robots cannot pass."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from robocov.arrays import Array, IntArray
 from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.selection import rings_of
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
+from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
@@ -43,21 +44,19 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
     found, free = examined(sketch, radius)
     narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
-    gap = narrow[0] if narrow else narrowest_gap(free)
     reached, untouched = reach_of(free, radius)
     discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
-    impassable = shapely.union_all([*discs, untouched]) & free
-    marks = _polygons(impassable)
-    owners = [BOUNDARY, *(item.key for item in sketch.obstacles)]
+    marks = _polygons(shapely.union_all([*discs, untouched]) & free)
+    sealed = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
     return Measurement(
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in reached),
-        gap=gap,
+        gap=narrow[0] if narrow else narrowest_gap(free),
         impassable=MultiPolygon(marks),
-        sealed=MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)]),
-        vertices=sum(len(points) for owner in owners for _, points, _ in rings_of(sketch, owner)),
-        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, free, radius)),
+        sealed=sealed,
+        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in rings_of(sketch, owner)),
+        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, sealed, free, radius)),
         radius=radius,
     )
 
@@ -125,28 +124,23 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
             words = f"the gap at {at} is {gap.width:.3g} m wide: too narrow for robots of radius {radius:g} m"
             found[mark] = Problem(words, LineString(gap.between), None, False, "narrow")
     problems = list(found.values())
-    more = problems[_MOST_GAPS:]
-    if more:
+    if more := problems[_MOST_GAPS:]:
         words = f"{len(more)} more gaps are too narrow for robots of radius {radius:g} m"
         where = shapely.union_all([problem.where for problem in more])
-        return [*problems[:_MOST_GAPS], Problem(words, where, None, False)]
+        problems[_MOST_GAPS:] = [Problem(words, where, None, False)]
     return problems
 
 
-def _cut_off(reached: tuple[BaseGeometry, ...], free: MultiPolygon, radius: float) -> list[Problem]:
+def _cut_off(
+    reached: tuple[BaseGeometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
+) -> Iterator[Problem]:
     """Warn of places that are out of reach from the largest part, because of gaps that are too narrow."""
-    rooms = [part for part in free.geoms if part.area >= np.pi * radius**2]
     if not free.is_empty and not reached:
-        return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
-    if len(reached) <= len(rooms):
-        return []
-    area = sum(part.area for part in reached[1:])
-    words = (
-        f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space: "
-        f"{area:.3g} m² are cut off from the largest"
-    )
-    where = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
-    return [Problem(words, where, None, False, "cut off")]
+        yield Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)
+    elif len(reached) > sum(part.area >= np.pi * radius**2 for part in free.geoms):
+        parts = f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space"
+        area = sum(part.area for part in reached[1:])
+        yield Problem(f"{parts}: {area:.3g} m² are cut off from the largest", sealed, None, False, "cut off")
 
 
 def _polygons(geometry: BaseGeometry) -> list[Polygon]:
@@ -173,10 +167,9 @@ class MeasurementWire(Wire):
         self._known: dict[int, Item] = {}
 
     def encode(self, question: tuple[Sketch, float]) -> Question:
-        """Return the question about a sketch, for robots of a radius in m."""
         sketch, radius = question
-        known, self._known = self._known, {item.key: item for item in sketch.obstacles}
-        changed = tuple(item for item in sketch.obstacles if known.get(item.key) is not item)
+        changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
+        self._known = {item.key: item for item in sketch.obstacles}
         return Question(replace(sketch, obstacles=()), tuple(self._known), changed, radius)
 
 
@@ -189,7 +182,6 @@ class Measuring:
         self._known: dict[int, Item] = {}
 
     def __call__(self, questions: list[Question], line: Line) -> Measurement:
-        """Learn from all questions, and answer the last."""
         for question in questions:
             self._known |= {item.key: item for item in question.changed}
             self._known = {key: self._known[key] for key in question.order}
@@ -201,5 +193,4 @@ def measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
     """Return what measures sketches, asked by (sketch, radius), in another process or at once in this one."""
     if direct:
         return DirectWorker(Measuring(), MeasurementWire())
-    service = "robocov_app.editor.model.measurement:Measuring"
-    return LatestWorker(service, "measures the map", MeasurementWire)
+    return LatestWorker(f"{__name__}:{Measuring.__name__}", "measures the map", MeasurementWire)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from robocov import environment as env
-from robocov.environment import Obstacle, Point, StartSpec
+from robocov.environment import Obstacle, Point, Ring
 from robocov.errors import MapError, counted, one_line
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_and_name
 
@@ -56,16 +57,18 @@ class Selection:
     @classmethod
     def all(cls, sketch: Sketch) -> Selection:
         """Return the selection of every obstacle that is not locked or hidden, every start, the boundary."""
-        free = [item.key for item in sketch.obstacles if not (item.locked or item.hidden)]
-        return replace(cls.of(*free, *dict(sketch.starts)), boundary=sketch.boundary is not None)
+        shut = frozenset(item.key for item in sketch.obstacles if not item.takeable)
+        return cls.of(*(owner for owner in sketch.owners if owner not in shut)).within(sketch)
 
     @property
     def owners(self) -> frozenset[Owner]:
-        """The whole things that are selected."""
         return self.items | self.starts | ({BOUNDARY} if self.boundary else frozenset())
 
+    def items_in(self, sketch: Sketch) -> list[Item]:
+        """Return the selected obstacles, the lowest first."""
+        return [item for item in sketch.obstacles if item.key in self.items]
+
     def plus(self, other: Selection) -> Selection:
-        """Return both together."""
         items, starts = self.items | other.items, self.starts | other.starts
         return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
 
@@ -84,13 +87,12 @@ class Selection:
         )
 
     def without_vertices(self) -> Selection:
-        """Return the whole things of the selection, without single vertices."""
         return replace(self, vertices=frozenset())
 
     def with_groups(self, sketch: Sketch) -> Selection:
         """Return the selection with the members of all its groups, but for the locked and the hidden."""
         groups = {sketch.item(key).group for key in self.items} - {""}
-        members = {i.key for i in sketch.obstacles if i.group in groups and not (i.locked or i.hidden)}
+        members = {item.key for item in sketch.obstacles if item.group in groups and item.takeable}
         return replace(self, items=self.items | members)
 
     def words(self, sketch: Sketch) -> str:
@@ -129,15 +131,11 @@ def numbered_name(sketch: Sketch, owner: Owner) -> str:
     return f"{name} {sketch.places[owner] + 1}"
 
 
-def ring_points(sketch: Sketch, owner: Owner) -> tuple[tuple[Point, ...], ...]:
+def ring_points(sketch: Sketch, owner: Owner) -> tuple[Ring, ...]:
     """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
     if owner == BOUNDARY:
         return () if sketch.boundary is None else (sketch.boundary,)
-    thing: Obstacle | StartSpec | None
-    if isinstance(owner, str):
-        thing = dict(sketch.starts).get(owner)
-    else:
-        thing = sketch.item(owner).shape if owner in sketch.places else None
+    thing = sketch.thing(owner)
     if isinstance(thing, env.PolygonObstacle):
         return (thing.vertices, *thing.holes)
     if isinstance(thing, env.WallObstacle):
@@ -150,18 +148,25 @@ def ring_points(sketch: Sketch, owner: Owner) -> tuple[tuple[Point, ...], ...]:
     return ()
 
 
+def rings_of(sketch: Sketch, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
+    """Return the rings of something: number, points, and whether it is closed; none of circles and starts."""
+    thing = sketch.thing(owner)
+    if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
+        return ()
+    closed = not isinstance(thing, env.WallObstacle)
+    return tuple((k, points, closed) for k, points in enumerate(ring_points(sketch, owner)))
+
+
 def with_rings(sketch: Sketch, owner: Owner, rings: Sequence[Sequence[Point]]) -> Sketch:
     """Return the sketch with other vertices for something that `ring_points` has rings of, not circles."""
-    lines = [tuple(ring) for ring in rings]
-    if isinstance(owner, str):
-        return sketch.with_start(owner, env.PointsStart(lines[0]))
+    line, *holes = map(tuple, rings)
     if owner == BOUNDARY:
-        return replace(sketch, boundary=lines[0])
-    shape = sketch.item(owner).shape
-    if isinstance(shape, env.WallObstacle):
-        return sketch.with_shapes({owner: replace(shape, points=lines[0])})
-    assert isinstance(shape, env.PolygonObstacle)
-    return sketch.with_shapes({owner: replace(shape, vertices=lines[0], holes=tuple(lines[1:]))})
+        return replace(sketch, boundary=line)
+    thing: Any = sketch.thing(owner)
+    if isinstance(thing, env.PolygonObstacle):
+        return sketch.with_thing(owner, replace(thing, vertices=line, holes=tuple(holes)))
+    key = "points" if isinstance(thing, env.WallObstacle) else "positions"
+    return sketch.with_thing(owner, replace(thing, **{key: line}))
 
 
 def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], words: str) -> Change:
@@ -181,7 +186,7 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], 
 
 
 def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
-    """Return the vertices of something and where they are, m; the handles that a window shows."""
+    """Return the vertices of something and where they are, m."""
     return tuple(
         (Vertex(owner, ring, index), point)
         for ring, points in enumerate(ring_points(sketch, owner))
@@ -190,7 +195,6 @@ def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
 
 
 def exists(sketch: Sketch, vertex: Vertex) -> bool:
-    """Return whether there is such a vertex."""
     rings = ring_points(sketch, vertex.of)
     return 0 <= vertex.ring < len(rings) and 0 <= vertex.index < len(rings[vertex.ring])
 
@@ -200,14 +204,3 @@ def place_of(sketch: Sketch, vertex: Vertex) -> Point:
     if not exists(sketch, vertex):
         raise MapError("there is no such vertex any more")
     return ring_points(sketch, vertex.of)[vertex.ring][vertex.index]
-
-
-def rings_of(sketch: Sketch, owner: Owner) -> tuple[tuple[int, tuple[Point, ...], bool], ...]:
-    """Return the rings of something: number, points, and whether it is closed; none of circles and starts."""
-    if isinstance(owner, str):
-        return ()
-    shape = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(shape, env.CircleObstacle):
-        return ()
-    closed = not isinstance(shape, env.WallObstacle)
-    return tuple((k, points, closed) for k, points in enumerate(ring_points(sketch, owner)))

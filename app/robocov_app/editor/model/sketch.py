@@ -18,6 +18,7 @@ from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
+from robocov_app.editor.model.geometry import Box, as_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
@@ -43,14 +44,17 @@ class Item:
         return geometry_of(self.shape)
 
     @property
-    def marks(self) -> dict[str, Any]:
-        """Attributes that the editor keeps besides the shape."""
-        return {name: value for name in MARKS if (value := getattr(self, name))}
+    def takeable(self) -> bool:
+        """Whether the mouse can take it."""
+        return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived again."""
-        marks = {name: getattr(self, name) for name in MARKS}
-        return {"key": self.key, "shape": replace(self.shape), **marks}
+        return {
+            "key": self.key,
+            "shape": replace(self.shape),
+            **{name: getattr(self, name) for name in MARKS},
+        }
 
 
 @dataclass(frozen=True)
@@ -74,13 +78,13 @@ class Sketch:
     @classmethod
     def from_environment(cls, environment: env.Environment) -> Sketch:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        names = [shape.name for shape in environment.obstacles]
-        marks, background, extra = taken_apart(to_json(environment).get("extra", {}), names)
+        shapes, free_keys = environment.obstacles, to_json(environment).get("extra", {})
+        marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
         return cls(
             name=environment.name,
             description=environment.description,
             boundary=environment.boundary,
-            obstacles=tuple(Item(k, s, **marks.get(k, {})) for k, s in enumerate(environment.obstacles)),
+            obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
@@ -94,25 +98,36 @@ class Sketch:
 
     def unchecked(self) -> env.Environment:
         """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
-        marks = {place: item.marks for place, item in enumerate(self.obstacles) if item.marks}
+        shapes, marks = [item.shape for item in self.obstacles], dict[int, dict[str, Any]]()
+        for k, item in enumerate(self.obstacles):
+            marks[k] = {name: value for name in MARKS if (value := getattr(item, name))}
         return env.Environment(
             name=self.name,
             boundary=self.boundary or (),
-            obstacles=tuple(item.shape for item in self.obstacles),
+            obstacles=tuple(shapes),
             starts=dict(self.starts),
             description=self.description,
-            extra=annotated(self.extra, marks, [i.shape.name for i in self.obstacles], self.background),
+            extra=annotated(self.extra, marks, [shape.name for shape in shapes], self.background),
             schema=self.schema,
             density=self.density,
         )
 
     def item(self, key: int) -> Item:
-        """Return the obstacle with a key; a KeyError where there is none."""
         return self.obstacles[self.places[key]]
 
     def start(self, name: str) -> StartSpec:
-        """Return the start of that name; a KeyError where there is none."""
         return dict(self.starts)[name]
+
+    def thing(self, owner: Owner) -> Obstacle | StartSpec | None:
+        """Return an obstacle or a start; None of the boundary, and where there is no such thing."""
+        if isinstance(owner, str):
+            return dict(self.starts).get(owner)
+        return self.item(owner).shape if owner in self.places else None
+
+    @property
+    def owners(self) -> tuple[Owner, ...]:
+        """All that may have vertices: the boundary, obstacles, starts."""
+        return BOUNDARY, *self.places, *dict(self.starts)
 
     @cached_property
     def places(self) -> Mapping[int, int]:
@@ -120,26 +135,23 @@ class Sketch:
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
-    def geometries(self) -> Any:
-        """Geometries of the obstacles in their order, an array of shapely geometries."""
+    def geometries(self) -> Any:  # an array of shapely geometries
         geometries = np.empty(len(self.obstacles), dtype=object)
         geometries[:] = [item.geometry for item in self.obstacles]
         return geometries
 
     @cached_property
     def tree(self) -> shapely.STRtree:
-        """An index of `geometries`."""
         return shapely.STRtree(self.geometries)
 
     @property
     def fresh_key(self) -> int:
-        """A key that no obstacle has."""
         return max((item.key for item in self.obstacles), default=-1) + 1
 
     def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
         pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
-        items = tuple(Item(k, shape, note) for k, (shape, note) in enumerate(pairs, self.fresh_key))
+        items = [Item(k, *pair) for k, pair in enumerate(pairs, self.fresh_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
     def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
@@ -152,10 +164,15 @@ class Sketch:
         """Return the sketch with a start changed in its place, or added as the last."""
         return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
 
-    def without(self, keys: Iterable[int]) -> Sketch:
-        """Return the sketch without some obstacles."""
-        gone = frozenset(keys)
-        return replace(self, obstacles=tuple(item for item in self.obstacles if item.key not in gone))
+    def with_thing(self, owner: Owner, thing: Any) -> Sketch:
+        """Return the sketch with another obstacle or start in place of one."""
+        return self.with_start(owner, thing) if isinstance(owner, str) else self.with_shapes({owner: thing})
+
+    def without(self, owners: Iterable[Owner]) -> Sketch:
+        """Return the sketch without some obstacles and starts."""
+        gone = frozenset(owners)
+        obstacles = tuple(item for item in self.obstacles if item.key not in gone)
+        return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
 
     def named(self, name: str) -> Sketch:
         """Return the sketch with a name if nobody has given it one."""
@@ -163,8 +180,8 @@ class Sketch:
         return replace(self, name=name) if self.name == Sketch.name and name else self
 
     @property
-    def bounds(self) -> tuple[float, float, float, float] | None:
-        """Smallest x, y and largest x, y of all that there is, m, with a shown picture; None of nothing."""
+    def bounds(self) -> Box | None:
+        """Bounding box of all that there is, with a shown picture; None of nothing."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
@@ -174,8 +191,7 @@ class Sketch:
             elif isinstance(spec, env.DiscStart):
                 (x, y), r = spec.center, abs(spec.radius)
                 points += [(x - r, y - r), (x + r, y + r)]
-        boxes = shapely.bounds(self.geometries).reshape(-1, 4)
-        corners = np.concatenate([np.array(points, dtype=float).reshape(-1, 2), boxes[:, :2], boxes[:, 2:]])
+        corners = np.concatenate([as_array(points), shapely.bounds(self.geometries).reshape(-1, 2)])
         corners = corners[np.isfinite(corners).all(axis=1)]
         if not len(corners):
             return None

@@ -3,8 +3,8 @@
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeAlias
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 import shapely
@@ -18,6 +18,7 @@ from robocov.errors import MapError, StartError, counted, listed, one_line
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
+from robocov_app.editor.model.geometry import as_array
 from robocov_app.editor.model.selection import numbered_name, rings_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
 
@@ -44,16 +45,8 @@ class Problem:
     words: str  # a sentence for people
     # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
     where: BaseGeometry | None
-    of: Owner | None  # the key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole
-    grave: bool  # the map cannot run so; else it is a warning
-    kind: Kind = "other"
-
-
-class _Fault(NamedTuple):
-    """Fault of a part: words that follow its name and a colon, and the place."""
-
-    words: str
-    where: BaseGeometry | None
+    of: Owner | None = None  # None of the map as a whole
+    grave: bool = True  # the map cannot run so; else it is a warning
     kind: Kind = "other"
 
 
@@ -71,7 +64,7 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
             validate(draft_document(sketch), "map")
             check_rules(environment, "map")
         except MapError as error:
-            otherwise = Problem(in_words(str(error), sketch), None, None, True)
+            otherwise = Problem(in_words(str(error), sketch), None)
             found = list(_space_faults(sketch, free, set())) or [otherwise]
     return (*found, *_warnings(sketch, free, radius, {problem.of for problem in found})), free
 
@@ -119,23 +112,26 @@ def place_words(x: float, y: float) -> str:
 
 def _faults(sketch: Sketch) -> Iterator[Problem]:
     for words in _label_faults(sketch.name):
-        yield Problem(f"the map {words}", None, None, True)
+        yield Problem(f"the map {words}", None)
     if len(sketch.description) > _LONGEST_TEXT:
-        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None, None, True)
+        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None)
     if sketch.boundary is None:
-        words = "there is no boundary: draw one round all that is free"
-        yield Problem(words, None, BOUNDARY, True, "no boundary")
-    faults: list[tuple[Owner, _Fault]] = []
-    if sketch.boundary is not None:
-        faults += [(BOUNDARY, fault) for fault in _ring_faults(sketch.boundary, "it")]
-    faults += [(item.key, fault) for item in sketch.obstacles for fault in _shape_faults(item.shape)]
-    for owner, (words, where, kind) in faults:
-        yield Problem(f"{numbered_name(sketch, owner)}: {words}", where, owner, True, kind)
+        yield Problem(
+            "there is no boundary: draw one round all that is free", None, BOUNDARY, kind="no boundary"
+        )
+    else:
+        yield from _named(sketch, BOUNDARY, _ring_faults(sketch.boundary, "it"))
+    for item in sketch.obstacles:
+        yield from _named(sketch, item.key, _shape_faults(item.shape))
     for name, spec in sketch.starts:
         for words in _label_faults(name):
-            yield Problem(f"a start {words}", None, name, True)
-        for words, where, kind in _start_faults(spec):
-            yield Problem(f"{numbered_name(sketch, name)}: {words}", where, name, True, kind)
+            yield Problem(f"a start {words}", None, name)
+        yield from _named(sketch, name, _start_faults(spec))
+
+
+def _named(sketch: Sketch, owner: Owner, faults: Iterator[Problem]) -> Iterator[Problem]:
+    for fault in faults:
+        yield replace(fault, of=owner, words=f"{numbered_name(sketch, owner)}: {fault.words}")
 
 
 def _label_faults(name: str) -> Iterator[str]:
@@ -147,9 +143,9 @@ def _label_faults(name: str) -> Iterator[str]:
         yield "has a name with line breaks or other control characters"
 
 
-def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
+def _shape_faults(shape: Obstacle) -> Iterator[Problem]:
     if shape.name is not None:
-        yield from (_Fault(words, None) for words in _label_faults(shape.name))
+        yield from (Problem(words, None) for words in _label_faults(shape.name))
     if isinstance(shape, env.PolygonObstacle):
         yield from _polygon_faults(shape)
     elif isinstance(shape, env.CircleObstacle):
@@ -159,59 +155,58 @@ def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
         yield from _size_faults("width", shape.width, shape.points[0] if shape.points else None)
         far = list(_far_faults(shape.points))
         yield from far
-        points = np.array(shape.points, dtype=float).reshape(-1, 2)
+        points = as_array(shape.points)
         extent = np.ptp(points, axis=0).max() if len(points) else 0.0
         if not far and (len(points) < 2 or extent < SMALLEST):
-            yield _Fault("it has no length: it needs two points that are apart", _drawn(points))
+            yield Problem("it has no length: it needs two points that are apart", _drawn(points))
         elif not far and extent > LARGEST:
             words = f"it is {extent:.5g} m long: at most {LARGEST / 1000:g} km are possible"
-            yield _Fault(words, _drawn(points))
+            yield Problem(words, _drawn(points))
 
 
-def _start_faults(spec: StartSpec) -> Iterator[_Fault]:
+def _start_faults(spec: StartSpec) -> Iterator[Problem]:
     if isinstance(spec, env.DiscStart):
         yield from _size_faults("radius", spec.radius, spec.center)
         yield from _far_faults((spec.center,))
     elif isinstance(spec, env.PointsStart):
         if not spec.positions:
-            yield _Fault("has no places: it needs one a robot", None)
+            yield Problem("has no places: it needs one a robot", None)
         yield from _far_faults(spec.positions)
         seen: set[Point] = set()
         for place in spec.positions:
             if place in seen:
                 words = f"the place {place_words(*place)} is given twice: every robot needs its own"
-                yield _Fault(words, shapely.Point(place), "spot")
+                yield Problem(words, shapely.Point(place), kind="spot")
             seen.add(place)
 
 
-def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[_Fault]:
+def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
     """Yield what is wrong with a closed outline, which messages call `what`."""
-    points = np.array(ring, dtype=float).reshape(-1, 2)
-    far = list(_far_faults(ring))
+    points, far = as_array(ring), list(_far_faults(ring))
     if far:
         yield from far
         return
-    count = len(np.unique(points, axis=0)) if len(points) else 0
+    count = len(set(ring))
     if count < 3:
         corners = ("no corners", "one corner", "two corners")[count]
-        yield _Fault(f"{what} has {corners}: it needs three", _drawn(points))
+        yield Problem(f"{what} has {corners}: it needs three", _drawn(points))
         return
     extent = np.ptp(points, axis=0)
     polygon = Polygon(points)
     if extent.max() > LARGEST:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        yield _Fault(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
+        yield Problem(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
     elif extent.min() < SMALLEST or shapely.convex_hull(polygon).area <= _FLAT * float(extent.max()) ** 2:
-        yield _Fault(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
+        yield Problem(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
     elif not polygon.is_valid:
         places = _meetings(points, polygon)
-        (x, y), more = places[0], len(places) - 1
+        more = len(places) - 1
         others = f" and at {more} more places" if more > 1 else " and at one more place" if more else ""
-        words = f"{what} crosses or touches itself at {place_words(x, y)}{others}"
-        yield _Fault(words, MultiPoint(places[:_MOST_PLACES]), "crossing")
+        words = f"{what} crosses or touches itself at {place_words(*places[0])}{others}"
+        yield Problem(words, MultiPoint(places[:_MOST_PLACES]), kind="crossing")
 
 
-def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[_Fault]:
+def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[Problem]:
     found = list(_ring_faults(shape.vertices))
     for hole in shape.holes:
         found += _ring_faults(hole, "a hole")
@@ -223,26 +218,25 @@ def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[_Fault]:
     for hole in shape.holes:
         inner = Polygon(hole)
         if not shell.covers(inner):
-            yield _Fault("a hole sticks out of its outline", inner - shell, "crossing")
+            yield Problem("a hole sticks out of its outline", inner - shell, kind="crossing")
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
             words = "a hole meets the outline or another hole: it must be apart from them"
-            yield _Fault(words, inner, "crossing")
+            yield Problem(words, inner, kind="crossing")
         else:
             good.append(hole)
 
 
-def _size_faults(what: str, size: float, at: Point | None) -> Iterator[_Fault]:
+def _size_faults(what: str, size: float, at: Point | None) -> Iterator[Problem]:
     if not SMALLEST <= size <= LARGEST:
         limit = f"at least {1000 * SMALLEST:g} mm" if size < SMALLEST else f"at most {LARGEST / 1000:g} km"
-        where = None if at is None else shapely.Point(at)
-        yield _Fault(f"its {what} is {size:.5g} m: {limit} is possible", where)
+        yield Problem(f"its {what} is {size:.5g} m: {limit} is possible", at and shapely.Point(at))
 
 
-def _far_faults(points: Ring) -> Iterator[_Fault]:
+def _far_faults(points: Ring) -> Iterator[Problem]:
     for x, y in points:
         if not max(abs(x), abs(y)) <= FARTHEST:
             limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
-            yield _Fault(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
+            yield Problem(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 
 
@@ -261,7 +255,7 @@ def _meetings(points: Array, polygon: Polygon) -> list[Point]:
     meeting = places[counts > 2] if (counts > 2).any() else places[counts != 2]
     if not len(meeting):
         reason = shapely.is_valid_reason(polygon)
-        x, y = (float(value) for value in reason[reason.index("[") + 1 : -1].split())
+        x, y = map(float, reason[reason.index("[") + 1 : -1].split())
         return [(x, y)]
     return [(x, y) for x, y in meeting.tolist()]
 
@@ -289,26 +283,20 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
     if free.is_empty:
         if BOUNDARY not in faulty:
             hull = shapely.convex_hull(MultiPoint(sketch.boundary))
-            yield Problem("no free space is left inside the boundary", hull, BOUNDARY, True)
+            yield Problem("no free space is left inside the boundary", hull, BOUNDARY)
         return
     for name, spec in sketch.starts:
-        if isinstance(spec, env.PointsStart):
-            yield from _blocked(sketch, name, spec, free)
-        elif name not in faulty:
-            yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
-
-
-def _blocked(sketch: Sketch, name: str, spec: env.PointsStart, free: MultiPolygon) -> Iterator[Problem]:
-    if not spec.positions:
-        return
-    points = shapely.points(np.array(spec.positions, dtype=float))
-    for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
-        near = sketch.tree.query(points[k], predicate="intersects")
-        what = "outside the boundary"
-        if len(near):
-            what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
-        words = f"{_spot(name, spec, k)} is {what}"
-        yield Problem(words, points[k], name, True, "spot")
+        if not isinstance(spec, env.PointsStart):
+            if name not in faulty:
+                yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
+            continue
+        points = shapely.points(as_array(spec.positions))
+        for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
+            near = sketch.tree.query(points[k], predicate="intersects")
+            what = "outside the boundary"
+            if len(near):
+                what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
+            yield Problem(f"{_spot(name, spec, k)} is {what}", points[k], name, kind="spot")
 
 
 def _spot(name: str, spec: env.PointsStart, k: int) -> str:
@@ -319,15 +307,16 @@ def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grav
     try:
         env.Start(name, spec, free).sample(1, radius=radius)
     except StartError:
-        is_disc = isinstance(spec, env.DiscStart)
-        what = "its disc" if is_disc else "the free space"
-        words = f"start “{one_line(name)}”: {what} has no room for a robot of radius {radius:g} m"
-        where = shapely.Point(spec.center).buffer(spec.radius) if isinstance(spec, env.DiscStart) else None
-        yield Problem(words, where, name, grave, "no room" if is_disc else "other")
+        words = f"has no room for a robot of radius {radius:g} m"
+        if isinstance(spec, env.DiscStart):
+            disc = shapely.Point(spec.center).buffer(spec.radius)
+            yield Problem(f"start “{one_line(name)}”: its disc {words}", disc, name, grave, "no room")
+        else:
+            yield Problem(f"start “{one_line(name)}”: the free space {words}", None, name, grave)
 
 
 def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    points = shapely.points(np.array(spec.positions, dtype=float))
+    points = shapely.points(as_array(spec.positions))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():
         words = f"{_spot(name, spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
@@ -356,11 +345,9 @@ def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner 
         return
     yield from _sealed_rooms(free, radius)
     for name, spec in sketch.starts:
-        if name in bad:
-            continue
-        if isinstance(spec, env.PointsStart):
+        if name not in bad and isinstance(spec, env.PointsStart):
             yield from _tight_places(name, spec, free, radius)
-        elif radius > DEFAULT_RADIUS:
+        elif name not in bad and radius > DEFAULT_RADIUS:
             yield from _no_room(name, spec, free, radius, grave=False)
 
 
@@ -384,12 +371,11 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
             continue
         area = env.swept_area(item.shape.polygon, item.shape.path)
         met, beyond = env.in_the_way(area, standing, inside)
-        names, places = [numbered_name(sketch, key) for key in met], list(met.values())
-        if beyond is not None:
-            names, places = [*names, "the boundary"], [*places, beyond]
+        names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
             words = f"{numbered_name(sketch, item.key)} moves through {listed(names)}"
-            yield Problem(words, shapely.union_all(places), item.key, False)
+            where = shapely.union_all([*met.values(), beyond])
+            yield Problem(words, where, item.key, False)
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:
@@ -403,7 +389,7 @@ def _twice(sketch: Sketch) -> Iterator[Problem]:
 
 
 def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
-    for owner in (BOUNDARY, *(item.key for item in sketch.obstacles)):
+    for owner in sketch.owners:
         for _, ring, closed in rings_of(sketch, owner):
             if len(set(ring)) == len(ring) or len(set(ring)) < 3:
                 continue
@@ -422,8 +408,7 @@ def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
         if part.area < math.pi * radius * radius:
             slivers.append(part)
             continue
-        spot = part.representative_point()
-        at = place_words(spot.x, spot.y)
+        at = place_words(*part.representative_point().coords[0])
         words = f"the room of {part.area:.3g} m² round {at} is sealed: no way leads in"
         yield Problem(words, part, None, False, "sealed")
     if slivers:

@@ -149,7 +149,6 @@ def _middle(feature: density.Feature) -> Point:
 
 
 def _outline(feature: density.Feature) -> Ring:
-    """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
     if isinstance(feature, WeightedArea):
         return feature.vertices
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)

@@ -138,7 +138,6 @@ class MotionPathTool(Tool):
 
 
 def _led(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
-    """Return the obstacle that is led, the one that is selected, and its path."""
     chosen = context.selection.within(context.sketch)
     if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
         return None, None

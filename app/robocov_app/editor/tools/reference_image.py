@@ -60,7 +60,6 @@ class ReferenceImageTool(Tool):
         """Take no notice: two points in one place mean nothing."""
 
     def finish(self, context: Workspace) -> bool:
-        """Turn the picture so that the line through the two points is level or upright."""
         if len(self._points) != 2 or context.sketch.background is None:
             return False
         (a, b), self._points = self._points, []

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -16,9 +17,9 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
-from robocov_app.editor.model.geometry import cos_sin, nearest_on
+from robocov_app.editor.model.geometry import as_array, bearing, cos_sin, nearest_on
 from robocov_app.editor.model.selection import Vertex, ring_points, rings_of
-from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
 
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
 
@@ -32,45 +33,37 @@ class Targets:
     def __init__(
         self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
     ) -> None:
-        dragged = list(without)
-        vertices = {each for each in dragged if isinstance(each, Vertex)}
-        owners = {each for each in dragged if not isinstance(each, Vertex)}
-        owners |= {item.key for item in sketch.obstacles if item.hidden}
-        touched = {(vertex.of, vertex.ring) for vertex in vertices}
-        rims, centres = list(more), list[Point]()
-        walls, circles = list[BaseGeometry](), list[BaseGeometry]()
-        points, starts, ends = list[Point](), list[Point](), list[Point]()
-        for owner in (BOUNDARY, *sketch.places):
-            for ring, line, closed in rings_of(sketch, owner) if owner not in owners else ():
-                begin, end = line if closed else line[:-1], (*line[1:], *(line[:1] if closed else ()))
-                if (owner, ring) in touched:
-                    gone = [Vertex(owner, ring, k) in vertices for k in range(len(line))]
-                    line = tuple(point for point, is_gone in zip(line, gone, strict=True) if not is_gone)
-                    kept = [k for k in range(len(begin)) if not (gone[k] or gone[(k + 1) % len(gone)])]
-                    begin, end = tuple(begin[k] for k in kept), tuple(end[k] for k in kept)
-                points += line
-                starts += begin
-                ends += end
-        for item in sketch.obstacles:
-            if item.key in owners:
+        dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
+        owners: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
+        for each in without:
+            if isinstance(each, Vertex):
+                dragged[each.of, each.ring].add(each.index)
+            else:
+                owners.add(each)
+        points, rims, centres = list[Point](), list(more), list[Point]()
+        edges, walls, circles = list[tuple[Point, Point]](), list[BaseGeometry](), list[BaseGeometry]()
+        for owner in sketch.owners:
+            if owner in owners:
                 continue
-            if isinstance(item.shape, CircleObstacle):
-                centres.append(item.shape.center)
-                rims += ring_points(sketch, item.key)[0][1:]
-                circles.append(item.geometry)
-            elif isinstance(item.shape, WallObstacle):
-                walls.append(item.geometry)
-        for name, spec in sketch.starts:
-            if name not in owners and isinstance(spec, DiscStart):
-                centres.append(spec.center)
-                rims += ring_points(sketch, name)[0][1:]
-            elif name not in owners and isinstance(spec, PointsStart):
-                places = enumerate(spec.positions)
-                centres += [at for k, at in places if Vertex(name, 0, k) not in vertices]
-        lows, highs = _array(starts), _array(ends)
+            thing = sketch.thing(owner)
+            if isinstance(thing, CircleObstacle | DiscStart):
+                centres.append(thing.center)
+                rims += ring_points(sketch, owner)[0][1:]
+            if isinstance(thing, CircleObstacle):
+                circles.append(geometry_of(thing))
+            elif isinstance(thing, WallObstacle):
+                walls.append(geometry_of(thing))
+            elif isinstance(thing, PointsStart):
+                centres += [at for k, at in enumerate(thing.positions) if k not in dragged[owner, 0]]
+            for ring, line, closed in rings_of(sketch, owner):
+                gone, count = dragged[owner, ring], len(line)
+                points += [point for k, point in enumerate(line) if k not in gone] if gone else line
+                pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
+                edges += [(line[a], line[b]) for a, b in pairs if a not in gone and b not in gone]
+        lows, highs = np.array(edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
         kinds = {
-            "vertex": np.concatenate([_array(points), _array(rims), _outline(walls)[0]]),
-            "centre": _array(centres),
+            "vertex": np.concatenate([as_array([*points, *rims]), _outline(walls)[0]]),
+            "centre": as_array(centres),
             "middle": (lows + highs) / 2,
         }
         self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
@@ -84,22 +77,18 @@ class Targets:
         self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
-        """Return the nearest point of a kind within `reach` metres."""
         if kind not in self._places:
             return None
         tree, places = self._places[kind]
         away, k = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
-        if not away <= reach:
-            return None
-        x, y = places[k].tolist()
-        return x, y
+        return _point(places[k]) if away <= reach else None
 
     def edges_near(self, point: Point, reach: float) -> tuple[Array, Array]:
         """Return the starts and the ends, (k, 2) m each, of the edges within `reach`, the nearest first."""
         x, y = point
         found = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts, ends = self.starts[found], self.ends[found]
-        away = np.hypot(*(nearest_on(starts, ends, np.array(point)) - point).T)
+        _, away = nearest_on(starts, ends, point)
         order = np.argsort(away, kind="stable")
         order = order[away[order] <= reach][:_MOST_EDGES]
         return starts[order], ends[order]
@@ -113,8 +102,7 @@ class Targets:
         if not len(some):
             return None
         off = np.round(np.abs(some[:, axis] - point[axis]), 9)
-        x, y = some[np.lexsort((np.hypot(*(some - point).T), off))[0]].tolist()
-        return x, y
+        return _point(some[np.lexsort((np.hypot(*(some - point).T), off))[0]])
 
 
 class Snapper:
@@ -140,18 +128,16 @@ class Snapper:
             else:
                 self._pool = self._pool or ThreadPoolExecutor(1, "targets")
                 self._coming = self._pool.submit(Targets, sketch, *key)
-        if self._known is None and self._coming is not None and self._coming.done():
-            self._known = self._coming.result()
+        if self._coming is not None and self._coming.done():
+            self._known, self._coming = self._coming.result(), None
         return self._known
 
     def close(self) -> None:
-        """End."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
 
 
 def vertex_count(sketch: Sketch) -> int:
-    """Return about how many vertices a sketch has."""
     shapes = (item.shape for item in sketch.obstacles)
     return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
 
@@ -163,8 +149,9 @@ def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
     return points[:-1][is_edge], points[1:][is_edge]
 
 
-def _array(points: Sequence[Point]) -> Array:
-    return np.array(points, dtype=float).reshape(-1, 2)
+def _point(at: Array) -> Point:
+    x, y = at.tolist()
+    return x, y
 
 
 Kind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
@@ -233,7 +220,6 @@ class _Line:
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
 
     def crossing(self, other: _Line) -> Point | None:
-        """Return where it crosses another line; None where it does not."""
         (ux, uy), (vx, vy) = self.direction, other.direction
         across = ux * vy - uy * vx
         if abs(across) < _PARALLEL:
@@ -276,7 +262,10 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
     # what many points meet somewhere means little of one of them
     telling = snapping.to - {"grid", "angle", "middle", "crossing"}
     of_others = Snapping(snapping.reach, snapping.grid, snapping.angle, telling)
-    for k, (x, y) in enumerate(_outermost(points)):
+    if len(points) > _MOST_POINTS:  # the first one, and those on their hull
+        hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
+        points = [points[0], *hull[:: math.ceil(len(hull) / (_MOST_POINTS - 1))]]
+    for k, (x, y) in enumerate(points):
         at = x + dx, y + dy
         rank, snap = _ranked(at, targets, snapping if k == 0 else of_others, None)
         by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
@@ -299,38 +288,39 @@ def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> flo
 
 def _ranked(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> tuple[int, Snap]:
     """Return how well a point snapped, the lower the better, and where to."""
-    ways = (_at_vertices, _at_points, _on_lines, _on_grid)
+
+    def telling(snap: Snap) -> tuple[int, int, float]:
+        # two lines say more than one, and the grid little
+        lines = sum(guide.kind != "grid" for guide in snap.guides)
+        return -lines, -len(snap.guides), math.dist(point, snap.point)
+
+    ways = (
+        _marks(point, targets, snapping, ("vertex",)),
+        chain(_marks(point, targets, snapping, ("centre", "middle")), _crossings(point, targets, snapping)),
+        _on_lines(point, targets, snapping, origin),
+        _on_grid(point, snapping),
+    )
     for rank, way in enumerate(ways):
-        found = [(math.dist(point, snap.point), snap) for snap in way(point, targets, snapping, origin)]
-        near = [each for each in found if each[0] <= snapping.reach]
+        near = [snap for snap in way if math.dist(point, snap.point) <= snapping.reach]
         if near:
-            return rank, min(near, key=lambda each: (*_telling(each[1]), each[0]))[1]
-    return 4, Snap(point)
+            return rank, min(near, key=telling)
+    return len(ways), Snap(point)
 
 
-def _telling(snap: Snap) -> tuple[int, int]:
-    """Return how much the guides say, the lower the more: two lines more than one, and the grid little."""
-    lines = sum(guide.kind != "grid" for guide in snap.guides)
-    return -lines, -len(snap.guides)
+def _mark(kind: Kind, place: Point) -> Snap:
+    return Snap(place, (Guide(kind, (place,), "middle of an edge" if kind == "middle" else kind),))
 
 
-def _mark(kind: Kind, place: Point, words: str = "") -> Snap:
-    return Snap(place, (Guide(kind, (place,), words or kind),))
+def _marks(
+    point: Point, targets: Targets, snapping: Snapping, kinds: tuple[PointKind, ...]
+) -> Iterator[Snap]:
+    for kind in kinds:
+        place = targets.nearest(point, kind, snapping.reach) if kind in snapping.to else None
+        if place is not None:
+            yield _mark(kind, place)
 
 
-def _at_vertices(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    place = targets.nearest(point, "vertex", snapping.reach) if "vertex" in snapping.to else None
-    if place is not None:
-        yield _mark("vertex", place)
-
-
-def _at_points(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    place = targets.nearest(point, "centre", snapping.reach) if "centre" in snapping.to else None
-    if place is not None:
-        yield _mark("centre", place)
-    place = targets.nearest(point, "middle", snapping.reach) if "middle" in snapping.to else None
-    if place is not None:
-        yield _mark("middle", place, "middle of an edge")
+def _crossings(point: Point, targets: Targets, snapping: Snapping) -> Iterator[Snap]:
     if "crossing" in snapping.to:
         for edge, other in combinations(_edges(point, targets, snapping), 2):
             place = other.crossing(edge)
@@ -341,7 +331,9 @@ def _at_points(point: Point, targets: Targets, snapping: Snapping, origin: Point
 def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
     lines = []
     if "angle" in snapping.to and origin is not None and math.dist(point, origin) > snapping.reach:
-        lines.append(_ray(point, origin, snapping.angle))
+        degrees = snapping.angle * round(bearing(origin, point) / snapping.angle)
+        words = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
+        lines.append(_Line("angle", origin, cos_sin(degrees), (origin,), words))
     if "aligned" in snapping.to:
         for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))):
             mark = targets.in_line(point, axis, snapping.reach, _HORIZON * snapping.reach)
@@ -363,20 +355,13 @@ def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point 
         yield Snap(foot, (line.shown(foot),))
 
 
-def _on_grid(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
+def _on_grid(point: Point, snapping: Snapping) -> Iterator[Snap]:
     if "grid" in snapping.to and snapping.grid > 0.0:
         x, y = (_multiple(value, snapping.grid) for value in point)
         for place in ((x, y), (x, point[1]), (point[0], y)):
             yield _mark("grid", place)
             if math.dist(place, point) <= snapping.reach:
                 return
-
-
-def _ray(point: Point, origin: Point, step: float) -> _Line:
-    degrees = math.degrees(math.atan2(point[1] - origin[1], point[0] - origin[0]))
-    nearest = step * round(degrees / step)
-    words = f"{math.remainder(nearest, 360.0) % 360.0:g}°"
-    return _Line("angle", origin, cos_sin(nearest), (origin,), words)
 
 
 def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line]:
@@ -391,12 +376,3 @@ def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line
 def _multiple(value: float, step: float) -> float:
     """Return the nearest multiple of a step, as the decimal that it is: 3 steps of 0.1 are 0.3."""
     return round(step * round(value / step), 9) + 0.0
-
-
-def _outermost(points: Sequence[Point]) -> Sequence[Point]:
-    """Return the first point, and of many others those on their hull."""
-    if len(points) <= _MOST_POINTS:
-        return points
-    hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
-    step = math.ceil(len(hull) / (_MOST_POINTS - 1))
-    return [points[0], *((x, y) for x, y in hull[::step])]

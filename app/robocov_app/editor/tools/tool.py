@@ -46,7 +46,6 @@ def handled(selection: Selection) -> tuple[Owner, ...]:
 
 
 def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
-    """Return the box that is shown around whole things, m; `pixel` is how many metres one is at scale 1."""
     bounds = None if selection.vertices else bounds_of(sketch, selection)
     if bounds is None:
         return None
@@ -129,27 +128,22 @@ class Workspace:
 
     @property
     def sketch(self) -> Sketch:
-        """The map as it is now."""
         return self.document.history.sketch
 
     @property
     def selection(self) -> Selection:
-        """The current selection."""
         return self.document.history.selection
 
     @property
     def handled(self) -> tuple[Owner, ...]:
-        """Owners whose vertices are shown."""
         return handled(self.selection)
 
     @property
     def handles(self) -> tuple[Handle, ...]:
-        """Handles of the selection."""
         sketch, look = self.sketch, (self.selection, self.pixel)
         return self._handles.of(sketch, look, lambda: handles(sketch, *look))
 
     def snapping(self, reach: float) -> Snapping:
-        """Return what to snap to, for a finger that is so many metres wide."""
         kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name][1])
         return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
 
@@ -159,7 +153,6 @@ class Workspace:
         return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
 
     def change(self, change: Change, *, drag: Hashable | None = None) -> None:
-        """Make a change, and tell what it was."""
         if self.document.history.do(change, drag=drag):
             self.say(change.words)
         self._changed()
@@ -168,13 +161,11 @@ class Workspace:
         self.version += 1
 
     def select(self, selection: Selection) -> None:
-        """Select something else."""
         if selection != self.selection:
             self.document.history.selection = selection
             self.version += 1
 
     def say(self, words: str, *, trouble: bool = False) -> None:
-        """Tell something for a while."""
         if words:
             self.message, self.trouble, self.said = words, trouble, self.now
 
