@@ -1,7 +1,6 @@
 """Tools that draw: obstacles, the boundary, starts, doors in walls; and the tape measure."""
 
-from abc import ABC
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import copysign
 
@@ -12,33 +11,32 @@ from robocov_app.editor.edits import create
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
 from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
 from robocov_app.editor.model.selection import Change
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
 from robocov_app.toolkit.draw_tools import SAME, Outline
 
 
-class DrawTool(Tool, ABC):
+class DrawTool(Tool):
     """Draws point by point, or with a single drag; the tools below say what the points make."""
 
     begins_typed = True
     least, most = 2, 1_000_000  # points that are needed, and that are taken
     closes = False  # whether a click on the first point ends it
     drags = False  # whether it can be drawn by a single drag, too
+    make: Callable[[Sketch, Sequence[Point]], Change]
 
     def __init__(self) -> None:
         super().__init__()
         self.outline = Outline(self.least, self.most, self.closes, self.drags)
 
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change | None:
-        return None
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
+        return self.make(context.sketch, points)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
         closed = self.closes and len(points) > 2
         words = bearing_words(points[-2], points[-1]) + (f"   {ring_area(points):.2f} m²" if closed else "")
         return Preview(points, closed, True, words=words)
-
-    def dragged(self, a: Point, b: Point) -> list[Point]:
-        return [a, b]
 
     def placed(self, event: PointerEvent) -> Point:
         return constrained_point(event, self.origin)
@@ -86,9 +84,7 @@ class DrawTool(Tool, ABC):
             return False
         if len(points) < self.least:
             raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
-        change = self.made(context, points)
-        if change is not None:
-            context.change(change)
+        context.change(self.made(context, points))
         return True
 
     def back(self, context: Workspace) -> bool:
@@ -102,16 +98,16 @@ class DrawTool(Tool, ABC):
         end = self.end_for(text) if len(self.points) == 1 else None
         if end is not None:
             self._finish_drag(context, end)
-        else:
-            outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
-            outline.points.append(outline.at)
-            outline.dragging = False
+            return
+        outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
+        outline.points.append(outline.at)
+        outline.dragging = False
 
     def preview(self, context: Workspace) -> Preview | None:
         return self.shown(context, (*self.points, self.outline.at)) if self.points else None
 
     def _finish_drag(self, context: Workspace, end: Point) -> None:
-        self.outline.points = self.dragged(self.points[0], end)
+        self.outline.points = list(rectangle(self.points[0], end)) if self.closes else [self.points[0], end]
         self.finish(context)
 
     def _far_corner(self, text: str) -> Point:
@@ -128,9 +124,7 @@ class PolygonTool(DrawTool):
     title = "Polygon"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     least, closes = 3, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.polygon_drawn(context.sketch, points)
+    make = staticmethod(create.polygon_drawn)
 
 
 class WallTool(DrawTool):
@@ -199,9 +193,7 @@ class PlacesTool(DrawTool):
     title = "Start spots"
     hint = "click a place for each robot; Enter ends it"
     least = 1
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.points_start_drawn(context.sketch, points)
+    make = staticmethod(create.points_start_drawn)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         words = f"{counted(len(points) - 1, 'robot')}; Enter ends it"
@@ -215,12 +207,7 @@ class BoundaryTool(DrawTool):
     title = "Boundary"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     least, closes, drags = 3, True, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.boundary_drawn(context.sketch, points)
-
-    def dragged(self, a: Point, b: Point) -> list[Point]:
-        return list(rectangle(a, b))
+    make = staticmethod(create.boundary_drawn)
 
     def placed(self, event: PointerEvent) -> Point:
         return event.point if self.outline.dragging else super().placed(event)
@@ -278,9 +265,6 @@ class CircleTool(DrawTool):
     def made(self, context: Workspace, points: Sequence[Point]) -> Change:
         return create.circle_drawn(context.sketch, points[0], distance(*points))
 
-    def placed(self, event: PointerEvent) -> Point:
-        return event.point
-
     def end_for(self, text: str) -> Point:
         return self.points[0][0] + length_of(text), self.points[0][1]
 
@@ -317,36 +301,27 @@ class DoorTool(Tool):
     def __init__(self) -> None:
         super().__init__()
         self.width = 0.9
-        self._from: Point | None = None
-        self._at: Point = (0.0, 0.0)
         self._wall: int | None = None  # over which the cursor is, or that was pressed
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self._from = self._at = event.point
+        self.begun, self.at = event, event.point
         self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
         if self._wall is None:
             raise MapError("click a wall: doors are opened in walls")
 
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
-        self.press(context, event)
-
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self._at = event.point
-        if self._from is None:
+        self.at = event.point
+        if self.begun is None:
             self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, self._from, wall, self._wall = self._from, None, self._wall, None
+        begun, self.begun, wall, self._wall = self.begun, None, self._wall, None
         if begun is None or wall is None:
             return
         if clicked:
             context.change(create.door_opened(context.sketch, wall, event.point, self.width))
         else:
-            context.change(create.wall_opened(context.sketch, wall, begun, event.point))
-
-    def cancel(self, context: Workspace) -> bool:
-        had, self._from = self._from is not None, None
-        return had
+            context.change(create.wall_opened(context.sketch, wall, begun.point, event.point))
 
     def enter(self, context: Workspace, text: str) -> None:
         self.width = create.door_width(length_of(text))
@@ -355,7 +330,9 @@ class DoorTool(Tool):
     def preview(self, context: Workspace) -> Preview | None:
         if self._wall is None or self._wall not in context.sketch.places:
             return None
-        a, b = create.door_at(context.sketch, self._wall, self._at, self.width)
-        if self._from is not None and distance(self._from, self._at) > 0.1 * self.width:
-            a, b = (create.on_wall(context.sketch, self._wall, place) for place in (self._from, self._at))
+        a, b = create.door_at(context.sketch, self._wall, self.at, self.width)
+        if self.begun is not None and distance(self.begun.point, self.at) > 0.1 * self.width:
+            a, b = (
+                create.on_wall(context.sketch, self._wall, place) for place in (self.begun.point, self.at)
+            )
         return Preview((a, b), words=f"door, {length_words(distance(a, b))}")

@@ -2,9 +2,9 @@
 
 from robocov.environment import ObstaclePath, Point
 from robocov_app.editor.edits import paths
-from robocov_app.editor.model.geometry import bearing_words, distance
+from robocov_app.editor.model.geometry import bearing_words
 from robocov_app.editor.model.hit_test import obstacles_at
-from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
 
 NEAR = 0.75  # part of a finger's width within which a way point is taken hold of
@@ -21,9 +21,7 @@ class MotionPathTool(Tool):
         super().__init__()
         self.speed = paths.FIRST_SPEED
         self.chosen: int | None = None
-        self.change: Change | None = None  # what letting go of the mouse would make
         self._held: int | None = None
-        self._at: Point = (0.0, 0.0)
         self._last: Point | None = None
         self._leads = False
 
@@ -37,12 +35,11 @@ class MotionPathTool(Tool):
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
         subject, path = _led(context)
-        self._held = self.change = None
-        if path is not None:
-            self._held = paths.way_point_at(path, event.raw, NEAR * event.reach)
-            if self._held is not None:
-                self.chosen = self._held
-                return
+        self.change = None
+        self._held = None if path is None else paths.way_point_at(path, event.raw, NEAR * event.reach)
+        if self._held is not None:
+            self.chosen = self._held
+            return
         over = obstacles_at(context.sketch, event.raw, 0.0)
         if subject is None or (over and subject not in over):
             self.chosen = None
@@ -64,14 +61,14 @@ class MotionPathTool(Tool):
         self.finish(context)
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self._at = event.point
+        self.at = event.point
         self._note(context)
         subject, path = _led(context)
         if subject is None or self._held is None:
             return
         if path is None or self._held >= len(path.points):
             self._held = None
-        elif self.change is not None or distance(path.points[self._held], event.raw) >= 0.25 * event.reach:
+        elif self.change is not None or event.is_apart_from(path.points[self._held]):
             before = path.points[self._held - 1] if self._held else None
             to = constrained_point(event, before)
             self.change = paths.way_point_moved(context.sketch, subject, self._held, to)
@@ -101,9 +98,8 @@ class MotionPathTool(Tool):
         return True
 
     def cancel(self, context: Workspace) -> bool:
-        had = self._held is not None
+        had, self._leads = self._held is not None, False
         self._held = self.change = self.chosen = self._last = None
-        self._leads = False
         return had
 
     def enter(self, context: Workspace, text: str) -> None:
@@ -128,16 +124,16 @@ class MotionPathTool(Tool):
 
     def shape_of_cursor(self, context: Workspace) -> str:
         path = _led(context)[1]
-        over = path is not None and paths.way_point_at(path, self._at, 8.0 * context.pixel) is not None
+        over = path is not None and paths.way_point_at(path, self.at, 8.0 * context.pixel) is not None
         return "move" if over or self._held is not None else "cross"
 
     def _note(self, context: Workspace) -> None:
         subject, path = _led(context)
-        self._leads = subject is not None
-        self._last = None if path is None else path.points[-1]
+        self._leads, self._last = subject is not None, None if path is None else path.points[-1]
 
 
 def _led(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
+    """Return the obstacle that is led, the one that is selected, and its path."""
     chosen = context.selection.within(context.sketch)
     if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
         return None, None

@@ -1,6 +1,6 @@
 """The tool that selects and drags, and the one that moves the view."""
 
-import numpy as np
+import math
 
 from robocov.environment import CircleObstacle, Point
 from robocov.errors import MapError
@@ -12,7 +12,7 @@ from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertic
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of, rings_of
 from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
-from robocov_app.editor.tools.tool import Handle, PointerEvent, Preview, Tool, Workspace, handle_at
+from robocov_app.editor.tools.tool import Handle, PointerEvent, Preview, Tool, Workspace, handle_at, side_of
 
 MANY_POINTS = 1000  # points of what is moved from which on it is moved as a picture
 SAME = 1e-9  # metres below which nothing has moved
@@ -20,13 +20,9 @@ FEW_POINTS = 60  # points of what is moved that may snap; of more, a choice of t
 NEAR = 0.6  # part of a finger's width within which something is taken hold of
 ON_EDGE = 1e-5  # metres within which a point lies on an edge
 
-_CURSORS = {
-    **dict.fromkeys(((-1, 0), (1, 0)), "sideways"),
-    **dict.fromkeys(((0, -1), (0, 1)), "updown"),
-    **dict.fromkeys(((-1, -1), (1, 1)), "rising"),
-    **dict.fromkeys(((-1, 1), (1, -1)), "falling"),
-}
-"""Cursors over scale handles, by their sides."""
+# over scale handles, by their sides
+_CURSORS = {(1, 0): "sideways", (0, 1): "updown", (1, 1): "rising", (-1, 1): "falling"}
+_CURSORS |= {(-x, -y): shape for (x, y), shape in _CURSORS.items()}
 
 
 class Drag:
@@ -59,7 +55,7 @@ class Drag:
         origin: Point | None = None,
     ) -> Point:
         """Return where a place snaps to anything but what is dragged, unless Ctrl is held down."""
-        without = dragged.vertices or dragged.owners
+        self.guides, without = (), dragged.vertices or dragged.owners
         targets = None if event.ctrl else context.snapper.targets(context.sketch, without)
         if targets is None:
             return to
@@ -81,26 +77,21 @@ class Moving(Drag):
 
     def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Alt copies move, with Shift at round angles, with Ctrl freely."""
-        self.copies = event.alt
+        self.copies, self.guides = event.alt, ()
         to = geometry.at_round_angle(self._begun, event.raw) if event.shift else event.raw
-        dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
-        self.guides = ()
-        if not event.ctrl and not event.shift:
-            targets = context.snapper.targets(context.sketch, self.moving.owners)
-            if targets is not None:
-                snap = snapped_move(self._points, dx, dy, targets, context.snapping(event.reach))
-                self.guides = snap.guides
-                dx, dy = self._on_grid(context, (dx, dy), snap.point)
-        self._move(context, dx, dy)
-
-    def _on_grid(self, context: Workspace, free: Point, snapped_to: Point) -> Point:
-        """Return the move, with the grid along an axis that nothing else counts for."""
-        by = list(snapped_to)
-        for axis in (0, 1):
-            if "grid" in context.snaps and abs(by[axis] - free[axis]) < SAME and self._points:
-                first = self._points[0][axis]
-                by[axis] = context.grid * round((first + by[axis]) / context.grid) - first
-        return by[0], by[1]
+        by = [to[0] - self._begun[0], to[1] - self._begun[1]]
+        free = event.ctrl or event.shift
+        targets = None if free else context.snapper.targets(context.sketch, self.moving.owners)
+        if targets is not None:
+            snap = snapped_move(self._points, by[0], by[1], targets, context.snapping(event.reach))
+            self.guides = snap.guides
+            for axis in (0, 1):
+                alone = abs(snap.point[axis] - by[axis]) < SAME  # nothing else counts along this axis
+                by[axis] = snap.point[axis]
+                if alone and "grid" in context.snaps and self._points:
+                    first = self._points[0][axis]
+                    by[axis] = context.grid * round((first + by[axis]) / context.grid) - first
+        self._move(context, *by)
 
     def _move(self, context: Workspace, dx: float, dy: float) -> None:
         self._at = self._begun[0] + dx, self._begun[1] + dy
@@ -108,13 +99,12 @@ class Moving(Drag):
             self.change = self._made(context, dx, dy)
         else:
             self.offset = (dx, dy)
-        far = geometry.length_words(float(np.hypot(dx, dy)))
+        far = geometry.length_words(math.hypot(dx, dy))
         self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {far}"
 
     def _made(self, context: Workspace, dx: float, dy: float) -> Change | None:
         act = transform.duplicated if self.copies else transform.moved
-        still = dx == 0.0 and dy == 0.0
-        return None if still else act(context.sketch, self.moving, dx, dy)
+        return act(context.sketch, self.moving, dx, dy) if dx or dy else None
 
     def ended(self, context: Workspace) -> None:
         if self.offset is not None:
@@ -125,9 +115,8 @@ class Moving(Drag):
         """Move by a length towards the cursor, or by what was typed: ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         two = len(text.split()) > 1 or "<" in text or ";" in text
-        if two and text[0] not in "@+":
-            text = f"@{text}"
-        to = next_point_of(text, self._begun, self._at)
+        relative = f"@{text}" if two and text[0] not in "@+" else text
+        to = next_point_of(relative, self._begun, self._at)
         self._move(context, to[0] - self._begun[0], to[1] - self._begun[1])
 
 
@@ -138,12 +127,17 @@ class MovingVertices(Drag):
         super().__init__()
         self._selection = Selection(vertices=selection.vertices | {taken})
         self._begun = self._at = place_of(context.sketch, taken)
-        self._origin = _neighbour(context, taken)
+        # the vertex before it on its ring, or after a wall's first; None of circles and starts
+        self._origin: Point | None = None
+        for ring, points, closed in rings_of(context.sketch, taken.of):
+            if ring == taken.ring:
+                first = taken.index == 0 and not closed
+                self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]
 
     def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
-        self.guides = ()
         if event.shift and self._origin is not None:
+            self.guides = ()
             self._put(context, geometry.at_round_angle(self._origin, event.raw))
         else:
             self._put(context, self.snapped_to(context, event, event.raw, self._selection, self._origin))
@@ -151,8 +145,7 @@ class MovingVertices(Drag):
     def _put(self, context: Workspace, to: Point) -> None:
         self._at = to
         dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
-        still = dx == 0.0 and dy == 0.0
-        self.change = None if still else vertices.moved(context.sketch, self._selection, dx, dy)
+        self.change = vertices.moved(context.sketch, self._selection, dx, dy) if dx or dy else None
         self.words = geometry.point_words(to)
         if self._origin is not None:
             self.words += f"   {geometry.bearing_words(self._origin, to)}"
@@ -161,30 +154,17 @@ class MovingVertices(Drag):
         self._put(context, next_point_of(text, self._origin or self._begun, self._at))
 
 
-def _neighbour(context: Workspace, vertex: Vertex) -> Point | None:
-    """Return the vertex before one on its ring, or after a wall's first; None of circles and starts."""
-    for ring, points, closed in rings_of(context.sketch, vertex.of):
-        if ring == vertex.ring:
-            before = vertex.index - 1
-            return points[before if before >= 0 or closed else min(1, len(points) - 1)]
-    return None
-
-
 class Turning(Drag):
     """Turns whole things about the middle of their box."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
         super().__init__()
-        low_x, low_y, high_x, high_y = bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0)
-        self.about = (low_x + high_x) / 2, (low_y + high_y) / 2
-        self._selection, self._from = selection, self._angle(begun)
-
-    def _angle(self, point: Point) -> float:
-        return float(np.degrees(np.arctan2(point[1] - self.about[1], point[0] - self.about[0])))
+        self.about = geometry.middle_of(bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0))
+        self._selection, self._from = selection, geometry.bearing(self.about, begun)
 
     def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in steps, with Ctrl freely."""
-        degrees = (self._angle(event.raw) - self._from + 180.0) % 360.0 - 180.0
+        degrees = (geometry.bearing(self.about, event.raw) - self._from + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.ANGLE * round(degrees / geometry.ANGLE)
         elif not event.ctrl:
@@ -207,37 +187,27 @@ class Scaling(Drag):
         super().__init__()
         self._selection, self._side = selection, handle.side
         self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
-        taken = self._edge(1)
-        self._offset = handle.at[0] - taken[0], handle.at[1] - taken[1]
+        self._taken = side_of(self._bounds, self._side)
+        self._fixed = side_of(self._bounds, (-self._side[0], -self._side[1]))
+        self._offset = handle.at[0] - self._taken[0], handle.at[1] - self._taken[1]
         shapes = [context.sketch.item(key).shape for key in selection.items]
         # a circle that is stretched would be a circle no more
         round_ones = bool(shapes) and all(isinstance(each, CircleObstacle) for each in shapes)
         self._even = bool(selection.starts) or round_ones
 
-    def _edge(self, which: int) -> Point:
-        """Return the corner or the middle of the side that is dragged (1), or of the one that stays (-1)."""
-        x, y = which * self._side[0], which * self._side[1]
-        low_x, low_y, high_x, high_y = self._bounds
-        return (low_x + high_x + x * (high_x - low_x)) / 2, (low_y + high_y + y * (high_y - low_y)) / 2
-
     def to(self, context: Workspace, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
-        self.guides = ()
         to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
         to = self.snapped_to(context, event, to, self._selection)
-        low_x, low_y, high_x, high_y = self._bounds
-        about = ((low_x + high_x) / 2, (low_y + high_y) / 2) if event.alt else self._edge(-1)
-        taken = self._edge(1)
-        fx, fy = (
-            (to[k] - about[k]) / (taken[k] - about[k])
-            if self._side[k] and abs(taken[k] - about[k]) > SAME
-            else 1.0
-            for k in (0, 1)
-        )
+        about = geometry.middle_of(self._bounds) if event.alt else self._fixed
+        factors = [1.0, 1.0]
+        for k in (0, 1):
+            if self._side[k] and abs(self._taken[k] - about[k]) > SAME:
+                factors[k] = (to[k] - about[k]) / (self._taken[k] - about[k])
         if event.shift or self._even:
-            whole = [f for f, side in ((fx, self._side[0]), (fy, self._side[1])) if side]
-            fx = fy = max(whole, key=lambda f: abs(f - 1.0))
-        self._scale(context, fx, fy, about)
+            whole = [factor for factor, side in zip(factors, self._side, strict=True) if side]
+            factors = 2 * [max(whole, key=lambda factor: abs(factor - 1.0))]
+        self._scale(context, factors[0], factors[1], about)
 
     def _scale(self, context: Workspace, fx: float, fy: float, about: Point) -> None:
         wide, high = self._bounds[2] - self._bounds[0], self._bounds[3] - self._bounds[1]
@@ -259,7 +229,7 @@ class Scaling(Drag):
             raise MapError(f"“{text}”: a size above 0 was wanted")
         both = self._even or (self._side[0] and self._side[1])
         fx, fy = (factor if both or axis == k else 1.0 for k in (0, 1))
-        self._scale(context, fx, fy, self._edge(-1))
+        self._scale(context, fx, fy, self._fixed)
 
 
 class Box(Drag):
@@ -276,24 +246,20 @@ class Box(Drag):
 
     def found(self, context: Workspace) -> Selection:
         """Return what is in the box: whole things, or vertices where it holds some that are shown."""
-        sketch, shown = context.sketch, context.handled
-        inside = in_box(sketch, self._begun, self._at, touched=self._leftwards).with_groups(sketch)
+        sketch, shown, preview = context.sketch, context.handled, self.preview()
+        inside = in_box(sketch, self._begun, self._at, touched=preview.touched).with_groups(sketch)
         if shown and not self._adds and not (inside.items | inside.starts) - set(shown):
             single = vertices_in_box(sketch, self._begun, self._at, shown)
             if single.vertices and len(single.vertices) < sum(len(points_of(sketch, each)) for each in shown):
                 return single
         return inside
 
-    @property
-    def _leftwards(self) -> bool:
-        return self._at[0] < self._begun[0]
-
     def ended(self, context: Workspace) -> None:
-        if geometry.distance(self._begun, self._at) > 0.0:
+        if self._begun != self._at:
             context.select(self._before.plus(self.found(context)))
 
     def preview(self) -> Preview:
-        return Preview(box=(self._begun, self._at), touched=self._leftwards)
+        return Preview(box=(self._begun, self._at), touched=self._at[0] < self._begun[0])
 
 
 class SelectTool(Tool):
@@ -309,18 +275,17 @@ class SelectTool(Tool):
         self.hovered: Owner | None = None
         self.near: Handle | None = None
         self.drag: Drag | None = None
-        self._pressed: PointerEvent | None = None
         self._handle: Handle | None = None
         self._narrows = False
-        self._gone = False
+        self._gone = False  # what the press began is done with, though the button is held down still
 
     @property
     def busy(self) -> bool:
         return self.drag is not None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self._pressed, self.drag, self._narrows, self._gone = event, None, False, False
-        self._handle = handle_at(context.handles, event.raw, NEAR * event.reach)
+        self.begun, self.drag, self._narrows, self._gone = event, None, False, False
+        self._handle = _handle_at(context, event)
         vertex = self._handle.vertex if self._handle is not None else None
         if vertex is not None:
             own = Selection(vertices=frozenset({vertex}))
@@ -328,9 +293,8 @@ class SelectTool(Tool):
                 context.select(Selection(vertices=context.selection.vertices).toggled(own))
             elif vertex not in context.selection.vertices:
                 context.select(own)
-        if self._handle is not None:  # those of the box wait to be dragged
-            return
-        found = owners_at(context.sketch, event.raw, 0.5 * event.reach)
+        # handles of the box wait to be dragged
+        found = () if self._handle is not None else _owners_at(context, event)
         if not found:
             return
         # what is selected already is meant, also where something else lies above it
@@ -345,18 +309,15 @@ class SelectTool(Tool):
             self._narrows = True
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        if self._pressed is None:
-            self.near = handle_at(context.handles, event.raw, NEAR * event.reach)
-            found = () if self.near else owners_at(context.sketch, event.raw, 0.5 * event.reach)
-            self.hovered = found[0] if found else None
-            return
-        if self._gone:
-            return
-        if self.drag is None and geometry.distance(event.raw, self._pressed.raw) > 0.25 * event.reach:
-            self.drag = self._begun(context, self._pressed)
-        if self.drag is not None:
-            self.drag.to(context, event)
-            self.guides = self.drag.guides
+        if self.begun is None:
+            self.near = _handle_at(context, event)
+            self.hovered = None if self.near else next(iter(_owners_at(context, event)), None)
+        elif not self._gone:
+            if self.drag is None and event.is_apart_from(self.begun.raw):
+                self.drag = self._begun(context, self.begun)
+            if self.drag is not None:
+                self.drag.to(context, event)
+                self.guides = self.drag.guides
 
     def _begun(self, context: Workspace, pressed: PointerEvent) -> Drag:
         handle, whole = self._handle, context.selection.without_vertices()
@@ -366,25 +327,24 @@ class SelectTool(Tool):
             return Turning(context, whole, pressed.raw)
         if handle is not None:
             return Scaling(context, whole, handle)
-        found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
-        if any(each in whole.owners for each in found):
+        if any(each in whole.owners for each in _owners_at(context, pressed)):
             return Moving(context, whole, pressed.raw)
         return Box(context, pressed.raw, adds=pressed.shift)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Do what was dragged; a click selects one of what is selected, and again what lies below."""
-        pressed, drag, gone = self._pressed, self.drag, self._gone
-        self._pressed, self.drag, self.guides = None, None, ()
-        if gone or pressed is None:
+        pressed, drag = self.begun, self.drag
+        self.begun, self.drag, self.guides = None, None, ()
+        if self._gone or pressed is None:
             return
         if drag is not None:
             drag.to(context, event)
             drag.ended(context)
         elif self._handle is None and not event.shift:
-            found = owners_at(context.sketch, pressed.raw, 0.5 * pressed.reach)
+            found, chosen = _owners_at(context, pressed), context.selection.owners
             if not found:
                 context.select(Selection())
-            elif self._narrows and len(chosen := context.selection.owners) > 1:
+            elif self._narrows and len(chosen) > 1:
                 context.select(Selection.of(next(each for each in found if each in chosen)))
             elif self._narrows and len(found) > 1:
                 (one,) = chosen
@@ -392,12 +352,12 @@ class SelectTool(Tool):
 
     def twice(self, context: Workspace, event: PointerEvent) -> None:
         """Insert a vertex where the edge of something was clicked twice; elsewhere it is one more press."""
-        owners = context.handled or owners_at(context.sketch, event.raw, 0.5 * event.reach)[:1]
+        owners = context.handled or _owners_at(context, event)[:1]
         edge = edge_at(context.sketch, event.raw, NEAR * event.reach, owners)
-        if edge is None or handle_at(context.handles, event.raw, NEAR * event.reach) is not None:
+        if edge is None or _handle_at(context, event) is not None:
             self.press(context, event)
             return
-        self._pressed, self.drag, self._gone = event, None, True
+        self.begun, self.drag, self._gone = event, None, True
         if not event.ctrl:
             # on the edge, but at a round place
             to = context.snapped(edge.point, event.reach).point
@@ -405,8 +365,7 @@ class SelectTool(Tool):
         context.change(vertices.inserted(context.sketch, edge))
 
     def enter(self, context: Workspace, text: str) -> None:
-        drag = self.drag
-        if drag is None:
+        if (drag := self.drag) is None:
             super().enter(context, text)
             return
         drag.enter(context, text)
@@ -434,6 +393,14 @@ class SelectTool(Tool):
         if self.hovered is not None:
             return "move" if self.hovered in context.selection.owners else "hand"
         return "arrow"
+
+
+def _handle_at(context: Workspace, event: PointerEvent) -> Handle | None:
+    return handle_at(context.handles, event.raw, NEAR * event.reach)
+
+
+def _owners_at(context: Workspace, event: PointerEvent) -> tuple[Owner, ...]:
+    return owners_at(context.sketch, event.raw, 0.5 * event.reach)
 
 
 class PanTool(Tool):

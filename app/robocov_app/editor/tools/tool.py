@@ -8,7 +8,7 @@ from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
 from robocov_app.editor.edits.transform import bounds_of, box_of
 from robocov_app.editor.model.document import Document
-from robocov_app.editor.model.geometry import at_round_angle, distance
+from robocov_app.editor.model.geometry import Box, at_round_angle, distance, middle_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.tools.snapping import SNAPS, Guide, Snap, Snapper, Snapping, snapped
@@ -45,7 +45,8 @@ def handled(selection: Selection) -> tuple[Owner, ...]:
     return tuple(owners) if len(owners) == 1 else ()
 
 
-def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> tuple[float, float, float, float] | None:
+def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> Box | None:
+    """Return the box that is shown around whole things; `pixel` is how many metres one is at scale 1."""
     bounds = None if selection.vertices else bounds_of(sketch, selection)
     if bounds is None:
         return None
@@ -59,19 +60,23 @@ def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle,
     frame = frame_of(sketch, selection, pixel)
     if frame is not None:
         low_x, low_y, high_x, high_y = frame
-        xs = {-1: low_x, 0: (low_x + high_x) / 2, 1: high_x}
-        ys = {-1: low_y, 0: (low_y + high_y) / 2, 1: high_y}
         columns = (-1, 0, 1) if high_x - low_x > ROOMY * pixel else (-1, 1)
         rows = (-1, 0, 1) if high_y - low_y > ROOMY * pixel else (-1, 1)
         sides = [(x, y) for x in columns for y in rows if x or y]
-        found += [Handle("scale", (xs[x], ys[y]), side=(x, y)) for x, y in sides]
-        found.append(Handle("turn", (xs[0], high_y + KNOB * pixel)))
+        found += [Handle("scale", side_of(frame, side), side=side) for side in sides]
+        found.append(Handle("turn", (middle_of(frame)[0], high_y + KNOB * pixel)))
     for owner in handled(selection):
         box = None if owner == BOUNDARY or selection.vertices else box_of(sketch, owner)
         if box is None or max(box[2] - box[0], box[3] - box[1]) >= SMALL * pixel:
             points = points_of(sketch, owner)
             found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
     return tuple(found)
+
+
+def side_of(box: Box, side: tuple[int, int]) -> Point:
+    """Return a corner of a box, or the middle of a side: -1, 0 or 1 along each axis."""
+    (low_x, low_y, high_x, high_y), (x, y) = box, side
+    return (low_x + high_x + x * (high_x - low_x)) / 2, (low_y + high_y + y * (high_y - low_y)) / 2
 
 
 def handle_at(found: tuple[Handle, ...], point: Point, reach: float) -> Handle | None:
@@ -90,6 +95,10 @@ class PointerEvent:
     shift: bool = False
     alt: bool = False
     ctrl: bool = False
+
+    def is_apart_from(self, place: Point) -> bool:
+        """Return whether the hand that pressed there has moved on purpose."""
+        return distance(place, self.raw) >= 0.25 * self.reach
 
 
 @dataclass(frozen=True)
@@ -182,15 +191,18 @@ class Tool:
 
     def __init__(self) -> None:
         self.guides: tuple[Guide, ...] = ()
+        self.begun: PointerEvent | None = None  # where the button was pressed that is held down
+        self.at: Point = (0.0, 0.0)  # m; where the cursor is
+        self.change: Change | None = None  # what letting go of the mouse would make
 
     @property
     def busy(self) -> bool:
         """Whether something is half done."""
-        return False
+        return self.begun is not None
 
     @property
     def origin(self) -> Point | None:
-        """Origin of the line that is drawn."""
+        """Where the line comes from that is being drawn."""
         return None
 
     @property
@@ -199,14 +211,15 @@ class Tool:
         return ()
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        """Take a press of the left button."""
+        self.begun, self.change = event, None
 
     def twice(self, context: Workspace, event: PointerEvent) -> None:
-        """Take the second press of a double click; by default it finishes."""
-        self.finish(context)
+        """Take the second press of a double click."""
+        self.press(context, event)
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
         """Take a move of the mouse, pressed or not."""
+        self.at = event.point
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Take the button's release; `clicked` if it has not moved since it was pressed."""
@@ -221,14 +234,14 @@ class Tool:
 
     def cancel(self, context: Workspace) -> bool:
         """Take Escape; return whether there was something to give up."""
-        return False
+        had, self.begun, self.change = self.busy, None, None
+        return had
 
     def enter(self, context: Workspace, text: str) -> None:
         """Take what was typed; MapError when it means nothing."""
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self, context: Workspace) -> Preview | None:
-        """Return what to show."""
         return None
 
     def shape_of_cursor(self, context: Workspace) -> str:
