@@ -16,7 +16,7 @@ from robocov.errors import MapError
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
+from robocov_app.editor.model.selection import Edge, Selection, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined
 
@@ -179,7 +179,7 @@ def changes(draw, sketch):
     edges = [
         Edge(each, ring, k, points[k])
         for each in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, _ in rings_of(sketch, each)
+        for ring, points, _ in sketch.rings_of(each)
         for k in range(len(points))
     ]
     edge = draw(st.sampled_from(edges)) if edges else Edge(BOUNDARY, 0, 0, a)

@@ -249,7 +249,7 @@ def test_single_vertices_go_along_unless_their_owner_does(sketch):
     assert change.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
     assert change.sketch.item(1).shape.center == (7.0, 4.0)
     once = transform.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
-    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).shape(BOX)
+    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).thing(BOX)
     turned = transform.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
     assert turned.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
@@ -258,7 +258,7 @@ def test_copies(sketch):
     noted = properties.noted(sketch, Selection.of(0), "oak").sketch
     change = transform.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
-    assert copy.shape == Affine.shift(1.0, 0.5).shape(BOX)
+    assert copy.shape == Affine.shift(1.0, 0.5).thing(BOX)
     assert copy.note == "oak"
     assert change.sketch.start("corner 2") == DiscStart((2.0, 5.5), 0.8)
     assert change.selection == Selection.of(copy.key, "corner 2", "all 2")

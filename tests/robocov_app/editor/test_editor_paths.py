@@ -116,7 +116,7 @@ def test_who_is_moved_turned_or_scaled_takes_its_path_along(shape) -> None:
     assert led(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
     turned = transform.rotated(sketch, one, 90.0, (2.0, 2.0)).sketch
     assert led(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
-    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).shape(replace(shape, path=ROUND))
+    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).thing(replace(shape, path=ROUND))
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
 

@@ -12,7 +12,7 @@ from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model.geometry import outlines, tenths
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
 
 _difference = partial(shapely.difference, grid_size=GRID)
@@ -28,7 +28,7 @@ def subtracted(sketch: Sketch, selection: Selection) -> Change:
     """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
     lowest, *uppers = items = _chosen(sketch, selection, "subtract")
     left = _difference(lowest.geometry, _union(uppers))
-    what = display_name(sketch, lowest.key)
+    what = sketch.display_name(lowest.key)
     words = f"{counted(len(uppers), 'obstacle')} cut out of {what}"
     return _in_place(sketch, items, [left], words, f"nothing is left of {what}")
 
@@ -44,7 +44,7 @@ def divided(sketch: Sketch, selection: Selection) -> Change:
     """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
     lowest, *uppers = items = _chosen(sketch, selection, "divide")
     parts = [cut(lowest.geometry, _union(uppers)) for cut in (_difference, _intersection)]
-    return _in_place(sketch, items, parts, f"{display_name(sketch, lowest.key)} divided")
+    return _in_place(sketch, items, parts, f"{sketch.display_name(lowest.key)} divided")
 
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
@@ -63,7 +63,7 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
             shapes[item.key] = outlines(buffered, item.shape.name)
         if not shapes[item.key]:
-            raise MapError(f"nothing would be left of the {display_name(sketch, item.key)}")
+            raise MapError(f"nothing would be left of the {sketch.display_name(item.key)}")
     words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
     return replace_obstacles(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
 
@@ -95,10 +95,10 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
         if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
             shapes[item.key] = outlines(item.geometry, shape.name)
     boundary = sketch.boundary
-    if (everything or selection.boundary) and boundary is not None and len(boundary) >= 3:
-        if not (polygon := Polygon(boundary)).is_valid:
-            parts = outlines(shapely.make_valid(polygon))
-            boundary = parts[0].vertices if parts else None
+    meant = everything or selection.boundary
+    if meant and boundary is not None and len(boundary) >= 3 and not Polygon(boundary).is_valid:
+        parts = outlines(shapely.make_valid(Polygon(boundary)))
+        boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
     if not (shapes or redrawn):
         raise MapError("there is nothing to repair: no outline crosses itself")
@@ -118,7 +118,7 @@ def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
         raise MapError(f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
-            raise MapError(f"the {display_name(sketch, item.key)} covers nothing: repair or delete it first")
+            raise MapError(f"the {sketch.display_name(item.key)} covers nothing: repair or delete it first")
     return items
 
 

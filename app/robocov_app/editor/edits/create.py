@@ -15,7 +15,7 @@ from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
@@ -155,7 +155,7 @@ def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
     """Open a door of a width, m, its middle as near to a point as the wall allows."""
     line = _line(sketch, key)
     if door_width(width) > line.length - SMALLEST:
-        raise MapError(f"the {display_name(sketch, key)} is not longer than a door of {width:g} m")
+        raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
     return _opened(sketch, key, *_span(line, point, width))
 
 
@@ -177,8 +177,8 @@ def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
         if high - low >= SMALLEST
     ]
     if not pieces:
-        raise MapError(f"nothing would be left of the {display_name(sketch, key)}")
-    words = f"door of {end - begin:.3g} m opened in {display_name(sketch, key)}"
+        raise MapError(f"nothing would be left of the {sketch.display_name(key)}")
+    words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"
     return replace_obstacles(sketch, {key: pieces}, words)
 
 

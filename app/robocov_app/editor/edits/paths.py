@@ -11,7 +11,7 @@ from robocov.environment import ObstaclePath, Point, Repeat
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.model.geometry import as_array, middle_of, nearest_on, point_near
-from robocov_app.editor.model.selection import Change, Selection, display_name
+from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
 
 FIRST_SPEED = 0.5  # metres a second of a new path, until another speed is typed
@@ -149,7 +149,7 @@ def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
     if np.ptp(path.points, axis=0).max() < SMALLEST or LineString(path.points).length < SMALLEST:
         raise MapError("the way points lie in one place: click somewhere else")
     after = sketch.with_thing(key, replace(sketch.item(key).shape, path=path))
-    return Change(after, Selection.of(key), f"{display_name(sketch, key)}: {words}")
+    return Change(after, Selection.of(key), f"{sketch.display_name(key)}: {words}")
 
 
 def _speed(speed: float) -> float:

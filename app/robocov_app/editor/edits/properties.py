@@ -10,7 +10,7 @@ from robocov_app.editor.edits import vertices
 from robocov_app.editor.edits.create import label_of, text_of
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import outlines, tenths
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
@@ -28,7 +28,7 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
 def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
     """Name an obstacle or a start; an empty name takes an obstacle's name away."""
     name = label_of(name)
-    words = f"{display_name(sketch, owner)} renamed to “{name}”"
+    words = f"{sketch.display_name(owner)} renamed to “{name}”"
     if owner == BOUNDARY:
         raise MapError("the boundary has no name; the map has one")
     if isinstance(owner, str):
@@ -38,7 +38,7 @@ def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
             raise MapError(f"there is a start “{name}” already")
         starts = tuple((name if each == owner else each, spec) for each, spec in sketch.starts)
         return Change(replace(sketch, starts=starts), Selection.of(name), words)
-    words = words if name else f"{display_name(sketch, owner)}: name taken away"
+    words = words if name else f"{sketch.display_name(owner)}: name taken away"
     after = sketch.with_thing(owner, replace(sketch.item(owner).shape, name=name or None))
     return Change(after, Selection.of(owner), words)
 
@@ -167,7 +167,7 @@ def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     for item in chosen:
         polygons = outlines(item.geometry, item.shape.name)
         if not polygons:
-            raise MapError(f"the {display_name(sketch, item.key)} covers nothing: it cannot become a polygon")
+            raise MapError(f"the {sketch.display_name(item.key)} covers nothing: it cannot become a polygon")
         shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
     change = replace_obstacles(sketch, shapes, f"{Selection.of(*shapes).words(sketch)} turned into polygons")
     return replace(change, selection=change.selection.plus(selection.without_vertices()))

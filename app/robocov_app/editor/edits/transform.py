@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Final, Literal, TypeAlias, TypeVar
+from itertools import product
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 import shapely
 
 from robocov import environment as env
 from robocov.density import Density, Gaussians, WeightedPolygons
-from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov.environment import Point, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import free_name
@@ -20,7 +21,7 @@ from robocov_app.editor.edits.vertices import with_places
 from robocov_app.editor.model import geometry
 from robocov_app.editor.model.background import turned
 from robocov_app.editor.model.geometry import Box, box_around, middle_of, tenths
-from robocov_app.editor.model.selection import Change, Selection, place_of, ring_points
+from robocov_app.editor.model.selection import Change, Selection, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
@@ -33,7 +34,6 @@ _MOST_COPIES = 10_000
 _MANY = 100
 
 _ALIKE = 1e-12  # relative difference of what is the same but for rounding
-_Thing = TypeVar("_Thing")
 
 
 @dataclass(frozen=True)
@@ -83,34 +83,29 @@ class Affine:
         to = [self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0]
         return geometry.ring_near(np.column_stack(to))
 
-    def thing(self, thing: _Thing) -> _Thing:
-        """Return where an obstacle, its path, a start or a feature of a density goes, by their fields."""
-        found: dict[str, Any] = {}
-        for field in fields(thing):  # type: ignore[arg-type]
-            value = getattr(thing, field.name)
-            if field.name in ("vertices", "points", "positions"):
-                found[field.name] = self.ring(value)
-            elif field.name == "holes":
-                found[field.name] = tuple(map(self.ring, value))
-            elif field.name == "center":
-                (found[field.name],) = self.ring([value])
-            elif field.name == "path" and value is not None:
-                found[field.name] = self.thing(value)
-            elif field.name in ("width", "radius") and self.factor not in (None, 1.0):
-                found[field.name] = tenths(value * self.factor)
-        return replace(thing, **found)  # type: ignore[type-var]
+    def thing(self, thing: Any) -> Any:
+        """Return where an obstacle, its path, a start or a feature of a density goes, field by field.
 
-    def shape(self, shape: Obstacle) -> Obstacle:
-        """Return where an obstacle goes; stretched, circles become polygons and walls keep their width."""
-        if isinstance(shape, env.CircleObstacle) and self.factor is None:
-            rim = tuple(shape.polygon.exterior.coords[:-1])
-            shape = env.PolygonObstacle(rim, (), shape.name, shape.path)
-        return self.thing(shape)
-
-    def start(self, spec: StartSpec) -> StartSpec:
-        if isinstance(spec, env.DiscStart) and self.factor is None:
+        Stretched, circles become polygons, and walls keep their width; MapError for starts that are discs.
+        """
+        factor = self.factor
+        if factor is None and isinstance(thing, env.DiscStart):
             raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
-        return self.thing(spec)
+        if factor is None and isinstance(thing, env.CircleObstacle):
+            thing = env.PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
+        found: dict[str, Any] = {}
+        for name, value in ((field.name, getattr(thing, field.name)) for field in fields(thing)):
+            if name in ("vertices", "points", "positions"):
+                found[name] = self.ring(value)
+            elif name == "holes":
+                found[name] = tuple(map(self.ring, value))
+            elif name == "center":
+                (found[name],) = self.ring([value])
+            elif name == "path" and value is not None:
+                found[name] = self.thing(value)
+            elif name in ("width", "radius") and factor not in (None, 1.0):
+                found[name] = tenths(value * factor)
+        return replace(thing, **found)
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
@@ -128,7 +123,7 @@ def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point |
 def scaled(
     sketch: Sketch, selection: Selection, fx: float, fy: float | None = None, about: Point | None = None
 ) -> Change:
-    """Scale by fx and fy about the middle or a point, see `Affine.shape`; factors below 0 mirror."""
+    """Scale by fx and fy about the middle or a point, see `Affine.thing`; factors below 0 mirror."""
     fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
         raise MapError("a factor that is not 0 was wanted")
@@ -183,7 +178,7 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
-    """Copy the selected obstacles and starts, the copies moved by (dx, dy) m; they are selected then."""
+    """Copy the selected obstacles and starts, the copies moved by (dx, dy) m."""
     whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
     if not whole:
         raise MapError("select obstacles or starts to copy")
@@ -201,11 +196,9 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
     if columns * rows * len(whole.items) > _MOST_COPIES:
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
     after, everything = sketch, whole
-    for row in range(rows):
-        for column in range(columns):
-            if row or column:
-                after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
-                everything = everything.plus(copies)
+    for row, column in list(product(range(rows), range(columns)))[1:]:
+        after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
+        everything = everything.plus(copies)
     return Change(after, everything, f"{whole.words(sketch)} copied into {columns} × {rows}")
 
 
@@ -259,8 +252,8 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     affine = Affine.turn(degrees, a)
     everything = Selection.of(*sketch.owners).within(sketch)
     picture = None if sketch.background is None else turned(sketch.background, degrees, a)
-    after = replace(_placed(sketch, everything, affine), background=picture)
-    after = replace(after, density=_turned_density(sketch.density, affine))
+    density = _turned_density(sketch.density, affine)
+    after = replace(_placed(sketch, everything, affine), background=picture, density=density)
     return Change(after, Selection(), f"map turned by {degrees:.2f}°")
 
 
@@ -283,12 +276,12 @@ def _turned_density(density: Density | None, affine: Affine) -> Density | None:
 
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
-    if isinstance(owner, int) and owner != BOUNDARY:
-        item = sketch.item(owner)
-        # a typed size is that of the circle, not of the polygon that stands for it
-        if not isinstance(item.shape, env.CircleObstacle):
-            return None if item.geometry.is_empty else item.geometry.bounds
-    points = [point for ring in ring_points(sketch, owner) for point in ring]
+    # a typed size is that of a circle, not of the polygon that stands for it
+    round_one = isinstance(sketch.thing(owner), env.CircleObstacle)
+    if isinstance(owner, int) and owner != BOUNDARY and not round_one:
+        covered = sketch.item(owner).geometry
+        return None if covered.is_empty else covered.bounds
+    points = [point for ring in sketch.ring_points(owner) for point in ring]
     return box_around((*point, *point) for point in points) if points else None
 
 
@@ -306,9 +299,9 @@ def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
 
 
 def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
-    owners: list[Owner] = [item.key for item in selection.items_in(sketch)]
-    owners += [name for name, _ in sketch.starts if name in selection.starts]
-    return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}
+    things = selection.items | selection.starts
+    boxes = {owner: box_of(sketch, owner) for owner in sketch.owners if owner in things}
+    return {owner: box for owner, box in boxes.items() if box is not None}
 
 
 def _level(box: Box, side: Side) -> float:
@@ -320,19 +313,20 @@ def _level(box: Box, side: Side) -> float:
 
 def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
     """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
-    shapes = [(affine.shape(item.shape), item.note) for item in whole.items_in(sketch)]
+    shapes = [(affine.thing(item.shape), item.note) for item in whole.items_in(sketch)]
     after, keys = sketch.added(shapes)
     names = []
     for name, spec in sketch.starts:
         if name in whole.starts:
             names.append(free_name(after, name))
-            after = after.with_start(names[-1], affine.start(spec))
+            after = after.with_start(names[-1], affine.thing(spec))
     return after, Selection.of(*keys, *names)
 
 
 def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
     for owner, shift in by.items():
-        sketch = _placed(sketch, Selection.of(owner), Affine.shift(*shift)) if any(shift) else sketch
+        if any(shift):
+            sketch = _placed(sketch, Selection.of(owner), Affine.shift(*shift))
     return sketch
 
 
@@ -347,9 +341,9 @@ def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     owners = selection.owners
     single = [vertex for vertex in selection.vertices if vertex.of not in owners]
     places = dict(zip(single, affine.ring([place_of(sketch, vertex) for vertex in single]), strict=True))
-    sketch = sketch.with_shapes({key: affine.shape(sketch.item(key).shape) for key in selection.items})
+    sketch = sketch.with_shapes({key: affine.thing(sketch.item(key).shape) for key in selection.items})
     for name in selection.starts:
-        sketch = sketch.with_start(name, affine.start(sketch.start(name)))
+        sketch = sketch.with_start(name, affine.thing(sketch.start(name)))
     if selection.boundary and sketch.boundary is not None:
         sketch = replace(sketch, boundary=affine.ring(sketch.boundary))
     return with_places(sketch, places) if places else sketch

@@ -17,22 +17,12 @@ from robocov.environment import Point, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
-from robocov_app.editor.model.selection import (
-    Change,
-    Edge,
-    Selection,
-    Vertex,
-    display_name,
-    place_of,
-    replace_obstacles,
-    ring_points,
-    rings_of,
-    with_rings,
-)
+from robocov_app.editor.model.selection import Change, Edge, Selection, Vertex, place_of, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be cut off
 _MOST_SEGMENTS = 256
+_STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
 
 _Disc: TypeAlias = env.CircleObstacle | env.DiscStart
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
@@ -44,13 +34,8 @@ def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
     if not selection.vertices:
         raise MapError("select vertices first")
     places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
-    places = {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()}
-    return replace(put(sketch, places), selection=selection)
-
-
-def put(sketch: Sketch, places: Mapping[Vertex, Point]) -> Change:
-    selection = Selection(vertices=frozenset(places))
-    return Change(with_places(sketch, places), selection, f"{selection.words(sketch)} moved")
+    after = with_places(sketch, {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()})
+    return Change(after, selection, f"{Selection(vertices=selection.vertices).words(sketch)} moved")
 
 
 def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
@@ -64,10 +49,10 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
         if isinstance(thing, env.CircleObstacle | env.DiscStart):
             sketch = sketch.with_thing(owner, _with_rim(thing, moves))
             continue
-        rings = [list(ring) for ring in ring_points(sketch, owner)]
+        rings = [list(ring) for ring in sketch.ring_points(owner)]
         for vertex, place in zip(moves, ring_near(list(moves.values())), strict=True):
             rings[vertex.ring][vertex.index] = place
-        sketch = with_rings(sketch, owner, rings)
+        sketch = sketch.with_rings(owner, rings)
     return sketch
 
 
@@ -83,14 +68,14 @@ def _with_rim(disc: _Disc, moves: Mapping[Vertex, Point]) -> _Disc:
 
 
 def inserted(sketch: Sketch, edge: Edge) -> Change:
-    rings = [list(ring) for ring in ring_points(sketch, edge.of)]
-    closed = {number: is_closed for number, _, is_closed in rings_of(sketch, edge.of)}
-    if edge.ring not in closed or not 0 <= edge.index < len(rings[edge.ring]) - (not closed[edge.ring]):
+    rings = [list(ring) for ring in sketch.ring_points(edge.of)]
+    counts = {number: len(ring) - (not closed) for number, ring, closed in sketch.rings_of(edge.of)}
+    if not 0 <= edge.index < counts.get(edge.ring, 0):
         raise MapError("there is no such edge any more")
     rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
     new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
-    words = f"vertex inserted in {display_name(sketch, edge.of)}"
-    return Change(with_rings(sketch, edge.of, rings), new, words)
+    words = f"vertex inserted in {sketch.display_name(edge.of)}"
+    return Change(sketch.with_rings(edge.of, rings), new, words)
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
@@ -115,7 +100,7 @@ def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int
 def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> Sketch:
     rings = [
         tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ()))
-        for number, ring in enumerate(ring_points(sketch, owner))
+        for number, ring in enumerate(sketch.ring_points(owner))
     ]
     thing = sketch.thing(owner)
     if isinstance(thing, env.DiscStart):
@@ -129,16 +114,15 @@ def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> S
         return sketch.without({owner})
     # a hole goes that has too few left, but one that was broken before and is not touched stays
     kept = [ring for k, ring in enumerate(rings) if k == 0 or k not in gone or len(ring) >= 3]
-    return with_rings(sketch, owner, kept)
+    return sketch.with_rings(owner, kept)
 
 
 def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
-    shape = sketch.item(key).shape
-    if not isinstance(shape, env.PolygonObstacle) or not 1 <= ring <= len(shape.holes):
+    rings = sketch.ring_points(key)
+    if not isinstance(sketch.thing(key), env.PolygonObstacle) or not 1 <= ring < len(rings):
         raise MapError("there is no such hole")
-    holes = shape.holes[: ring - 1] + shape.holes[ring:]
-    after = sketch.with_shapes({key: replace(shape, holes=holes)})
-    return Change(after, Selection.of(key), f"hole of {display_name(sketch, key)} filled")
+    after = sketch.with_rings(key, rings[:ring] + rings[ring + 1 :])
+    return Change(after, Selection.of(key), f"hole of {sketch.display_name(key)} filled")
 
 
 def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
@@ -163,14 +147,14 @@ def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
 def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Change:
     after, count = sketch, 0
     for owner, by_ring in _by_ring(sketch, selection.vertices).items():
-        rings = list(ring_points(sketch, owner))
-        for number, ring, closed in rings_of(sketch, owner):
+        rings = list(sketch.ring_points(owner))
+        for number, ring, closed in sketch.rings_of(owner):
             cuts = _cuts(ring, by_ring[number], closed, wanted)
             arcs = [_arc(ring, k, *cuts[k]) if k in cuts else [ring[k]] for k in range(len(ring))]
             if cuts:
                 rings[number] = distinct(ring_near(np.concatenate(arcs)), closed=closed)
                 count += len(cuts)
-                after = with_rings(after, owner, rings)
+                after = after.with_rings(owner, rings)
     if not count:
         raise MapError("select corners first, of polygons, walls or the boundary")
     words = f"{count} corners {words}" if count > 1 else f"corner {words}"
@@ -216,25 +200,31 @@ def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
 
 def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Go on with a wall from its first or last vertex; the new one is selected then."""
-    key, wall = _wall(sketch, vertex)
-    place, last = point_near(point), len(wall.points) - 1
-    if vertex.index not in (0, last):
+    points = _wall(sketch, vertex).points
+    if vertex.index not in (0, len(points) - 1):
         raise MapError("a wall goes on from its ends only")
-    at_end = vertex.index == last
-    points = (*wall.points, place) if at_end else (place, *wall.points)
-    selection = Selection(vertices=frozenset({Vertex(key, 0, last + 1 if at_end else 0)}))
-    after = sketch.with_shapes({key: replace(wall, points=points)})
-    return Change(after, selection, f"{display_name(sketch, key)} extended")
+    at = 0 if vertex.index == 0 else len(points)
+    after = sketch.with_rings(vertex.of, [(*points[:at], point_near(point), *points[at:])])
+    selection = Selection(vertices=frozenset({Vertex(vertex.of, 0, at)}))
+    return Change(after, selection, f"{sketch.display_name(vertex.of)} extended")
 
 
 def split(sketch: Sketch, vertex: Vertex) -> Change:
     """Cut a wall in two at one of its inner vertices; both are selected then."""
-    key, wall = _wall(sketch, vertex)
+    wall = _wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
     halves = wall.points[: vertex.index + 1], wall.points[vertex.index :]
-    pieces = [replace(wall, points=points) for points in halves]
-    return replace_obstacles(sketch, {key: pieces}, f"{display_name(sketch, key)} cut in two")
+    pieces = {vertex.of: [replace(wall, points=points) for points in halves]}
+    return replace_obstacles(sketch, pieces, f"{sketch.display_name(vertex.of)} cut in two")
+
+
+def _wall(sketch: Sketch, vertex: Vertex) -> env.WallObstacle:
+    place_of(sketch, vertex)
+    wall = sketch.thing(vertex.of)
+    if not isinstance(wall, env.WallObstacle):
+        raise MapError("that is no wall")
+    return wall
 
 
 def joined(sketch: Sketch, selection: Selection) -> Change:
@@ -245,10 +235,9 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
         raise MapError("select two or more walls to join, and nothing else")
     chain, *rest = [wall.points for wall in shapes]
     while rest:
-        ways = [_chained(chain, line) for line in rest]
-        k = min(range(len(rest)), key=lambda k: ways[k][0])
-        chain = ways[k][1]
-        del rest[k]
+        ways = [(*_chained(chain, line), line) for line in rest]
+        _, chain, line = min(ways, key=lambda way: way[0])
+        rest.remove(line)
     name = next((wall.name for wall in shapes if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
     whole = replace(items[0], shape=env.WallObstacle(chain, shapes[0].width, name), note=note)
@@ -262,18 +251,6 @@ def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
     ways = [(math.dist(a[-1], b[0]), a, b) for a in (chain, chain[::-1]) for b in (line, line[::-1])]
     gap, a, b = min(ways, key=lambda way: way[0])
     return gap, (*a, *(b[1:] if gap <= _SAME else b))
-
-
-def _wall(sketch: Sketch, vertex: Vertex) -> tuple[int, env.WallObstacle]:
-    place_of(sketch, vertex)
-    if isinstance(vertex.of, int) and vertex.of in sketch.places:
-        shape = sketch.item(vertex.of).shape
-        if isinstance(shape, env.WallObstacle):
-            return vertex.of, shape
-    raise MapError("that is no wall")
-
-
-_STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
 
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
@@ -309,15 +286,15 @@ def _redrawn(
     everything = not (selection.items or selection.boundary)
     owners = [key for key in sketch.places if everything or key in selection.items]
     owners += [BOUNDARY] if selection.boundary else []
-    outlines = {owner: found for owner in owners if (found := rings_of(sketch, owner))}
+    outlines = {owner: found for owner in owners if (found := sketch.rings_of(owner))}
     if not outlines:
         raise MapError("select polygons, walls or the boundary first")
     after, changed = sketch, []
     for owner, ((_, _, closed), *_) in outlines.items():
-        rings = ring_points(sketch, owner)
+        rings = sketch.ring_points(owner)
         new = redraw(rings, closed)
         changed += [pair for pair in zip(rings, new, strict=True) if pair[0] != pair[1]]
-        after = with_rings(after, owner, new) if new != rings else after
+        after = after.with_rings(owner, new) if new != rings else after
     return after, changed
 
 

@@ -9,7 +9,7 @@ import shapely
 from robocov.arrays import Array, BoolArray
 from robocov.environment import DiscStart, Point, PointsStart
 from robocov_app.editor.model.geometry import as_array, nearest_on
-from robocov_app.editor.model.selection import Edge, Selection, Vertex, ring_points, rings_of
+from robocov_app.editor.model.selection import Edge, Selection, Vertex
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 
@@ -51,7 +51,7 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
         near = {sketch.obstacles[k].key for k in _places_near(sketch, point, reach)}
         wanted = [each for each in wanted if each in near or each not in sketch.places]
     for owner in wanted:
-        for ring, points, closed in rings_of(sketch, owner):
+        for ring, points, closed in sketch.rings_of(owner):
             starts = as_array(points)
             ends = np.roll(starts, -1, axis=0)
             if not closed:
@@ -78,7 +78,7 @@ def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Sele
     items = [sketch.obstacles[k] for k in places.tolist()]
     starts = []
     for name, spec in sketch.starts:
-        inside = _inside([point for ring in ring_points(sketch, name) for point in ring], low, high)
+        inside = _inside([point for ring in sketch.ring_points(name) for point in ring], low, high)
         caught = inside.any() if touched else inside.size and inside.all()
         if touched and isinstance(spec, DiscStart):
             caught = shapely.distance(area, shapely.Point(spec.center)) <= spec.radius
@@ -97,7 +97,7 @@ def vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner])
     found = [
         Vertex(owner, ring, k)
         for owner in owners
-        for ring, points in enumerate(ring_points(sketch, owner))
+        for ring, points in enumerate(sketch.ring_points(owner))
         for k in np.flatnonzero(_inside(points, low, high)).tolist()
     ]
     return Selection(vertices=frozenset(found))

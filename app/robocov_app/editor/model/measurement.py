@@ -11,7 +11,6 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array, IntArray
 from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.selection import rings_of
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
@@ -55,7 +54,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
         gap=narrow[0] if narrow else narrowest_gap(free),
         impassable=MultiPolygon(marks),
         sealed=sealed,
-        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in rings_of(sketch, owner)),
+        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.rings_of(owner)),
         problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, sealed, free, radius)),
         radius=radius,
     )

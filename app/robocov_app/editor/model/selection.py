@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robocov import environment as env
-from robocov.environment import Obstacle, Point, Ring
-from robocov.errors import MapError, counted, one_line
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_and_name
+from robocov.environment import Obstacle, Point
+from robocov.errors import MapError, counted
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +103,7 @@ class Selection:
             return f"{vertices} vertices" if vertices > 1 else "vertex"
         if len(owners) > 1:
             return counted(len(owners), "obstacle" if self.items else "start")
-        return display_name(sketch, next(iter(owners))) if owners else "nothing"
+        return sketch.display_name(next(iter(owners))) if owners else "nothing"
 
 
 @dataclass(frozen=True)
@@ -116,60 +115,15 @@ class Change:
     words: str
 
 
-def display_name(sketch: Sketch, owner: Owner) -> str:
-    """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
-    if owner == BOUNDARY:
-        return "boundary"
-    return one_line(f"start “{owner}”" if isinstance(owner, str) else kind_and_name(sketch.item(owner).shape))
-
-
 def numbered_name(sketch: Sketch, owner: Owner) -> str:
     """Return a name that tells things apart: obstacles without a name by their number, "wall 17"."""
-    name = display_name(sketch, owner)
+    name = sketch.display_name(owner)
     if isinstance(owner, str) or owner == BOUNDARY or sketch.item(owner).shape.name:
         return name
     return f"{name} {sketch.places[owner] + 1}"
 
 
-def ring_points(sketch: Sketch, owner: Owner) -> tuple[Ring, ...]:
-    """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
-    if owner == BOUNDARY:
-        return () if sketch.boundary is None else (sketch.boundary,)
-    thing = sketch.thing(owner)
-    if isinstance(thing, env.PolygonObstacle):
-        return (thing.vertices, *thing.holes)
-    if isinstance(thing, env.WallObstacle):
-        return (thing.points,)
-    if isinstance(thing, env.PointsStart):
-        return (thing.positions,)
-    if isinstance(thing, env.CircleObstacle | env.DiscStart):
-        (x, y), r = thing.center, thing.radius
-        return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
-    return ()
-
-
-def rings_of(sketch: Sketch, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
-    """Return the rings of something: number, points, and whether it is closed; none of circles and starts."""
-    thing = sketch.thing(owner)
-    if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
-        return ()
-    closed = not isinstance(thing, env.WallObstacle)
-    return tuple((k, points, closed) for k, points in enumerate(ring_points(sketch, owner)))
-
-
-def with_rings(sketch: Sketch, owner: Owner, rings: Sequence[Sequence[Point]]) -> Sketch:
-    """Return the sketch with other vertices for something that `ring_points` has rings of, not circles."""
-    line, *holes = map(tuple, rings)
-    if owner == BOUNDARY:
-        return replace(sketch, boundary=line)
-    thing: Any = sketch.thing(owner)
-    if isinstance(thing, env.PolygonObstacle):
-        return sketch.with_thing(owner, replace(thing, vertices=line, holes=tuple(holes)))
-    key = "points" if isinstance(thing, env.WallObstacle) else "positions"
-    return sketch.with_thing(owner, replace(thing, **{key: line}))
-
-
-def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], words: str) -> Change:
+def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], words: str) -> Change:
     """Return the change that puts shapes, none or several, in the place of some obstacles."""
     fresh = sketch.fresh_key
     items: list[Item] = []
@@ -189,13 +143,13 @@ def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
     """Return the vertices of something and where they are, m."""
     return tuple(
         (Vertex(owner, ring, index), point)
-        for ring, points in enumerate(ring_points(sketch, owner))
+        for ring, points in enumerate(sketch.ring_points(owner))
         for index, point in enumerate(points)
     )
 
 
 def exists(sketch: Sketch, vertex: Vertex) -> bool:
-    rings = ring_points(sketch, vertex.of)
+    rings = sketch.ring_points(vertex.of)
     return 0 <= vertex.ring < len(rings) and 0 <= vertex.index < len(rings[vertex.ring])
 
 
@@ -203,4 +157,4 @@ def place_of(sketch: Sketch, vertex: Vertex) -> Point:
     """Return where a vertex is, m; MapError when there is none."""
     if not exists(sketch, vertex):
         raise MapError("there is no such vertex any more")
-    return ring_points(sketch, vertex.of)[vertex.ring][vertex.index]
+    return sketch.ring_points(vertex.of)[vertex.ring][vertex.index]

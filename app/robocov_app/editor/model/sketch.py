@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, TypeAlias
@@ -15,6 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov import environment as env
 from robocov.density import Density
 from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov.errors import one_line
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
@@ -128,6 +129,49 @@ class Sketch:
     def owners(self) -> tuple[Owner, ...]:
         """All that may have vertices: the boundary, obstacles, starts."""
         return BOUNDARY, *self.places, *dict(self.starts)
+
+    def display_name(self, owner: Owner) -> str:
+        """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
+        if owner == BOUNDARY:
+            return "boundary"
+        return one_line(
+            f"start “{owner}”" if isinstance(owner, str) else kind_and_name(self.item(owner).shape)
+        )
+
+    def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
+        """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
+        if owner == BOUNDARY:
+            return () if self.boundary is None else (self.boundary,)
+        thing = self.thing(owner)
+        if isinstance(thing, env.PolygonObstacle):
+            return (thing.vertices, *thing.holes)
+        if isinstance(thing, env.WallObstacle):
+            return (thing.points,)
+        if isinstance(thing, env.PointsStart):
+            return (thing.positions,)
+        if isinstance(thing, env.CircleObstacle | env.DiscStart):
+            (x, y), r = thing.center, thing.radius
+            return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
+        return ()
+
+    def rings_of(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
+        """Return the rings of something: number, points, whether it is closed; none of circles and starts."""
+        thing = self.thing(owner)
+        if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
+            return ()
+        closed = not isinstance(thing, env.WallObstacle)
+        return tuple((k, points, closed) for k, points in enumerate(self.ring_points(owner)))
+
+    def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Sketch:
+        """Return the sketch with other vertices for something that `ring_points` has, but circles."""
+        line, *holes = map(tuple, rings)
+        if owner == BOUNDARY:
+            return replace(self, boundary=line)
+        thing: Any = self.thing(owner)
+        if isinstance(thing, env.PolygonObstacle):
+            return self.with_thing(owner, replace(thing, vertices=line, holes=tuple(holes)))
+        key = "points" if isinstance(thing, env.WallObstacle) else "positions"
+        return self.with_thing(owner, replace(thing, **{key: line}))
 
     @cached_property
     def places(self) -> Mapping[int, int]:

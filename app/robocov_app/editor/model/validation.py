@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -14,12 +15,12 @@ from shapely.geometry.base import BaseGeometry
 from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring, StartSpec
-from robocov.errors import MapError, StartError, counted, listed, one_line
+from robocov.errors import MapError, StartError, counted, listed
 from robocov.mapfile.check import check_rules
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import as_array
-from robocov_app.editor.model.selection import numbered_name, rings_of
+from robocov_app.editor.model.selection import numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
 
 Kind: TypeAlias = Literal[
@@ -42,7 +43,7 @@ _NOUNS = {"vertices": "corner", "points": "point", "positions": "place", "holes"
 class Problem:
     """Something that is wrong, or may be."""
 
-    words: str  # a sentence for people
+    words: str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
     # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
     where: BaseGeometry | None
     of: Owner | None = None  # None of the map as a whole
@@ -66,7 +67,11 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
         except MapError as error:
             otherwise = Problem(in_words(str(error), sketch), None)
             found = list(_space_faults(sketch, free, set())) or [otherwise]
-    return (*found, *_warnings(sketch, free, radius, {problem.of for problem in found})), free
+    found += _warnings(sketch, free, radius, {problem.of for problem in found})
+    for k, problem in enumerate(found):
+        if problem.of is not None and problem.words[0] in ": ":
+            found[k] = replace(problem, words=numbered_name(sketch, problem.of) + problem.words)
+    return tuple(found), free
 
 
 def in_words(message: str, sketch: Sketch) -> str:
@@ -99,39 +104,23 @@ def in_words(message: str, sketch: Sketch) -> str:
 
 
 def place_words(x: float, y: float) -> str:
-    """Return a place as people read it.
-
-    >>> place_words(1.25, 0.0)
-    '(1.25, 0)'
-    """
     return f"({x:.5g}, {y:.5g})"
 
 
-# the map as a whole, and its parts one by one
-
-
 def _faults(sketch: Sketch) -> Iterator[Problem]:
+    """Yield what is wrong with the map as a whole, and its parts one by one."""
     for words in _label_faults(sketch.name):
         yield Problem(f"the map {words}", None)
     if len(sketch.description) > _LONGEST_TEXT:
         yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None)
     if sketch.boundary is None:
-        yield Problem(
-            "there is no boundary: draw one round all that is free", None, BOUNDARY, kind="no boundary"
-        )
-    else:
-        yield from _named(sketch, BOUNDARY, _ring_faults(sketch.boundary, "it"))
-    for item in sketch.obstacles:
-        yield from _named(sketch, item.key, _shape_faults(item.shape))
-    for name, spec in sketch.starts:
-        for words in _label_faults(name):
-            yield Problem(f"a start {words}", None, name)
-        yield from _named(sketch, name, _start_faults(spec))
-
-
-def _named(sketch: Sketch, owner: Owner, faults: Iterator[Problem]) -> Iterator[Problem]:
-    for fault in faults:
-        yield replace(fault, of=owner, words=f"{numbered_name(sketch, owner)}: {fault.words}")
+        words = "there is no boundary: draw one round all that is free"
+        yield Problem(words, None, BOUNDARY, kind="no boundary")
+    for owner in sketch.owners:
+        for words in _label_faults(owner) if isinstance(owner, str) else ():
+            yield Problem(f"a start {words}", None, owner)
+        for fault in _thing_faults(sketch.thing(owner), sketch.boundary if owner == BOUNDARY else None):
+            yield replace(fault, of=owner, words=f": {fault.words}")
 
 
 def _label_faults(name: str) -> Iterator[str]:
@@ -143,37 +132,33 @@ def _label_faults(name: str) -> Iterator[str]:
         yield "has a name with line breaks or other control characters"
 
 
-def _shape_faults(shape: Obstacle) -> Iterator[Problem]:
-    if shape.name is not None:
-        yield from (Problem(words, None) for words in _label_faults(shape.name))
-    if isinstance(shape, env.PolygonObstacle):
-        yield from _polygon_faults(shape)
-    elif isinstance(shape, env.CircleObstacle):
-        yield from _size_faults("radius", shape.radius, shape.center)
-        yield from _far_faults((shape.center,))
-    else:
-        yield from _size_faults("width", shape.width, shape.points[0] if shape.points else None)
-        far = list(_far_faults(shape.points))
+def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> Iterator[Problem]:
+    if isinstance(thing, Obstacle) and thing.name is not None:
+        yield from (Problem(words, None) for words in _label_faults(thing.name))
+    if boundary is not None:
+        yield from _ring_faults(boundary, "it")
+    elif isinstance(thing, env.PolygonObstacle):
+        yield from _polygon_faults(thing)
+    elif isinstance(thing, env.CircleObstacle | env.DiscStart):
+        yield from _size_faults("radius", thing.radius, thing.center)
+        yield from _far_faults((thing.center,))
+    elif isinstance(thing, env.WallObstacle):
+        yield from _size_faults("width", thing.width, thing.points[0] if thing.points else None)
+        far = list(_far_faults(thing.points))
         yield from far
-        points = as_array(shape.points)
+        points = as_array(thing.points)
         extent = np.ptp(points, axis=0).max() if len(points) else 0.0
         if not far and (len(points) < 2 or extent < SMALLEST):
             yield Problem("it has no length: it needs two points that are apart", _drawn(points))
         elif not far and extent > LARGEST:
             words = f"it is {extent:.5g} m long: at most {LARGEST / 1000:g} km are possible"
             yield Problem(words, _drawn(points))
-
-
-def _start_faults(spec: StartSpec) -> Iterator[Problem]:
-    if isinstance(spec, env.DiscStart):
-        yield from _size_faults("radius", spec.radius, spec.center)
-        yield from _far_faults((spec.center,))
-    elif isinstance(spec, env.PointsStart):
-        if not spec.positions:
+    elif isinstance(thing, env.PointsStart):
+        if not thing.positions:
             yield Problem("has no places: it needs one a robot", None)
-        yield from _far_faults(spec.positions)
+        yield from _far_faults(thing.positions)
         seen: set[Point] = set()
-        for place in spec.positions:
+        for place in thing.positions:
             if place in seen:
                 words = f"the place {place_words(*place)} is given twice: every robot needs its own"
                 yield Problem(words, shapely.Point(place), kind="spot")
@@ -182,17 +167,12 @@ def _start_faults(spec: StartSpec) -> Iterator[Problem]:
 
 def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
     """Yield what is wrong with a closed outline, which messages call `what`."""
-    points, far = as_array(ring), list(_far_faults(ring))
-    if far:
-        yield from far
+    points, far, count = as_array(ring), list(_far_faults(ring)), len(set(ring))
+    if far or count < 3:
+        corners = ("no corners", "one corner", "two corners", "")[min(count, 3)]
+        yield from far or [Problem(f"{what} has {corners}: it needs three", _drawn(points))]
         return
-    count = len(set(ring))
-    if count < 3:
-        corners = ("no corners", "one corner", "two corners")[count]
-        yield Problem(f"{what} has {corners}: it needs three", _drawn(points))
-        return
-    extent = np.ptp(points, axis=0)
-    polygon = Polygon(points)
+    extent, polygon = np.ptp(points, axis=0), Polygon(points)
     if extent.max() > LARGEST:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
         yield Problem(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
@@ -260,9 +240,6 @@ def _meetings(points: Array, polygon: Polygon) -> list[Point]:
     return [(x, y) for x, y in meeting.tolist()]
 
 
-# the free space, and the starts in it
-
-
 def _rough_free(sketch: Sketch) -> MultiPolygon:
     """Return the free space of a draft, as far as its boundary and its obstacles can be made valid."""
     ring = sketch.boundary or ()
@@ -296,11 +273,11 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
             what = "outside the boundary"
             if len(near):
                 what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
-            yield Problem(f"{_spot(name, spec, k)} is {what}", points[k], name, kind="spot")
+            yield Problem(f"{_spot(spec, k)} is {what}", points[k], name, kind="spot")
 
 
-def _spot(name: str, spec: env.PointsStart, k: int) -> str:
-    return f"start “{one_line(name)}”: place {k + 1} at {place_words(*spec.positions[k])}"
+def _spot(spec: env.PointsStart, k: int) -> str:
+    return f": place {k + 1} at {place_words(*spec.positions[k])}"
 
 
 def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grave: bool) -> Iterator[Problem]:
@@ -310,28 +287,24 @@ def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grav
         words = f"has no room for a robot of radius {radius:g} m"
         if isinstance(spec, env.DiscStart):
             disc = shapely.Point(spec.center).buffer(spec.radius)
-            yield Problem(f"start “{one_line(name)}”: its disc {words}", disc, name, grave, "no room")
+            yield Problem(f": its disc {words}", disc, name, grave, "no room")
         else:
-            yield Problem(f"start “{one_line(name)}”: the free space {words}", None, name, grave)
+            yield Problem(f": the free space {words}", None, name, grave)
 
 
 def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
     points = shapely.points(as_array(spec.positions))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():
-        words = f"{_spot(name, spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
+        words = f"{_spot(spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
         yield Problem(words, points[k], name, False, "spot")
     tree = shapely.STRtree(points)
     pairs = tree.query(points, predicate="dwithin", distance=2 * radius).T
     for i, j in sorted((i, j) for i, j in pairs.tolist() if i < j):
         gap = math.dist(spec.positions[i], spec.positions[j])
         if gap < 2 * radius:
-            apart = f"are {gap:.3g} m apart: robots need {2 * radius:g} m"
-            words = f"{_spot(name, spec, i)} and place {j + 1} {apart}"
+            words = f"{_spot(spec, i)} and place {j + 1} are {gap:.3g} m apart: robots need {2 * radius:g} m"
             yield Problem(words, MultiPoint([points[i], points[j]]), name, False, "spot")
-
-
-# warnings
 
 
 def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner | None]) -> Iterator[Problem]:
@@ -358,8 +331,7 @@ def _outside(sketch: Sketch) -> Iterator[Problem]:
     outside = ~shapely.intersects(inside, sketch.geometries) | shapely.touches(inside, sketch.geometries)
     for k in np.flatnonzero(outside & ~shapely.is_empty(sketch.geometries)).tolist():
         item = sketch.obstacles[k]
-        words = f"{numbered_name(sketch, item.key)} lies outside the boundary"
-        yield Problem(words, item.geometry, item.key, False, "outside")
+        yield Problem(" lies outside the boundary", item.geometry, item.key, False, "outside")
 
 
 def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
@@ -373,9 +345,8 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         met, beyond = env.in_the_way(area, standing, inside)
         names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
-            words = f"{numbered_name(sketch, item.key)} moves through {listed(names)}"
             where = shapely.union_all([*met.values(), beyond])
-            yield Problem(words, where, item.key, False)
+            yield Problem(f" moves through {listed(names)}", where, item.key, False)
 
 
 def _twice(sketch: Sketch) -> Iterator[Problem]:
@@ -383,31 +354,26 @@ def _twice(sketch: Sketch) -> Iterator[Problem]:
     for item in sketch.obstacles:
         form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
         if form in below and not item.geometry.is_empty:
-            words = f"{numbered_name(sketch, item.key)} lies on another one that is just the same"
+            words = " lies on another one that is just the same"
             yield Problem(words, item.geometry, item.key, False, "twice")
         below.add(form)
 
 
 def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
     for owner in sketch.owners:
-        for _, ring, closed in rings_of(sketch, owner):
-            if len(set(ring)) == len(ring) or len(set(ring)) < 3:
-                continue
-            following = (*ring[1:], ring[0]) if closed else ring[1:]
-            twice = [at for at, after in zip(ring, following, strict=False) if at == after]
-            if twice:
-                at = place_words(*twice[0])
-                words = f"{numbered_name(sketch, owner)}: two vertices lie in the same place, {at}"
-                yield Problem(words, MultiPoint(twice), owner, False, "double")
+        for _, ring, closed in sketch.rings_of(owner):
+            if 3 <= len(set(ring)) < len(ring):
+                steps = pairwise((*ring, ring[0]) if closed else ring)
+                if twice := [at for at, after in steps if at == after]:
+                    words = f": two vertices lie in the same place, {place_words(*twice[0])}"
+                    yield Problem(words, MultiPoint(twice), owner, False, "double")
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
     """Warn of parts of the free space that nothing leads to from the largest."""
-    slivers = []
-    for part in list(free.geoms)[1:]:
-        if part.area < math.pi * radius * radius:
-            slivers.append(part)
-            continue
+    rest = list(free.geoms)[1:]
+    slivers = [part for part in rest if part.area < math.pi * radius * radius]
+    for part in rest[: len(rest) - len(slivers)]:  # the largest first
         at = place_words(*part.representative_point().coords[0])
         words = f"the room of {part.area:.3g} m² round {at} is sealed: no way leads in"
         yield Problem(words, part, None, False, "sealed")

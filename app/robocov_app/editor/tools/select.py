@@ -9,7 +9,7 @@ from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model import geometry
 from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of
 from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
-from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of, rings_of
+from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of
 from robocov_app.editor.model.sketch import Owner
 from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
 from robocov_app.editor.tools.tool import Handle, PointerEvent, Preview, Tool, Workspace, handle_at, side_of
@@ -129,7 +129,7 @@ class MovingVertices(Drag):
         self._begun = self._at = place_of(context.sketch, taken)
         # the vertex before it on its ring, or after a wall's first; None of circles and starts
         self._origin: Point | None = None
-        for ring, points, closed in rings_of(context.sketch, taken.of):
+        for ring, points, closed in context.sketch.rings_of(taken.of):
             if ring == taken.ring:
                 first = taken.index == 0 and not closed
                 self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]

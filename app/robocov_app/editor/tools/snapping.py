@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
 from robocov_app.editor.model.geometry import as_array, bearing, cos_sin, nearest_on
-from robocov_app.editor.model.selection import Vertex, ring_points, rings_of
+from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
 
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
@@ -48,14 +48,14 @@ class Targets:
             thing = sketch.thing(owner)
             if isinstance(thing, CircleObstacle | DiscStart):
                 centres.append(thing.center)
-                rims += ring_points(sketch, owner)[0][1:]
+                rims += sketch.ring_points(owner)[0][1:]
             if isinstance(thing, CircleObstacle):
                 circles.append(geometry_of(thing))
             elif isinstance(thing, WallObstacle):
                 walls.append(geometry_of(thing))
             elif isinstance(thing, PointsStart):
                 centres += [at for k, at in enumerate(thing.positions) if k not in dragged[owner, 0]]
-            for ring, line, closed in rings_of(sketch, owner):
+            for ring, line, closed in sketch.rings_of(owner):
                 gone, count = dragged[owner, ring], len(line)
                 points += [point for k, point in enumerate(line) if k not in gone] if gone else line
                 pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
