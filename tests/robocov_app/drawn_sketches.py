@@ -16,7 +16,7 @@ from robocov.errors import MapError
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.selection import Edge, Selection, points_of
+from robocov_app.editor.model.selection import Change, Edge, Selection, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined
 
@@ -217,7 +217,7 @@ def changes(draw, sketch):
         lambda: properties.made_boundary(sketch, selection),
         lambda: properties.underlaid(sketch, Background("plan.png", (40, 30))),
         lambda: vertices.moved(sketch, selection, dx, dy),
-        lambda: vertices.put(sketch, dict.fromkeys(handles, a)),
+        lambda: Change(vertices.with_places(sketch, dict.fromkeys(handles, a)), selection, "put"),
         lambda: vertices.inserted(sketch, edge),
         lambda: vertices.extended(sketch, handles[0], a) if handles else None,
         lambda: vertices.deleted(sketch, selection),

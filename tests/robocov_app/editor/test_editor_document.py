@@ -149,7 +149,7 @@ def test_moving_a_vertex_changes_one_line(data):
     to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))
     moved = (to[0] / 10000, to[1] / 10000)
     before = sketch_text(sketch).splitlines()
-    after = sketch_text(vertices.put(sketch, {vertex: moved}).sketch).splitlines()
+    after = sketch_text(vertices.with_places(sketch, {vertex: moved})).splitlines()
     changed = [line for line in difflib.ndiff(before, after) if line[:2] in ("- ", "+ ")]
     assert len(changed) <= 2
     assert len(before) == len(after)

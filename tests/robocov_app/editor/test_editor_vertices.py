@@ -83,14 +83,14 @@ def test_several_things_move_together(sketch):
 
 
 def test_centre_and_rim_of_discs(sketch):
-    assert vertices.put(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).sketch.start("disc") == DiscStart(
+    assert vertices.with_places(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).start("disc") == DiscStart(
         (9.0, 5.0), 1.0
     )
-    assert vertices.put(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).sketch.start("disc") == DiscStart(
+    assert vertices.with_places(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).start("disc") == DiscStart(
         (10.0, 6.0), 2.0
     )
     both = {Vertex(1, 0, 0): (1.0, 1.0), Vertex(1, 0, 1): (9.0, 9.0)}
-    assert vertices.put(sketch, both).sketch.item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
+    assert vertices.with_places(sketch, both).item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_centre_and_rim_of_discs(sketch):
         (lambda s: vertices.moved(s, picked(Vertex(0, 0, 9)), 1, 1), "no such vertex"),
         (lambda s: vertices.moved(s, picked(Vertex(99, 0, 0)), 1, 1), "no such vertex"),
         (lambda s: vertices.moved(s, picked(Vertex("none", 0, 0)), 1, 1), "no such vertex"),
-        (lambda s: vertices.put(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
+        (lambda s: vertices.with_places(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
         (lambda s: vertices.inserted(s, Edge(2, 0, 2, (9.0, 2.0))), "no such edge"),
         (lambda s: vertices.inserted(s, Edge(1, 0, 0, (9.0, 2.0))), "no such edge"),
         (lambda s: vertices.extended(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),

@@ -51,11 +51,8 @@ class Item:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived again."""
-        return {
-            "key": self.key,
-            "shape": replace(self.shape),
-            **{name: getattr(self, name) for name in MARKS},
-        }
+        state = {name: getattr(self, name) for name in ("key", *MARKS)}
+        return state | {"shape": replace(self.shape)}
 
 
 @dataclass(frozen=True)
@@ -134,9 +131,8 @@ class Sketch:
         """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
         if owner == BOUNDARY:
             return "boundary"
-        return one_line(
-            f"start “{owner}”" if isinstance(owner, str) else kind_and_name(self.item(owner).shape)
-        )
+        name = f"start “{owner}”" if isinstance(owner, str) else kind_and_name(self.item(owner).shape)
+        return one_line(name)
 
     def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
         """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
