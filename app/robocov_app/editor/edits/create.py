@@ -80,11 +80,7 @@ def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
 
 
 def free_name(sketch: Sketch, name: str) -> str:
-    """Return a name for a start that no start has yet: this one, or with a number after it.
-
-    >>> free_name(Sketch(starts=(("start", env.UniformStart()),)), "start")
-    'start 2'
-    """
+    """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
     taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
     while name in taken:
         name = f"{stem} {count}"

@@ -110,11 +110,7 @@ def _nearest(away: Array, reach: float) -> int | None:
 
 
 def path_words(path: ObstaclePath | None) -> str:
-    """Return a path in a few words.
-
-    >>> path_words(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5))
-    '0.5 m/s, loop of 6 m in 12 s'
-    """
+    """Return a path in a few words: "0.5 m/s, loop of 6 m in 12 s"."""
     if path is None:
         return "stands"
     if not goes(path):

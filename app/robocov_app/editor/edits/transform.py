@@ -38,11 +38,7 @@ _ALIKE = 1e-12  # relative difference of what is the same but for rounding
 
 @dataclass(frozen=True)
 class Affine:
-    """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0); rings to tenths of a millimetre.
-
-    >>> Affine.turn(90.0, about=(1.0, 0.0)).ring([(2.0, 0.0)])
-    ((1.0, 1.0),)
-    """
+    """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0); rings to tenths of a millimetre."""
 
     xx: float = 1.0
     xy: float = 0.0

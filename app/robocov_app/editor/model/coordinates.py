@@ -26,9 +26,6 @@ def length_of(text: str, *, now: float | None = None) -> float:
     """Return a length in metres: ``3.2``, ``3,2``, ``120cm``, ``1200 mm``, ``3m``, ``4'``, ``6"``, ``4'6"``.
 
     With `now`, what it is at present, also ``+0.5``, ``-0.5``, ``*2``, ``/2`` and ``50%``.
-
-    >>> length_of("120cm"), length_of("3,2"), length_of("+0.5", now=2.0), length_of("/4", now=2.0)
-    (1.2, 3.2, 2.5, 0.5)
     """
     typed = _clean(text)
     sign = typed[:1]
@@ -44,14 +41,9 @@ def length_of(text: str, *, now: float | None = None) -> float:
 
 
 def point_of(text: str, *, last: Point | None = None) -> Point:
-    """Return a place in metres: ``3.2 1.5``; ``2<45`` from the origin, at 45 degrees.
+    """Return a place in metres: ``3.2 1.5``, ``3,2 1,5``, ``320 cm; 1.5 m``; ``2<45``, at 45 degrees.
 
     Relative to `last`: ``@0.5 0``, ``@2<45``, and ``+0.5 0``, whose first sign is a plus.
-
-    >>> point_of("3.2 1.5"), point_of("3,2 1,5"), point_of("320 cm; 1.5 m"), point_of("3.2,1.5")
-    ((3.2, 1.5), (3.2, 1.5), (3.2, 1.5), (3.2, 1.5))
-    >>> point_of("@2<90", last=(1.0, 1.0)), point_of("+0.5 -1", last=(1.0, 1.0))
-    ((1.0, 3.0), (1.5, 0.0))
     """
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
@@ -73,9 +65,6 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
     """Return the next point of a line that is drawn: as `point_of`, or a mere length towards the cursor.
 
     ``<45`` alone keeps the cursor's distance at that angle.
-
-    >>> next_point_of("2", (1.0, 1.0), (1.0, 1.3))
-    (1.0, 3.0)
     """
     typed = _clean(text)
     if last is not None and towards is not None:
@@ -93,11 +82,7 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
 
 
 def size_of(text: str) -> tuple[float, float]:
-    """Return width and height in metres: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both.
-
-    >>> size_of("3 x 2"), size_of("120cm×80cm"), size_of("1,5")
-    ((3.0, 2.0), (1.2, 0.8), (1.5, 1.5))
-    """
+    """Return width and height in metres: ``3 x 2``, ``3 2``, ``120cm × 80cm``; a single length is both."""
     typed = _clean(text)
     both = _length(typed)
     pair = _pair(typed, "x×*") if math.isnan(both) else (both, both)
@@ -108,11 +93,7 @@ def size_of(text: str) -> tuple[float, float]:
 
 
 def angle_of(text: str) -> float:
-    """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``.
-
-    >>> angle_of("22,5°")
-    22.5
-    """
+    """Return an angle in degrees: ``45``, ``45°``, ``-90``, ``0.5rad``."""
     return _wanted(_angle(_clean(text)), text, "type an angle in degrees, such as 45")
 
 
@@ -126,10 +107,8 @@ def _wanted(value: float, text: str, wanted: str) -> float:
     return value
 
 
-# what is typed in another way than these read is nan
-
-
 def _number(typed: str) -> float:
+    """Return a number; nan, as what reads lengths and angles below, for what is typed in another way."""
     typed = typed.strip()
     value = float(typed.replace(",", ".")) if re.fullmatch(_NUMBER, typed) else math.nan
     return value if math.isfinite(value) else math.nan

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import groupby
 from typing import TypeAlias
 
 import numpy as np
@@ -51,15 +52,8 @@ def point_near(point: Point) -> Point:
 
 
 def distinct(ring: Iterable[Point], *, closed: bool = True) -> Ring:
-    """Return points without those that repeat the one before; of a closed ring the last is before the first.
-
-    >>> distinct([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 0.0)])
-    ((0.0, 0.0), (1.0, 0.0))
-    """
-    kept: list[Point] = []
-    for point in ring:
-        if not kept or point != kept[-1]:
-            kept.append(point)
+    """Return points without those that repeat the one before, which of a closed ring's first is its last."""
+    kept = [point for point, _ in groupby(ring)]
     if closed and len(kept) > 1 and kept[0] == kept[-1]:
         kept.pop()
     return tuple(kept)
@@ -75,11 +69,7 @@ def nearest_on(starts: Array, ends: Array, point: Point) -> tuple[Array, Array]:
 
 
 def cos_sin(degrees: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle, exact at quarters of a turn.
-
-    >>> cos_sin(-90.0)
-    (0.0, -1.0)
-    """
+    """Return cosine and sine of an angle, exact at quarters of a turn."""
     quarters, rest = divmod(degrees, 90.0)
     if rest == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarters) % 4]
@@ -92,20 +82,12 @@ def bearing(a: Point, b: Point) -> float:
 
 
 def angle_to_level(a: Point, b: Point) -> float:
-    """Return by how many degrees a line has to be turned to be level or upright, whichever is nearer.
-
-    >>> angle_to_level((1.0, 1.0), (1.0, 3.0)), angle_to_level((0.0, 0.0), (1.0, 1.0))
-    (0.0, -45.0)
-    """
+    """Return by how many degrees a line has to be turned to be level or upright, whichever is nearer."""
     return 90.0 * round(bearing(a, b) / 90.0) - bearing(a, b)
 
 
 def at_round_angle(origin: Point, point: Point) -> Point:
-    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another.
-
-    >>> at_round_angle((0.0, 0.0), (3.0, 0.1))
-    (3.0, 0.0)
-    """
+    """Return the point on the nearest line at a multiple of `ANGLE` degrees through another."""
     cos, sin = cos_sin(ANGLE * round(bearing(origin, point) / ANGLE))
     along = (point[0] - origin[0]) * cos + (point[1] - origin[1]) * sin
     return round(origin[0] + along * cos, 9) + 0.0, round(origin[1] + along * sin, 9) + 0.0
@@ -148,22 +130,14 @@ def ring_area(points: Sequence[Point]) -> float:
 
 
 def bearing_words(a: Point, b: Point) -> str:
-    """Return length and direction from one point to another, in words.
-
-    >>> bearing_words((0.0, 0.0), (0.0, 2.4))
-    '2.40 m  ∠ 90°'
-    """
+    """Return length and direction from one point to another: "2.40 m  ∠ 90°"."""
     angle = bearing(a, b)
     shown = 0.0 if abs(angle) < 0.05 else angle
     return f"{length_words(distance(a, b))}  ∠ {shown:.1f}".removesuffix(".0") + "°"
 
 
 def length_words(metres: float) -> str:
-    """Return a length as it stands beside the cursor.
-
-    >>> length_words(0.0234), length_words(12.3456), length_words(1234.5)
-    ('2.3 cm', '12.35 m', '1234.5 m')
-    """
+    """Return a length as it stands beside the cursor: "2.3 cm", "12.35 m", "1234.5 m"."""
     if metres < 0.1:
         return f"{100 * metres:.1f} cm"
     return f"{metres:.2f} m" if metres < 1000 else f"{metres:.1f} m"

@@ -75,11 +75,7 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
 
 
 def in_words(message: str, sketch: Sketch) -> str:
-    """Return a message of the map's rules with the names of things instead of places in a file.
-
-    >>> in_words('map: starts["a b"].positions[1]: x', Sketch())
-    'start “a b”, place 2: x'
-    """
+    """Return a message of the map's rules with the names of things instead of places in a file."""
 
     def named(match: re.Match[str]) -> str:
         words, noun = [match[1]], "corner"

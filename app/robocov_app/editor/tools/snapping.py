@@ -6,8 +6,8 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import chain, combinations
+from dataclasses import dataclass, replace
+from itertools import chain, combinations, islice
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -20,6 +20,7 @@ from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, W
 from robocov_app.editor.model.geometry import as_array, bearing, cos_sin, nearest_on
 from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
+from robocov_app.render.surface_cache import Latest
 
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
 
@@ -83,15 +84,15 @@ class Targets:
         away, k = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
         return _point(places[k]) if away <= reach else None
 
-    def edges_near(self, point: Point, reach: float) -> tuple[Array, Array]:
-        """Return the starts and the ends, (k, 2) m each, of the edges within `reach`, the nearest first."""
+    def edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
+        """Return the ends of the edges within `reach` m, the nearest first."""
         x, y = point
         found = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts, ends = self.starts[found], self.ends[found]
         _, away = nearest_on(starts, ends, point)
         order = np.argsort(away, kind="stable")
         order = order[away[order] <= reach][:_MOST_EDGES]
-        return starts[order], ends[order]
+        return [(_point(starts[k]), _point(ends[k])) for k in order]
 
     def in_line(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
         """Return the mark within the horizon that is nearest along an axis, within `reach` m, then at all."""
@@ -110,31 +111,20 @@ class Snapper:
 
     def __init__(self) -> None:
         self.patient = False  # to wait for the targets of large maps too
-        self._sketch: Sketch | None = None
-        self._key: object = None
-        self._known: Targets | None = None
-        self._coming: Future[Targets] | None = None
-        self._pool: ThreadPoolExecutor | None = None
+        self._latest: Latest[Future[Targets]] = Latest()
+        self._pool = ThreadPoolExecutor(1, "targets")
 
     def targets(
         self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
     ) -> Targets | None:
         """Return what to snap to; None as long as that is being worked out."""
-        key = frozenset(without), tuple(more)
-        if self._sketch is not sketch or self._key != key:
-            self._sketch, self._key, self._known, self._coming = sketch, key, None, None
-            if self.patient or vertex_count(sketch) < MANY:
-                self._known = Targets(sketch, *key)
-            else:
-                self._pool = self._pool or ThreadPoolExecutor(1, "targets")
-                self._coming = self._pool.submit(Targets, sketch, *key)
-        if self._coming is not None and self._coming.done():
-            self._known, self._coming = self._coming.result(), None
-        return self._known
+        look = frozenset(without), tuple(more)
+        coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))
+        at_once = coming.done() or self.patient or vertex_count(sketch) < MANY
+        return coming.result() if at_once else None
 
     def close(self) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+        self._pool.shutdown(cancel_futures=True)
 
 
 def vertex_count(sketch: Sketch) -> int:
@@ -209,12 +199,13 @@ class _Line:
     words: str
     length: float = math.inf
 
-    def foot(self, point: Point) -> Point:
+    def along(self, point: Point) -> float:
         dx, dy = point[0] - self.through[0], point[1] - self.through[1]
-        along = dx * self.direction[0] + dy * self.direction[1]
-        if self.kind == "edge":
-            along = min(max(along, 0.0), self.length)
-        return self.at(along)
+        return dx * self.direction[0] + dy * self.direction[1]
+
+    def foot(self, point: Point) -> Point:
+        along = self.along(point)
+        return self.at(min(max(along, 0.0), self.length) if self.kind == "edge" else along)
 
     def at(self, along: float) -> Point:
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
@@ -236,8 +227,7 @@ class _Line:
         if grid <= 0.0:
             return None
         if self.kind == "angle":
-            dx, dy = foot[0] - self.through[0], foot[1] - self.through[1]
-            return self.at(_multiple(dx * self.direction[0] + dy * self.direction[1], grid))
+            return self.at(_multiple(self.along(foot), grid))
         if min(map(abs, self.direction)) >= _PARALLEL:
             return None
         axis = 0 if abs(self.direction[1]) < _PARALLEL else 1
@@ -253,21 +243,20 @@ class _Line:
 
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
     """Return where a point snaps: to points, crossing lines, lines, the grid; angles count from `origin`."""
-    return _ranked(point, targets, snapping, origin)[1]
+    return _Candidates(point, targets, snapping, origin).best()[1]
 
 
 def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets, snapping: Snapping) -> Snap:
     """Return as `point` the move near (dx, dy) m that snaps the nearest of some points."""
     best: tuple[tuple[int, float], Snap] | None = None
     # what many points meet somewhere means little of one of them
-    telling = snapping.to - {"grid", "angle", "middle", "crossing"}
-    of_others = Snapping(snapping.reach, snapping.grid, snapping.angle, telling)
+    of_others = replace(snapping, to=snapping.to - {"grid", "angle", "middle", "crossing"})
     if len(points) > _MOST_POINTS:  # the first one, and those on their hull
         hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
         points = [points[0], *hull[:: math.ceil(len(hull) / (_MOST_POINTS - 1))]]
     for k, (x, y) in enumerate(points):
         at = x + dx, y + dy
-        rank, snap = _ranked(at, targets, snapping if k == 0 else of_others, None)
+        rank, snap = _Candidates(at, targets, snapping if k == 0 else of_others).best()
         by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
         # what rounding adds is not to add to the reach
         away = math.hypot(by[0] - dx, by[1] - dy)
@@ -277,100 +266,89 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
 
 
 def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
-    """Return the nearest multiple of `step` degrees if it is within `reach` degrees, else the angle itself.
-
-    >>> snapped_angle(43.0), snapped_angle(40.0)
-    (45.0, 40.0)
-    """
+    """Return the nearest multiple of `step` degrees if that is within `reach`, else the angle itself."""
     nearest = step * round(degrees / step)
     return nearest + 0.0 if abs(nearest - degrees) <= reach else degrees
 
 
-def _ranked(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> tuple[int, Snap]:
-    """Return how well a point snapped, the lower the better, and where to."""
+@dataclass(frozen=True)
+class _Candidates:
+    """Where a point may snap to; angles count from `origin`."""
 
-    def telling(snap: Snap) -> tuple[int, int, float]:
+    point: Point
+    targets: Targets
+    how: Snapping
+    origin: Point | None = None
+
+    def best(self) -> tuple[int, Snap]:
+        """Return how well the point snapped, the lower the better, and where to."""
+        found = chain(self.marks("centre", "middle"), self.crossings())
+        ways = (self.marks("vertex"), found, self.on_lines(), self.on_grid())
+        for rank, way in enumerate(ways):
+            near = [snap for snap in way if math.dist(self.point, snap.point) <= self.how.reach]
+            if near:
+                return rank, min(near, key=self.telling)
+        return len(ways), Snap(self.point)
+
+    def telling(self, snap: Snap) -> tuple[int, int, float]:
         # two lines say more than one, and the grid little
         lines = sum(guide.kind != "grid" for guide in snap.guides)
-        return -lines, -len(snap.guides), math.dist(point, snap.point)
+        return -lines, -len(snap.guides), math.dist(self.point, snap.point)
 
-    ways = (
-        _marks(point, targets, snapping, ("vertex",)),
-        chain(_marks(point, targets, snapping, ("centre", "middle")), _crossings(point, targets, snapping)),
-        _on_lines(point, targets, snapping, origin),
-        _on_grid(point, snapping),
-    )
-    for rank, way in enumerate(ways):
-        near = [snap for snap in way if math.dist(point, snap.point) <= snapping.reach]
-        if near:
-            return rank, min(near, key=telling)
-    return len(ways), Snap(point)
+    def marks(self, *kinds: PointKind) -> Iterator[Snap]:
+        for kind in kinds:
+            place = self.targets.nearest(self.point, kind, self.how.reach) if kind in self.how.to else None
+            if place is not None:
+                yield _mark(kind, place)
 
-
-def _mark(kind: Kind, place: Point) -> Snap:
-    return Snap(place, (Guide(kind, (place,), "middle of an edge" if kind == "middle" else kind),))
-
-
-def _marks(
-    point: Point, targets: Targets, snapping: Snapping, kinds: tuple[PointKind, ...]
-) -> Iterator[Snap]:
-    for kind in kinds:
-        place = targets.nearest(point, kind, snapping.reach) if kind in snapping.to else None
-        if place is not None:
-            yield _mark(kind, place)
-
-
-def _crossings(point: Point, targets: Targets, snapping: Snapping) -> Iterator[Snap]:
-    if "crossing" in snapping.to:
-        for edge, other in combinations(_edges(point, targets, snapping), 2):
+    def crossings(self) -> Iterator[Snap]:
+        for edge, other in combinations(self.edges(), 2) if "crossing" in self.how.to else ():
             place = other.crossing(edge)
             if place is not None:
                 yield _mark("crossing", place)
 
-
-def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    lines = []
-    if "angle" in snapping.to and origin is not None and math.dist(point, origin) > snapping.reach:
-        degrees = snapping.angle * round(bearing(origin, point) / snapping.angle)
-        words = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
-        lines.append(_Line("angle", origin, cos_sin(degrees), (origin,), words))
-    if "aligned" in snapping.to:
-        for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))):
-            mark = targets.in_line(point, axis, snapping.reach, _HORIZON * snapping.reach)
+    def on_lines(self) -> Iterator[Snap]:
+        lines, reach, origin = list[_Line](), self.how.reach, self.origin
+        if "angle" in self.how.to and origin is not None and math.dist(self.point, origin) > reach:
+            degrees = self.how.angle * round(bearing(origin, self.point) / self.how.angle)
+            words = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
+            lines.append(_Line("angle", origin, cos_sin(degrees), (origin,), words))
+        for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))) if "aligned" in self.how.to else ():
+            mark = self.targets.in_line(self.point, axis, reach, _HORIZON * reach)
             if mark is not None:
                 lines.append(_Line("aligned", mark, direction, (mark,), "in line"))
-    if "edge" in snapping.to:
-        lines += list(_edges(point, targets, snapping))[:4]
-    for k, line in enumerate(lines):
-        for other in lines[:k]:
-            # where two edges cross is a matter of its own
-            both_edges = line.kind == other.kind == "edge"
-            place = None if both_edges else line.crossing(other)
+        lines += islice(self.edges(), 4) if "edge" in self.how.to else ()
+        for k, line in enumerate(lines):
+            for other in lines[:k]:
+                # where two edges cross is a matter of its own
+                both_edges = line.kind == other.kind == "edge"
+                place = None if both_edges else line.crossing(other)
+                if place is not None:
+                    yield Snap(place, (other.shown(place), line.shown(place)))
+            foot = line.foot(self.point)
+            place = line.grid_place(foot, self.how.grid) if "grid" in self.how.to else None
             if place is not None:
-                yield Snap(place, (other.shown(place), line.shown(place)))
-        foot = line.foot(point)
-        place = line.grid_place(foot, snapping.grid) if "grid" in snapping.to else None
-        if place is not None:
-            yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
-        yield Snap(foot, (line.shown(foot),))
+                yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
+            yield Snap(foot, (line.shown(foot),))
+
+    def on_grid(self) -> Iterator[Snap]:
+        if "grid" in self.how.to and self.how.grid > 0.0:
+            x, y = (_multiple(value, self.how.grid) for value in self.point)
+            for place in ((x, y), (x, self.point[1]), (self.point[0], y)):
+                yield _mark("grid", place)
+                if math.dist(place, self.point) <= self.how.reach:
+                    return
+
+    def edges(self) -> Iterator[_Line]:
+        for a, b in self.targets.edges_near(self.point, self.how.reach):
+            length = math.dist(a, b)
+            if length > 0.0:
+                direction = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+                yield _Line("edge", a, direction, (a, b), "edge", length)
 
 
-def _on_grid(point: Point, snapping: Snapping) -> Iterator[Snap]:
-    if "grid" in snapping.to and snapping.grid > 0.0:
-        x, y = (_multiple(value, snapping.grid) for value in point)
-        for place in ((x, y), (x, point[1]), (point[0], y)):
-            yield _mark("grid", place)
-            if math.dist(place, point) <= snapping.reach:
-                return
-
-
-def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line]:
-    starts, ends = targets.edges_near(point, snapping.reach)
-    for (ax, ay), (bx, by) in zip(starts.tolist(), ends.tolist(), strict=True):
-        length = math.hypot(bx - ax, by - ay)
-        if length > 0.0:
-            direction = (bx - ax) / length, (by - ay) / length
-            yield _Line("edge", (ax, ay), direction, ((ax, ay), (bx, by)), "edge", length)
+def _mark(kind: Kind, place: Point) -> Snap:
+    return Snap(place, (Guide(kind, (place,), "middle of an edge" if kind == "middle" else kind),))
 
 
 def _multiple(value: float, step: float) -> float:
