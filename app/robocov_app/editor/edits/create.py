@@ -89,7 +89,6 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    """Return a name as maps can have it."""
     name = _encodable(" ".join(name.split()))
     if len(name) > _LONGEST_NAME:
         raise MapError(f"a name has at most {_LONGEST_NAME} characters")
@@ -99,7 +98,6 @@ def label_of(name: str) -> str:
 
 
 def text_of(text: str, what: str) -> str:
-    """Return a note or a description as maps can have it."""
     if len(text) > _LONGEST_TEXT:
         raise MapError(f"{what} has at most {_LONGEST_TEXT} characters")
     return _encodable(text.strip())
@@ -124,7 +122,6 @@ def _radius(radius: float, what: str) -> float:
 
 
 def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
-    """Return the topmost wall within `reach` metres of a point."""
     keys = obstacles_at(sketch, point, reach)
     return next((key for key in keys if isinstance(sketch.item(key).shape, env.WallObstacle)), None)
 

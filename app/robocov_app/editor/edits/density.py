@@ -69,7 +69,7 @@ def removed(sketch: Sketch, number: int) -> Change:
     """Take a feature away; with the last one the density goes."""
     words = f"{_name(_feature(sketch, number))} taken away"
     kept = [each for k, each in enumerate(features_of(sketch)) if k != number]
-    return _put(sketch, kept, words) if kept else _with(sketch, None, words)
+    return _put(sketch, kept, words) if kept else replace(density_removed(sketch), words=words)
 
 
 def moved(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
@@ -113,7 +113,7 @@ def floor_set(sketch: Sketch, floor: float) -> Change:
 def density_removed(sketch: Sketch) -> Change:
     if sketch.density is None:
         raise MapError("every place counts the same already")
-    return _with(sketch, None, "density taken away")
+    return Change(replace(sketch, density=None), Selection(), "density taken away")
 
 
 def weight_of(text: str) -> float:
@@ -156,11 +156,8 @@ def _put(sketch: Sketch, features: Sequence[Feature], words: str, base: float | 
     areas = tuple(each for each in features if isinstance(each, WeightedArea))
     if areas and not max(base, *(area.weight for area in areas)) > 0.0:
         raise MapError("some place must have a weight above 0")
-    return _with(sketch, WeightedPolygons(areas, base) if areas else Gaussians(peaks, base), words)
-
-
-def _with(sketch: Sketch, density: Density | None, words: str) -> Change:
-    return Change(replace(sketch, density=density), Selection(), words)
+    after = replace(sketch, density=WeightedPolygons(areas, base) if areas else Gaussians(peaks, base))
+    return Change(after, Selection(), words)
 
 
 def _changed(sketch: Sketch, number: int, feature: Feature, words: str) -> Change:

@@ -41,14 +41,12 @@ _SPARE = 1e-3  # metres by which a widened gap is wider than a robot
 
 
 def fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
-    """Return the change that mends a problem for robots of a radius, m; None where there is none."""
     with suppress(MapError):
         return _fixed(sketch, problem, radius)
     return None
 
 
 def unreachable_filled(sketch: Sketch, radius: float) -> Change:
-    """Fill all places that robots cannot reach from the largest part of the free space."""
     free = examined(sketch, radius)[1]
     reached, untouched = reach_of(free, radius)
     if not reached:

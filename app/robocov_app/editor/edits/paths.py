@@ -92,7 +92,6 @@ def speed_of(text: str) -> float:
 
 
 def way_point_at(path: ObstaclePath, point: Point, reach: float) -> int | None:
-    """Return the nearest way point within `reach` metres of a point."""
     points = as_array(path.points)
     return _nearest(nearest_on(points, points, point)[1], reach)
 

@@ -68,7 +68,6 @@ def ungrouped(sketch: Sketch, selection: Selection) -> Change:
 
 
 def locked(sketch: Sketch, selection: Selection) -> Change:
-    """Lock obstacles: the mouse cannot take them."""
     change = _marked(sketch, selection, "locked", locked=True)
     return replace(change, selection=replace(selection, items=frozenset()))
 
@@ -99,7 +98,6 @@ def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | boo
 
 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
-    """Change the map's name, its description, or both."""
     after, words = sketch, "map described"
     if name is not None:
         name = label_of(name)
@@ -123,7 +121,6 @@ def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Give the selected circles and discs another radius, m."""
     if not SMALLEST <= radius <= LARGEST:
         raise MapError(f"a radius of at least {1000 * SMALLEST:g} mm was wanted")
     things = {owner: sketch.thing(owner) for owner in selection.owners}
@@ -150,7 +147,6 @@ def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
 
 
 def start_first(sketch: Sketch, name: str) -> Change:
-    """Make a start the map's default: the first."""
     if name not in dict(sketch.starts):
         raise MapError(f"there is no start “{one_line(name)}”")
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
@@ -183,7 +179,6 @@ def made_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def underlaid(sketch: Sketch, background: Background | None) -> Change:
-    """Put a picture under the map, change it, or take it away."""
     words = "picture laid under" if sketch.background is None else "picture changed"
     words = "picture taken away" if background is None else words
     return Change(replace(sketch, background=background), Selection(), words)

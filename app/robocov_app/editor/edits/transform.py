@@ -174,7 +174,6 @@ def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
-    """Copy the selected obstacles and starts, the copies moved by (dx, dy) m."""
     whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
     if not whole:
         raise MapError("select obstacles or starts to copy")

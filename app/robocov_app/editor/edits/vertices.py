@@ -210,7 +210,6 @@ def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
 
 
 def split(sketch: Sketch, vertex: Vertex) -> Change:
-    """Cut a wall in two at one of its inner vertices; both are selected then."""
     wall = _wall(sketch, vertex)
     if not 0 < vertex.index < len(wall.points) - 1:
         raise MapError("a wall is cut at a vertex between its ends: insert one first")
@@ -299,7 +298,6 @@ def _redrawn(
 
 
 def _simpler(rings: tuple[Ring, ...], tolerance: float, closed: bool) -> tuple[Ring, ...]:
-    """Return the rings of one thing with fewer vertices; the vertices that stay are the same."""
 
     def is_sound(rings: tuple[Ring, ...]) -> bool:
         return not closed or (min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid))

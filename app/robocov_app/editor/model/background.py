@@ -188,7 +188,6 @@ def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
 
 
 def _obstacle_of(entry: Mapping[str, Any], names: Sequence[str | None]) -> int | None:
-    """Return the place of the obstacle that an entry is about; None if it is gone."""
     k, name = entry["obstacle"], entry.get("name")
     there = 0 <= k < len(names)
     if not (there and names[k] == name) and name is not None and names.count(name) == 1:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from hashlib import sha256
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -62,7 +63,6 @@ class History:
         return self._go_to(self._undone[-1].before)
 
     def redo(self) -> Change | None:
-        """Do again what was undone last; None if there is nothing."""
         if not self._undone:
             return None
         self._done.append(self._undone.pop())
@@ -127,7 +127,6 @@ class Autosave:
     disk: OnDisk | None  # what the file was like when it was read or written last
 
     def sketch(self) -> Sketch:
-        """Return the map; MapError when it cannot be read any more."""
         return sketch_of(autosave.read_record(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def words(self, now: datetime | None = None) -> str:
@@ -146,7 +145,6 @@ def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
 
 
 def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
-    """Return the maps that editors left behind which live no more, the newest first."""
     return autosave.recoverable(folder, KIND, _autosave)
 
 
@@ -194,7 +192,6 @@ class OnDisk:
 
 
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
-    """Return the sketch in a map file, which may be a draft, and what the file was like."""
     path = path.absolute()
     # the stamp of before: what changes while it is read is noticed at the next look
     stamp = _stamp(path)
@@ -204,8 +201,7 @@ def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
 
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
     """Write a file whole or not at all; ChangedError, unless `over`, when it is not as it was `before`."""
-    path = path.absolute()
-    text = sketch_text(sketch).encode()
+    path, text = path.absolute(), sketch_text(sketch).encode()
     writable(path)
     ours = before if before is not None and before.path == path else None
     if not over and ours is None and _stamp(path) is not None:
@@ -221,10 +217,8 @@ def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, ov
 def state_of(before: OnDisk) -> State:
     """Return whether a file is still as it was, quickly; one that was merely touched is the same."""
     stamp = _stamp(before.path)
-    if stamp is None:
-        return "gone"
-    if stamp == before.stamp:
-        return "same"
+    if stamp in (None, before.stamp):
+        return "same" if stamp else "gone"
     try:
         content = read_bytes(before.path)
     except MapError:
@@ -233,11 +227,9 @@ def state_of(before: OnDisk) -> State:
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
-        status = path.stat()
-    except (OSError, ValueError):
-        return None
-    return status.st_size, status.st_mtime_ns
+    with suppress(OSError, ValueError):
+        return (status := path.stat()).st_size, status.st_mtime_ns
+    return None
 
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
@@ -263,11 +255,10 @@ class Document:
         self.history = History(sketch, saved=saved)
         self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
         self.state: State = "same"
+        self._looked, self._over = 0.0, False
         self._autosaver = Autosaver(drafts, KIND, path, resumed)
         self.flush, self.close = self._autosaver.flush, self._autosaver.close
         self._kept: Sketch | None = sketch if saved else None
-        self._looked = 0.0
-        self._over = False
         self.keep()
 
     @classmethod
@@ -284,10 +275,8 @@ class Document:
         return cls(sketch, drafts, path.resolve(), disk)
 
     @classmethod
-    def recovered(cls, autosave: Autosave, drafts: Path | None) -> Document:
-        return cls(
-            autosave.sketch(), drafts, autosave.path, autosave.disk, resumed=autosave.folder, saved=False
-        )
+    def recovered(cls, kept: Autosave, drafts: Path | None) -> Document:
+        return cls(kept.sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
 
     @property
     def unsaved(self) -> bool:
@@ -302,13 +291,10 @@ class Document:
             return self.path
         stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
         stem = "".join(char for char in stem if char.isalnum() or char in "-_.") or "map"
-        target, k = folder / f"{stem}{SUFFIX}", 1
-        while target.exists():
-            target, k = folder / f"{stem}-{k}{SUFFIX}", k + 1
-        return target
+        names = chain([stem], (f"{stem}-{k}" for k in count(1)))
+        return next(path for name in names if not (path := folder / f"{name}{SUFFIX}").exists())
 
     def spoils(self, path: Path) -> bool:
-        """Return whether saving there would replace a valid map by one that cannot run."""
         with suppress(MapError):
             load_map(_with_suffix(path))
             try:
@@ -332,19 +318,14 @@ class Document:
         return f"saved: {path}"
 
     def keep(self) -> None:
-        """Keep aside what is not saved, if it is not what was kept last."""
-        sketch = self.history.sketch
-        if self._kept is sketch:
-            return
-        self._kept = sketch
-        if self.unsaved:
-            self._autosaver.keep(partial(content, sketch, self.disk))
-        else:
+        before, self._kept = self._kept, self.history.sketch
+        if before is not self._kept and self.unsaved:
+            self._autosaver.keep(partial(content, self._kept, self.disk))
+        elif before is not self._kept:
             self._autosaver.settle(self.path)
 
     @property
     def trouble(self) -> str:
-        """Why nothing is kept aside, in words; empty if it is."""
         return self._autosaver.trouble
 
     def look(self, now: float) -> State:
@@ -366,7 +347,6 @@ class Document:
         self._settle()
 
     def keep_mine(self) -> None:
-        """Take no notice of what is on the disk: saving replaces it."""
         self._over = True
 
     def _settle(self) -> None:
@@ -378,10 +358,9 @@ class Document:
 
 def is_bundled(path: Path) -> bool:
     """Return whether a file is one of the maps that come with robocov; what cannot be a file is none."""
-    try:
+    with suppress(OSError, ValueError, RuntimeError):
         return path.resolve() in {each.resolve() for each in bundled_maps().values()}
-    except (OSError, ValueError, RuntimeError):
-        return False
+    return False
 
 
 def _with_suffix(path: Path) -> Path:

@@ -29,13 +29,11 @@ def tenths(length: float) -> float:
 
 
 def rounded(point: Iterable[float]) -> Point:
-    """Return a point to the tenth of a millimetre, without minus zeros."""
     x, y = point
     return tenths(x), tenths(y)
 
 
 def as_array(points: Sequence[Point] | Array) -> Array:
-    """Return points, also none, as an array of shape (n, 2)."""
     return np.asarray(points, dtype=float).reshape(-1, 2)
 
 
@@ -102,7 +100,6 @@ def middle_of(box: Box) -> Point:
 
 
 def box_around(boxes: Iterable[Box]) -> Box:
-    """Return the box around boxes, one at least."""
     low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
     return min(low_x), min(low_y), max(high_x), max(high_y)
 

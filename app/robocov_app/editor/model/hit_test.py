@@ -92,7 +92,6 @@ def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Sele
 
 
 def vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
-    """Return the vertices of some things that lie in the box with two opposite corners, m."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     found = [
         Vertex(owner, ring, k)

@@ -133,7 +133,6 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
 def _cut_off(
     reached: tuple[BaseGeometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
 ) -> Iterator[Problem]:
-    """Warn of places that are out of reach from the largest part, because of gaps that are too narrow."""
     if not free.is_empty and not reached:
         yield Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)
     elif len(reached) > sum(part.area >= np.pi * radius**2 for part in free.geoms):

@@ -121,7 +121,6 @@ class _Reader:
         return self.built(env.ObstaclePath, value, path)
 
     def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
-        """Return what an object says, of the class of its kind."""
         wanted = f"one of {', '.join(classes)}"
         if "kind" not in self.typed(dict, value, path, f"an object whose kind is {wanted}"):
             self.refuse((*path, "kind"), "missing, but it was wanted")

@@ -46,7 +46,6 @@ class Selection:
 
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
-        """Return the selection of whole things: keys, `BOUNDARY`, names of starts."""
         return cls(
             items=frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY),
             starts=frozenset(each for each in owners if isinstance(each, str)),
@@ -140,7 +139,6 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], 
 
 
 def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
-    """Return the vertices of something and where they are, m."""
     return tuple(
         (Vertex(owner, ring, index), point)
         for ring, points in enumerate(sketch.ring_points(owner))

@@ -46,7 +46,6 @@ class Item:
 
     @property
     def takeable(self) -> bool:
-        """Whether the mouse can take it."""
         return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -124,7 +123,6 @@ class Sketch:
 
     @property
     def owners(self) -> tuple[Owner, ...]:
-        """All that may have vertices: the boundary, obstacles, starts."""
         return BOUNDARY, *self.places, *dict(self.starts)
 
     def display_name(self, owner: Owner) -> str:
@@ -171,7 +169,6 @@ class Sketch:
 
     @cached_property
     def places(self) -> Mapping[int, int]:
-        """Index in `obstacles` of each key."""
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
@@ -205,11 +202,9 @@ class Sketch:
         return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
 
     def with_thing(self, owner: Owner, thing: Any) -> Sketch:
-        """Return the sketch with another obstacle or start in place of one."""
         return self.with_start(owner, thing) if isinstance(owner, str) else self.with_shapes({owner: thing})
 
     def without(self, owners: Iterable[Owner]) -> Sketch:
-        """Return the sketch without some obstacles and starts."""
         gone = frozenset(owners)
         obstacles = tuple(item for item in self.obstacles if item.key not in gone)
         return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
@@ -253,7 +248,6 @@ def sketch_text(sketch: Sketch) -> str:
 
 
 def kind_and_name(shape: Obstacle) -> str:
-    """Return what people call an obstacle: "wall", "polygon “desk”"."""
     kind = KINDS[type(shape)]
     return f"{kind} “{shape.name}”" if shape.name else kind
 

@@ -104,7 +104,6 @@ def place_words(x: float, y: float) -> str:
 
 
 def _faults(sketch: Sketch) -> Iterator[Problem]:
-    """Yield what is wrong with the map as a whole, and its parts one by one."""
     for words in _label_faults(sketch.name):
         yield Problem(f"the map {words}", None)
     if len(sketch.description) > _LONGEST_TEXT:
@@ -162,7 +161,6 @@ def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> 
 
 
 def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
-    """Yield what is wrong with a closed outline, which messages call `what`."""
     points, far, count = as_array(ring), list(_far_faults(ring)), len(set(ring))
     if far or count < 3:
         corners = ("no corners", "one corner", "two corners", "")[min(count, 3)]
@@ -366,7 +364,6 @@ def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    """Warn of parts of the free space that nothing leads to from the largest."""
     rest = list(free.geoms)[1:]
     slivers = [part for part in rest if part.area < math.pi * radius * radius]
     for part in rest[: len(rest) - len(slivers)]:  # the largest first

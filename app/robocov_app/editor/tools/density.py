@@ -20,7 +20,6 @@ class DensityTool(Tool):
     """Adds hot spots, moves, sizes and weighs them, and takes them away; areas where a map has those."""
 
     name = "density"
-    title = "Density"
     hint = "drag from a hot spot's middle outwards; drag middles and rims; click a middle, type its weight"
 
     def __init__(self) -> None:

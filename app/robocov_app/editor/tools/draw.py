@@ -121,7 +121,6 @@ class PolygonTool(DrawTool):
     """Draws an obstacle with corners."""
 
     name = "polygon"
-    title = "Polygon"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     least, closes = 3, True
     make = staticmethod(create.polygon_drawn)
@@ -131,7 +130,6 @@ class WallTool(DrawTool):
     """Draws a poly-line that is some width thick."""
 
     name = "wall"
-    title = "Wall"
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
     drags = True
 
@@ -149,7 +147,6 @@ class MeasureTool(DrawTool):
     """Measures along a line; what was measured stays until something else is."""
 
     name = "measure"
-    title = "Measure"
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
 
@@ -204,7 +201,6 @@ class BoundaryTool(DrawTool):
     """Draws the outer boundary: a rectangle by dragging, anything else corner by corner."""
 
     name = "boundary"
-    title = "Boundary"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     least, closes, drags = 3, True, True
     make = staticmethod(create.boundary_drawn)
@@ -227,7 +223,6 @@ class RectangleTool(DrawTool):
     """Draws a rectangle from corner to corner; with Shift a square."""
 
     name = "rectangle"
-    title = "Rectangle"
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
 
@@ -258,7 +253,6 @@ class CircleTool(DrawTool):
     """Draws a round pillar from its middle."""
 
     name = "circle"
-    title = "Circle"
     hint = "drag from the middle to the rim, or click both; type the radius for metres"
     most, drags = 2, True
 
@@ -294,7 +288,6 @@ class DoorTool(Tool):
     """Opens a door in a wall; the pieces stay walls."""
 
     name = "door"
-    title = "Door"
     hint = "click a wall where its door is to be, or drag along it; type the door's width in metres"
     begins_typed = True
 

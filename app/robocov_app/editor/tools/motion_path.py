@@ -14,7 +14,6 @@ class MotionPathTool(Tool):
     """Gives the selected obstacle a path, and changes it."""
 
     name = "path"
-    title = "Path"
     hint = "click an obstacle, then where it goes; drag way points, Backspace takes one; type its speed"
 
     def __init__(self) -> None:
@@ -133,7 +132,6 @@ class MotionPathTool(Tool):
 
 
 def _led(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
-    """Return the obstacle that is led, the one that is selected, and its path."""
     chosen = context.selection.within(context.sketch)
     if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
         return None, None

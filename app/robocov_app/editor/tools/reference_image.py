@@ -15,7 +15,6 @@ class ReferenceImageTool(Tool):
     """Scales, levels and moves the picture."""
 
     name = "picture"
-    title = "Picture"
     hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
     snaps = False
 

@@ -266,7 +266,6 @@ class SelectTool(Tool):
     """Selects, and drags what is selected: whole, by its vertices, or by the box around it."""
 
     name = "select"
-    title = "Select"
     hint = "click or drag a box; drag to move, Alt-drag to copy; double click on an edge inserts a vertex"
     snaps = False
 
@@ -373,7 +372,6 @@ class SelectTool(Tool):
         drag.ended(context)
 
     def cancel(self, context: Workspace) -> bool:
-        """Give up what is dragged; then select nothing."""
         had = bool(self.drag or context.selection)
         if self.drag is not None:
             self.drag, self._gone, self.guides = None, True, ()
@@ -407,7 +405,6 @@ class PanTool(Tool):
     """Moves the view; the window does it, since cameras are its own."""
 
     name = "pan"
-    title = "Pan"
     hint = "drag the sheet; the right button does so with every tool, and Space while it is held down"
     snaps = False
     takes_numbers = False

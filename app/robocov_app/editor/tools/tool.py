@@ -55,7 +55,6 @@ def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> Box | None:
 
 
 def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
-    """Return all handles, those that are taken first last."""
     found: list[Handle] = []
     frame = frame_of(sketch, selection, pixel)
     if frame is not None:
@@ -157,7 +156,6 @@ class Workspace:
         return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
 
     def snapped(self, raw: Point, reach: float, origin: Point | None = None, more: Ring = ()) -> Snap:
-        """Return where a place means, whatever tool is chosen."""
         targets = self.snapper.targets(self.sketch, (), more)
         return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
 
@@ -183,7 +181,6 @@ class Tool:
     """A tool that does nothing; the others are like it."""
 
     name = ""
-    title = ""
     hint = ""  # what to do next
     snaps = True  # whether the point that it gets has snapped to something
     takes_numbers = True  # whether numbers can be typed while it is `busy`
@@ -194,6 +191,10 @@ class Tool:
         self.begun: PointerEvent | None = None  # where the button was pressed that is held down
         self.at: Point = (0.0, 0.0)  # m; where the cursor is
         self.change: Change | None = None  # what letting go of the mouse would make
+
+    @property
+    def title(self) -> str:
+        return self.name.capitalize()
 
     @property
     def busy(self) -> bool:
@@ -214,11 +215,9 @@ class Tool:
         self.begun, self.change = event, None
 
     def twice(self, context: Workspace, event: PointerEvent) -> None:
-        """Take the second press of a double click."""
         self.press(context, event)
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        """Take a move of the mouse, pressed or not."""
         self.at = event.point
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
