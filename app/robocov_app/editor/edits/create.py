@@ -1,7 +1,7 @@
 """Edits that draw: obstacles, the boundary, starts, and doors in walls, which stay walls."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,14 +12,13 @@ from shapely.ops import substring
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import LARGEST, LONGEST_LABEL, SMALLEST
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Sketch, kind_and_name
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
-_LONGEST_NAME = 100
 _LONGEST_TEXT = 10_000
 
 
@@ -79,6 +78,18 @@ def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     return Change(sketch.with_start(name, spec), Selection.of(name), f"start “{name}” added")
 
 
+def added(
+    sketch: Sketch, shapes: Iterable[tuple[Obstacle, str]], starts: Iterable[tuple[str, StartSpec]]
+) -> tuple[Sketch, Selection]:
+    """Return the sketch with more obstacles, with notes, and starts, under free names; and what they are."""
+    after, keys = sketch.added(shapes)
+    names = []
+    for name, spec in starts:
+        names.append(free_name(after, name or "start"))
+        after = after.with_start(names[-1], spec)
+    return after, Selection.of(*keys, *names)
+
+
 def free_name(sketch: Sketch, name: str) -> str:
     """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
     taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
@@ -90,8 +101,8 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 def label_of(name: str) -> str:
     name = _encodable(" ".join(name.split()))
-    if len(name) > _LONGEST_NAME:
-        raise MapError(f"a name has at most {_LONGEST_NAME} characters")
+    if len(name) > LONGEST_LABEL:
+        raise MapError(f"a name has at most {LONGEST_LABEL} characters")
     if any(ord(char) < 32 or ord(char) == 127 for char in name):
         raise MapError("a name is text on one line")
     return name

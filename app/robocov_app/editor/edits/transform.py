@@ -12,11 +12,11 @@ import numpy as np
 import shapely
 
 from robocov import environment as env
-from robocov.density import Density, Gaussians, WeightedPolygons
+from robocov.density import Gaussians, WeightedPolygons
 from robocov.environment import Point, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.edits.create import free_name
+from robocov_app.editor.edits.create import added
 from robocov_app.editor.edits.vertices import with_places
 from robocov_app.editor.model import geometry
 from robocov_app.editor.model.background import turned
@@ -80,7 +80,7 @@ class Affine:
         return geometry.ring_near(np.column_stack(to))
 
     def thing(self, thing: Any) -> Any:
-        """Return where an obstacle, its path, a start or a feature of a density goes, field by field.
+        """Return where an obstacle, its path, a start, a density or one of its features goes, field by field.
 
         Stretched, circles become polygons, and walls keep their width; MapError for starts that are discs.
         """
@@ -99,6 +99,12 @@ class Affine:
                 (found[name],) = self.ring([value])
             elif name == "path" and value is not None:
                 found[name] = self.thing(value)
+            elif name in ("peaks", "areas"):
+                found[name] = tuple(map(self.thing, value))
+            elif name == "covariance" and value is not None:
+                matrix = np.array([[self.xx, self.xy], [self.yx, self.yy]])
+                (p, q), (_, r) = (matrix @ np.array(value) @ matrix.T).tolist()
+                found[name] = ((p, q), (q, r))
             elif name in ("width", "radius") and factor not in (None, 1.0):
                 found[name] = tenths(value * factor)
         return replace(thing, **found)
@@ -112,8 +118,7 @@ def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point |
     """Turn what is selected counter-clockwise, by default about the middle of its bounding box."""
     if not math.isfinite(degrees):
         raise MapError("an angle in degrees was wanted")
-    affine = Affine.turn(degrees, about or _middle(sketch, selection))
-    return _change(sketch, selection, affine, "turned")
+    return _change(sketch, selection, Affine.turn(degrees, about or _middle(sketch, selection)), "turned")
 
 
 def scaled(
@@ -123,32 +128,26 @@ def scaled(
     fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
         raise MapError("a factor that is not 0 was wanted")
-    affine = Affine.stretch(fx, fy, about or _middle(sketch, selection))
-    return _change(sketch, selection, affine, "scaled")
+    return _change(sketch, selection, Affine.stretch(fx, fy, about or _middle(sketch, selection)), "scaled")
 
 
 def resized(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
     """Scale so that the bounding box has a width and height, m (None: in proportion), lower left fixed."""
     low_x, low_y, high_x, high_y = _bounds(sketch, selection)
     wide, high = high_x - low_x, high_y - low_y
-    factors = []
     for wanted, there, name in ((width, wide, "width"), (height, high, "height")):
-        if wanted is None:
-            continue
-        if not SMALLEST <= wanted <= LARGEST:
+        if wanted is not None and not SMALLEST <= wanted <= LARGEST:
             raise MapError(f"a {name} from {1000 * SMALLEST:g} mm to {LARGEST / 1000:g} km was wanted")
-        if there < SMALLEST:
+        if wanted is not None and there < SMALLEST:
             raise MapError(f"it has no {name} that could be scaled")
-        factors.append(wanted / there)
-    if width is None or height is None:
-        if not factors:
-            raise MapError("a width or a height was wanted")
-        affine = Affine.stretch(factors[0], factors[0], (low_x, low_y))
-        return _change(sketch, selection, affine, "resized")
+    if width is None and height is None:
+        raise MapError("a width or a height was wanted")
+    fx, fy = (width or 0.0) / max(wide, SMALLEST), (height or 0.0) / max(high, SMALLEST)
     # walls keep their width, so that the box does not quite grow by the factor: go nearer step by step
-    fx, fy = factors
     for _ in range(20):
-        change = _change(sketch, selection, Affine.stretch(fx, fy, (low_x, low_y)), "resized")
+        change = _change(sketch, selection, Affine.stretch(fx or fy, fy or fx, (low_x, low_y)), "resized")
+        if width is None or height is None:
+            return change
         box = _bounds(change.sketch, change.selection)
         off = width - (box[2] - box[0]), height - (box[3] - box[1])
         if max(map(abs, off)) <= 2e-4:
@@ -177,8 +176,7 @@ def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float 
     whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
     if not whole:
         raise MapError("select obstacles or starts to copy")
-    after, copies = _copied(sketch, whole, Affine.shift(dx, dy))
-    return Change(after, copies, f"{whole.words(sketch)} duplicated")
+    return Change(*_copied(sketch, whole, Affine.shift(dx, dy)), f"{whole.words(sketch)} duplicated")
 
 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
@@ -217,8 +215,8 @@ def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
         raise MapError(f"select {'' if frame else 'two or more '}obstacles or starts to align")
     frame = frame or box_around(boxes.values())
     off = {owner: _level(frame, side) - _level(box, side) for owner, box in boxes.items()}
-    by = {owner: (d, 0.0) if side in _ALONG_X else (0.0, d) for owner, d in off.items()}
-    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
+    after = _each_moved(sketch, off, along_x=side in _ALONG_X)
+    return Change(after, selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
 
 
 def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
@@ -229,14 +227,14 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
     if len(boxes) < 3:
         raise MapError("select three or more obstacles or starts to distribute")
-    room = boxes[-1][1][a + 2] - boxes[0][1][a]
-    gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
-    by: dict[Owner, Point] = {}
-    low = boxes[0][1][a]
-    for owner, box in boxes:
-        by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
-        low += box[a + 2] - box[a] + gap
-    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
+    low, sizes = boxes[0][1][a], [box[a + 2] - box[a] for _, box in boxes]
+    gap = (boxes[-1][1][a + 2] - low - sum(sizes)) / (len(boxes) - 1)
+    off: dict[Owner, float] = {}
+    for (owner, box), size in zip(boxes, sizes, strict=True):
+        off[owner] = low - box[a]
+        low += size + gap
+    after = _each_moved(sketch, off, along_x=axis == "x")
+    return Change(after, selection, f"{Selection.of(*off).words(sketch)} distributed")
 
 
 def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
@@ -247,27 +245,14 @@ def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     affine = Affine.turn(degrees, a)
     everything = Selection.of(*sketch.owners).within(sketch)
     picture = None if sketch.background is None else turned(sketch.background, degrees, a)
-    density = _turned_density(sketch.density, affine)
-    after = replace(_placed(sketch, everything, affine), background=picture, density=density)
-    return Change(after, Selection(), f"map turned by {degrees:.2f}°")
-
-
-def _turned_density(density: Density | None, affine: Affine) -> Density | None:
-    if isinstance(density, WeightedPolygons):
-        return replace(density, areas=tuple(map(affine.thing, density.areas)))
-    if not isinstance(density, Gaussians):
-        if density is None or density.uniform:
-            return density
+    density = sketch.density
+    if isinstance(density, Gaussians | WeightedPolygons):
+        density = affine.thing(density)
+    elif density is not None and not density.uniform:
         what = f"a density that is a {density.kind} cannot be turned"
         raise MapError(f"{what}: “density none” takes it away first")
-    matrix = np.array([[affine.xx, affine.xy], [affine.yx, affine.yy]])
-    peaks = []
-    for peak in map(affine.thing, density.peaks):
-        if peak.covariance is not None:
-            (p, q), (_, r) = (matrix @ np.array(peak.covariance) @ matrix.T).tolist()
-            peak = replace(peak, covariance=((p, q), (q, r)))
-        peaks.append(peak)
-    return replace(density, peaks=tuple(peaks))
+    after = replace(_placed(sketch, everything, affine), background=picture, density=density)
+    return Change(after, Selection(), f"map turned by {degrees:.2f}°")
 
 
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
@@ -309,19 +294,14 @@ def _level(box: Box, side: Side) -> float:
 def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
     """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
     shapes = [(affine.thing(item.shape), item.note) for item in whole.items_in(sketch)]
-    after, keys = sketch.added(shapes)
-    names = []
-    for name, spec in sketch.starts:
-        if name in whole.starts:
-            names.append(free_name(after, name))
-            after = after.with_start(names[-1], affine.thing(spec))
-    return after, Selection.of(*keys, *names)
+    return added(sketch, shapes, [(n, affine.thing(spec)) for n, spec in sketch.starts if n in whole.starts])
 
 
-def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
-    for owner, shift in by.items():
-        if any(shift):
-            sketch = _placed(sketch, Selection.of(owner), Affine.shift(*shift))
+def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> Sketch:
+    for owner, off in by.items():
+        if off:
+            shift = Affine.shift(off, 0.0) if along_x else Affine.shift(0.0, off)
+            sketch = _placed(sketch, Selection.of(owner), shift)
     return sketch
 
 

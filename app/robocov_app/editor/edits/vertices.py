@@ -9,10 +9,13 @@ from typing import TypeAlias
 
 import numpy as np
 import shapely
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapely import LineString, Polygon
 
 from robocov import environment as env
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
@@ -333,30 +336,16 @@ def _straight(ring: Ring, degrees: float, closed: bool) -> Ring:
     edges = np.roll(points, -1, axis=0) - points
     if not closed:
         edges[-1] = np.nan
-    slope = math.tan(math.radians(degrees))
-    size = np.abs(edges)
-    moved = points.copy()
-    # level edges give their ends the same y, upright ones the same x
-    for axis, flat in ((1, size[:, 1] <= slope * size[:, 0]), (0, size[:, 0] <= slope * size[:, 1])):
-        for run in _runs(flat & (size.max(axis=1) > 0.0)):
-            values = points[run, axis]
-            moved[run, axis] = (values.min() + values.max()) / 2
+    slope, count = math.tan(math.radians(degrees)), len(points)
+    size, moved = np.abs(edges), points.copy()
+    # the ends of edges in a row that are level come to the same y, of upright ones to the same x
+    for axis in (1, 0):
+        flat = np.flatnonzero((size[:, axis] <= slope * size[:, 1 - axis]) & (size.max(axis=1) > 0.0))
+        if len(flat) < count:
+            row = coo_array((np.ones(len(flat)), (flat, (flat + 1) % count)), shape=(count, count))
+            _, run = connected_components(row, directed=False)
+            ends = [of(points[:, axis], run, run) for of in (ndimage.minimum, ndimage.maximum)]
+            moved[:, axis] = (ends[0] + ends[1]) / 2
     if closed and (len({tuple(p) for p in moved.tolist()}) < 3 or Polygon(moved).area == 0.0):
         return ring
     return ring_near(moved)
-
-
-def _runs(flat: BoolArray) -> list[list[int]]:
-    """Return the vertices of each run of edges of a ring that are flat, one after another."""
-    count = len(flat)
-    if flat.all():
-        return []
-    first = int(flat.argmin()) + 1
-    runs: list[list[int]] = []
-    for k in (np.arange(first, first + count) % count).tolist():
-        if not flat[k]:
-            continue
-        if not runs or runs[-1][-1] != k:
-            runs.append([k])
-        runs[-1].append((k + 1) % count)
-    return runs

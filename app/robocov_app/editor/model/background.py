@@ -161,8 +161,8 @@ def taken_apart(
                     marks.setdefault(k, {}).update((name, entry[name]) for name in kept if name in entry)
                 elif key == "notes":
                     rest[_LOST] = [*rest.get(_LOST, []), entry]
-        others = {key: value for key, value in extra.items() if key != home}
-        return marks, background, {**extra, home: rest} if rest else others
+        others = {**extra, home: rest}
+        return marks, background, {key: value for key, value in others.items() if key != home or rest}
     return {}, None, dict(extra)
 
 

@@ -10,7 +10,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import DiscStart, Point, PointsStart
 from robocov_app.editor.model.geometry import as_array, nearest_on
 from robocov_app.editor.model.selection import Edge, Selection, Vertex
-from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
 def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
@@ -26,14 +26,11 @@ def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
                 discs.append(name)
         elif isinstance(spec, PointsStart) and any(math.dist(point, at) <= reach for at in spec.positions):
             found.append(name)
-    near = [
-        k for k in sorted(_places_near(sketch, point, reach), reverse=True) if sketch.obstacles[k].takeable
-    ]
-    away = shapely.distance(sketch.geometries[near], shapely.Point(point)).tolist()
-    keys = [sketch.obstacles[k].key for k in near]
-    found += [key for key, distance in zip(keys, away, strict=True) if distance == 0.0]
+    near = [item for item in reversed(_items_near(sketch, point, reach)) if item.takeable]
+    gaps = [(shapely.distance(item.geometry, shapely.Point(point)), item.key) for item in near]
+    found += [key for gap, key in gaps if gap == 0.0]
     found += discs
-    found += [keys[k] for k in sorted(range(len(keys)), key=away.__getitem__) if 0.0 < away[k] <= reach]
+    found += [key for gap, key in sorted(gaps, key=lambda each: each[0]) if 0.0 < gap <= reach]
     if sketch.boundary is not None and edge_at(sketch, point, reach, [BOUNDARY]) is not None:
         found.append(BOUNDARY)
     return tuple(found)
@@ -48,17 +45,14 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
     best, nearest = reach, None
     wanted = list(owners)
     if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
-        near = {sketch.obstacles[k].key for k in _places_near(sketch, point, reach)}
+        near = {item.key for item in _items_near(sketch, point, reach)}
         wanted = [each for each in wanted if each in near or each not in sketch.places]
     for owner in wanted:
         for ring, points, closed in sketch.rings_of(owner):
-            starts = as_array(points)
-            ends = np.roll(starts, -1, axis=0)
-            if not closed:
-                starts, ends = starts[:-1], ends[:-1]
-            if not len(starts):
+            starts, count = as_array(points), len(points) - (not closed)
+            if count <= 0:
                 continue
-            feet, away = nearest_on(starts, ends, point)
+            feet, away = nearest_on(starts[:count], np.roll(starts, -1, axis=0)[:count], point)
             k = int(away.argmin())
             if away[k] <= best and (nearest is None or away[k] < best):
                 best = float(away[k])
@@ -107,7 +101,7 @@ def _inside(points: Sequence[Point] | Array, low: Array, high: Array) -> BoolArr
     return np.asarray(((at >= low) & (at <= high)).all(axis=1))
 
 
-def _places_near(sketch: Sketch, point: Point, reach: float) -> list[int]:
+def _items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
     x, y = point
-    near: list[int] = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach)).tolist()
-    return near
+    near = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
+    return [sketch.obstacles[k] for k in sorted(near.tolist())]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -9,8 +10,9 @@ from shapely import LineString, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
-from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
+from robocov.environment import SAGITTA, Gap, Point, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
+from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
@@ -107,9 +109,8 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     return counts
 
 
-def _middle(gap: Gap) -> tuple[float, float]:
-    (ax, ay), (bx, by) = gap.between
-    return (ax + bx) / 2, (ay + by) / 2
+def _middle(gap: Gap) -> Point:
+    return middle_of((*gap.between[0], *gap.between[1]))
 
 
 def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
@@ -145,12 +146,8 @@ def _polygons(geometry: BaseGeometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
 
 
-# beside the window, in a process that is told only what has changed
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Request to measure a sketch."""
+class Question(NamedTuple):
+    """Request to measure a sketch beside the window, in a process that is told only what has changed."""
 
     rest: Sketch  # without its obstacles
     order: tuple[int, ...]  # the keys of its obstacles

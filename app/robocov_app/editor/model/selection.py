@@ -23,12 +23,9 @@ class Vertex:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A place on an edge, `point` in m: from vertex `index` of a ring to the next."""
+class Edge(Vertex):
+    """A place on an edge, `point` in m: from a vertex of a ring to the next."""
 
-    of: Owner
-    ring: int
-    index: int
     point: Point
 
 

@@ -17,7 +17,7 @@ from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError, StartError, counted, listed
 from robocov.mapfile.check import check_rules
-from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
+from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.geometry import as_array
 from robocov_app.editor.model.selection import numbered_name
@@ -30,7 +30,6 @@ Kind: TypeAlias = Literal[
 """Kind of a problem, by which fixes are found: see `robocov_app.editor.edits.fixes`."""
 
 _FLAT = 1e-9  # an outline whose area is below this part of its width or height squared is a line
-_LONGEST_NAME = 100
 _LONGEST_TEXT = 10_000
 _MOST_PLACES = 20
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
@@ -121,8 +120,8 @@ def _faults(sketch: Sketch) -> Iterator[Problem]:
 def _label_faults(name: str) -> Iterator[str]:
     if not name:
         yield "has no name"
-    elif len(name) > _LONGEST_NAME:
-        yield f"has a name of {len(name)} characters: at most {_LONGEST_NAME} are possible"
+    elif len(name) > LONGEST_LABEL:
+        yield f"has a name of {len(name)} characters: at most {LONGEST_LABEL} are possible"
     elif _CONTROL.search(name):
         yield "has a name with line breaks or other control characters"
 
@@ -304,8 +303,19 @@ def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: 
 def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner | None]) -> Iterator[Problem]:
     """Yield what may be a mistake, but not of what is at fault already."""
     if BOUNDARY not in bad:
-        yield from _outside(sketch)
-    yield from _twice(sketch)
+        inside, shapes = Polygon(sketch.boundary), sketch.geometries
+        shapely.prepare(inside)
+        # what only touches it from outside does nothing either
+        outside = ~shapely.intersects(inside, shapes) | shapely.touches(inside, shapes)
+        for k in np.flatnonzero(outside & ~shapely.is_empty(shapes)).tolist():
+            yield Problem(" lies outside the boundary", shapes[k], sketch.obstacles[k].key, False, "outside")
+    below: set[object] = set()
+    for item in sketch.obstacles:
+        form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
+        if form in below and not item.geometry.is_empty:
+            words = " lies on another one that is just the same"
+            yield Problem(words, item.geometry, item.key, False, "twice")
+        below.add(form)
     yield from _double_vertices(sketch)
     yield from _paths(sketch, bad)
     if free.is_empty:
@@ -316,16 +326,6 @@ def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner 
             yield from _tight_places(name, spec, free, radius)
         elif name not in bad and radius > DEFAULT_RADIUS:
             yield from _no_room(name, spec, free, radius, grave=False)
-
-
-def _outside(sketch: Sketch) -> Iterator[Problem]:
-    """Warn of obstacles outside the boundary; what only touches it from there does nothing either."""
-    inside = Polygon(sketch.boundary)
-    shapely.prepare(inside)
-    outside = ~shapely.intersects(inside, sketch.geometries) | shapely.touches(inside, sketch.geometries)
-    for k in np.flatnonzero(outside & ~shapely.is_empty(sketch.geometries)).tolist():
-        item = sketch.obstacles[k]
-        yield Problem(" lies outside the boundary", item.geometry, item.key, False, "outside")
 
 
 def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
@@ -341,16 +341,6 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         if names:
             where = shapely.union_all([*met.values(), beyond])
             yield Problem(f" moves through {listed(names)}", where, item.key, False)
-
-
-def _twice(sketch: Sketch) -> Iterator[Problem]:
-    below: set[object] = set()
-    for item in sketch.obstacles:
-        form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
-        if form in below and not item.geometry.is_empty:
-            words = " lies on another one that is just the same"
-            yield Problem(words, item.geometry, item.key, False, "twice")
-        below.add(form)
 
 
 def _double_vertices(sketch: Sketch) -> Iterator[Problem]:

@@ -255,9 +255,10 @@ class CircleTool(DrawTool):
     name = "circle"
     hint = "drag from the middle to the rim, or click both; type the radius for metres"
     most, drags = 2, True
+    make_round = staticmethod(create.circle_drawn)
 
     def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.circle_drawn(context.sketch, points[0], distance(*points))
+        return self.make_round(context.sketch, points[0], distance(*points))
 
     def end_for(self, text: str) -> Point:
         return self.points[0][0] + length_of(text), self.points[0][1]
@@ -274,9 +275,7 @@ class DiscTool(CircleTool):
     name = "disc"
     title = "Start disc"
     hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for metres"
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.disc_start_drawn(context.sketch, points[0], distance(*points))
+    make_round = staticmethod(create.disc_start_drawn)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)

@@ -28,38 +28,32 @@ _CURSORS |= {(-x, -y): shape for (x, y), shape in _CURSORS.items()}
 class Drag:
     """Something that is dragged: each move gives the change that letting go would make."""
 
-    def __init__(self) -> None:
+    def __init__(self, context: Workspace, moving: Selection) -> None:
+        self.context, self.moving = context, moving
         self.change: Change | None = None
         self.guides: tuple[Guide, ...] = ()
         self.words = ""  # beside the cursor
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         """Follow the mouse."""
 
-    def enter(self, context: Workspace, text: str) -> None:
+    def enter(self, text: str) -> None:
         raise MapError(f"“{text}”: there is nothing to type here")
 
     def preview(self) -> Preview:
         return Preview(words=self.words)
 
-    def ended(self, context: Workspace) -> None:
+    def ended(self) -> None:
         if self.change is not None:
-            context.change(self.change)
+            self.context.change(self.change)
 
-    def snapped_to(
-        self,
-        context: Workspace,
-        event: PointerEvent,
-        to: Point,
-        dragged: Selection,
-        origin: Point | None = None,
-    ) -> Point:
+    def snapped_to(self, event: PointerEvent, to: Point, origin: Point | None = None) -> Point:
         """Return where a place snaps to anything but what is dragged, unless Ctrl is held down."""
-        self.guides, without = (), dragged.vertices or dragged.owners
-        targets = None if event.ctrl else context.snapper.targets(context.sketch, without)
+        self.guides, without = (), self.moving.vertices or self.moving.owners
+        targets = None if event.ctrl else self.context.snapper.targets(self.context.sketch, without)
         if targets is None:
             return to
-        snap = snapped(to, targets, context.snapping(event.reach), origin)
+        snap = snapped(to, targets, self.context.snapping(event.reach), origin)
         self.guides = snap.guides
         return snap.point
 
@@ -68,64 +62,63 @@ class Moving(Drag):
     """Moves whole things, or copies them; by an `offset`, m, where a change in each frame took too long."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
-        super().__init__()
-        self.moving, self._begun, self._at = selection, begun, begun
+        super().__init__(context, selection)
+        self._begun = self._at = begun
         points = [at for owner in selection.owners for _, at in points_of(context.sketch, owner)]
         self._points = points[:: max(1, len(points) // FEW_POINTS)]
         self.offset = (0.0, 0.0) if len(points) > MANY_POINTS else None
         self.copies = False
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         """Follow the mouse; with Alt copies move, with Shift at round angles, with Ctrl freely."""
         self.copies, self.guides = event.alt, ()
         to = geometry.at_round_angle(self._begun, event.raw) if event.shift else event.raw
         by = [to[0] - self._begun[0], to[1] - self._begun[1]]
         free = event.ctrl or event.shift
-        targets = None if free else context.snapper.targets(context.sketch, self.moving.owners)
+        targets = None if free else self.context.snapper.targets(self.context.sketch, self.moving.owners)
         if targets is not None:
-            snap = snapped_move(self._points, by[0], by[1], targets, context.snapping(event.reach))
+            snap = snapped_move(self._points, by[0], by[1], targets, self.context.snapping(event.reach))
             self.guides = snap.guides
             for axis in (0, 1):
                 alone = abs(snap.point[axis] - by[axis]) < SAME  # nothing else counts along this axis
                 by[axis] = snap.point[axis]
-                if alone and "grid" in context.snaps and self._points:
+                if alone and "grid" in self.context.snaps and self._points:
                     first = self._points[0][axis]
-                    by[axis] = context.grid * round((first + by[axis]) / context.grid) - first
-        self._move(context, *by)
+                    by[axis] = self.context.grid * round((first + by[axis]) / self.context.grid) - first
+        self._move(*by)
 
-    def _move(self, context: Workspace, dx: float, dy: float) -> None:
+    def _move(self, dx: float, dy: float) -> None:
         self._at = self._begun[0] + dx, self._begun[1] + dy
         if self.offset is None:
-            self.change = self._made(context, dx, dy)
+            self.change = self._made(dx, dy)
         else:
             self.offset = (dx, dy)
         far = geometry.length_words(math.hypot(dx, dy))
         self.words = f"Δx {dx + 0.0:.2f}  Δy {dy + 0.0:.2f}   {far}"
 
-    def _made(self, context: Workspace, dx: float, dy: float) -> Change | None:
+    def _made(self, dx: float, dy: float) -> Change | None:
         act = transform.duplicated if self.copies else transform.moved
-        return act(context.sketch, self.moving, dx, dy) if dx or dy else None
+        return act(self.context.sketch, self.moving, dx, dy) if dx or dy else None
 
-    def ended(self, context: Workspace) -> None:
+    def ended(self) -> None:
         if self.offset is not None:
-            self.change = self._made(context, *self.offset)
-        super().ended(context)
+            self.change = self._made(*self.offset)
+        super().ended()
 
-    def enter(self, context: Workspace, text: str) -> None:
+    def enter(self, text: str) -> None:
         """Move by a length towards the cursor, or by what was typed: ``0.5 -2`` or ``2<45``."""
         text = text.strip()
         two = len(text.split()) > 1 or "<" in text or ";" in text
         relative = f"@{text}" if two and text[0] not in "@+" else text
         to = next_point_of(relative, self._begun, self._at)
-        self._move(context, to[0] - self._begun[0], to[1] - self._begun[1])
+        self._move(to[0] - self._begun[0], to[1] - self._begun[1])
 
 
 class MovingVertices(Drag):
     """Moves single vertices: the one that was taken, and those that are selected with it."""
 
     def __init__(self, context: Workspace, taken: Vertex, selection: Selection) -> None:
-        super().__init__()
-        self._selection = Selection(vertices=selection.vertices | {taken})
+        super().__init__(context, Selection(vertices=selection.vertices | {taken}))
         self._begun = self._at = place_of(context.sketch, taken)
         # the vertex before it on its ring, or after a wall's first; None of circles and starts
         self._origin: Point | None = None
@@ -134,94 +127,90 @@ class MovingVertices(Drag):
                 first = taken.index == 0 and not closed
                 self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
         if event.shift and self._origin is not None:
             self.guides = ()
-            self._put(context, geometry.at_round_angle(self._origin, event.raw))
+            self._put(geometry.at_round_angle(self._origin, event.raw))
         else:
-            self._put(context, self.snapped_to(context, event, event.raw, self._selection, self._origin))
+            self._put(self.snapped_to(event, event.raw, self._origin))
 
-    def _put(self, context: Workspace, to: Point) -> None:
+    def _put(self, to: Point) -> None:
         self._at = to
         dx, dy = to[0] - self._begun[0], to[1] - self._begun[1]
-        self.change = vertices.moved(context.sketch, self._selection, dx, dy) if dx or dy else None
+        self.change = vertices.moved(self.context.sketch, self.moving, dx, dy) if dx or dy else None
         self.words = geometry.point_words(to)
         if self._origin is not None:
             self.words += f"   {geometry.bearing_words(self._origin, to)}"
 
-    def enter(self, context: Workspace, text: str) -> None:
-        self._put(context, next_point_of(text, self._origin or self._begun, self._at))
+    def enter(self, text: str) -> None:
+        self._put(next_point_of(text, self._origin or self._begun, self._at))
 
 
 class Turning(Drag):
     """Turns whole things about the middle of their box."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
-        super().__init__()
+        super().__init__(context, selection)
         self.about = geometry.middle_of(bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0))
-        self._selection, self._from = selection, geometry.bearing(self.about, begun)
+        self._from = geometry.bearing(self.about, begun)
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in steps, with Ctrl freely."""
         degrees = (geometry.bearing(self.about, event.raw) - self._from + 180.0) % 360.0 - 180.0
         if event.shift:
             degrees = geometry.ANGLE * round(degrees / geometry.ANGLE)
         elif not event.ctrl:
-            degrees = snapped_angle(degrees, context.snap_angle)
-        self._turn(context, degrees)
+            degrees = snapped_angle(degrees, self.context.snap_angle)
+        self._turn(degrees)
 
-    def _turn(self, context: Workspace, degrees: float) -> None:
+    def _turn(self, degrees: float) -> None:
         self.words = f"{degrees + 0.0:.1f}".removesuffix(".0") + "°"
-        turned = transform.rotated(context.sketch, self._selection, degrees, self.about) if degrees else None
-        self.change = turned
+        sketch = self.context.sketch
+        self.change = transform.rotated(sketch, self.moving, degrees, self.about) if degrees else None
 
-    def enter(self, context: Workspace, text: str) -> None:
-        self._turn(context, angle_of(text))
+    def enter(self, text: str) -> None:
+        self._turn(angle_of(text))
 
 
 class Scaling(Drag):
     """Scales whole things by a corner or a side of their box; the opposite one stays."""
 
     def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
-        super().__init__()
-        self._selection, self._side = selection, handle.side
+        super().__init__(context, selection)
+        self._side = handle.side
         self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
         self._taken = side_of(self._bounds, self._side)
         self._fixed = side_of(self._bounds, (-self._side[0], -self._side[1]))
         self._offset = handle.at[0] - self._taken[0], handle.at[1] - self._taken[1]
-        shapes = [context.sketch.item(key).shape for key in selection.items]
         # a circle that is stretched would be a circle no more
-        round_ones = bool(shapes) and all(isinstance(each, CircleObstacle) for each in shapes)
-        self._even = bool(selection.starts) or round_ones
+        shapes = {type(item.shape) for item in selection.items_in(context.sketch)}
+        self._even = bool(selection.starts) or shapes == {CircleObstacle}
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         """Follow the mouse; with Shift in proportion, with Alt about the middle, with Ctrl freely."""
         to = event.raw[0] - self._offset[0], event.raw[1] - self._offset[1]
-        to = self.snapped_to(context, event, to, self._selection)
+        to = self.snapped_to(event, to)
         about = geometry.middle_of(self._bounds) if event.alt else self._fixed
         factors = [1.0, 1.0]
         for k in (0, 1):
             if self._side[k] and abs(self._taken[k] - about[k]) > SAME:
                 factors[k] = (to[k] - about[k]) / (self._taken[k] - about[k])
         if event.shift or self._even:
-            whole = [factor for factor, side in zip(factors, self._side, strict=True) if side]
-            factors = 2 * [max(whole, key=lambda factor: abs(factor - 1.0))]
-        self._scale(context, factors[0], factors[1], about)
+            factors = 2 * [max(factors, key=lambda factor: abs(factor - 1.0))]
+        self._scale(factors[0], factors[1], about)
 
-    def _scale(self, context: Workspace, fx: float, fy: float, about: Point) -> None:
+    def _scale(self, fx: float, fy: float, about: Point) -> None:
         wide, high = self._bounds[2] - self._bounds[0], self._bounds[3] - self._bounds[1]
-        fx, fy = (
-            f if abs(f) * max(size, 1e-3) >= 1e-3 else 1e-3 / max(size, 1e-3)
-            for f, size in ((fx, wide), (fy, high))
-        )
+        least = [1e-3 / max(size, 1e-3) for size in (wide, high)]
+        fx, fy = (f if abs(f) >= low else low for f, low in zip((fx, fy), least, strict=True))
         same = abs(fx - 1.0) < 1e-12 and abs(fy - 1.0) < 1e-12
-        self.change = None if same else transform.scaled(context.sketch, self._selection, fx, fy, about)
+        self.change = None if same else transform.scaled(self.context.sketch, self.moving, fx, fy, about)
         factor = f"{100 * fx:.0f} %" if abs(fx - fy) < 1e-9 else f"{100 * fx:.0f} % x {100 * fy:.0f} %"
         sides = [geometry.length_words(abs(side)) for side in (wide * fx, high * fy)]
         self.words = f"{sides[0]} x {sides[1]}   {factor}"
 
-    def enter(self, context: Workspace, text: str) -> None:
+    def enter(self, text: str) -> None:
         axis = 0 if self._side[0] else 1
         now = self._bounds[2 + axis] - self._bounds[axis]
         factor = length_of(text, now=now) / now
@@ -229,24 +218,24 @@ class Scaling(Drag):
             raise MapError(f"“{text}”: a size above 0 was wanted")
         both = self._even or (self._side[0] and self._side[1])
         fx, fy = (factor if both or axis == k else 1.0 for k in (0, 1))
-        self._scale(context, fx, fy, self._fixed)
+        self._scale(fx, fy, self._fixed)
 
 
 class Box(Drag):
     """Selects what lies in a box; drawn to the left also what it touches."""
 
     def __init__(self, context: Workspace, begun: Point, *, adds: bool) -> None:
-        super().__init__()
+        super().__init__(context, Selection())
         self._begun = self._at = begun
         self._before = context.selection if adds else Selection()
         self._adds = adds
 
-    def to(self, context: Workspace, event: PointerEvent) -> None:
+    def to(self, event: PointerEvent) -> None:
         self._at = event.raw
 
-    def found(self, context: Workspace) -> Selection:
+    def found(self) -> Selection:
         """Return what is in the box: whole things, or vertices where it holds some that are shown."""
-        sketch, shown, preview = context.sketch, context.handled, self.preview()
+        sketch, shown, preview = self.context.sketch, self.context.handled, self.preview()
         inside = in_box(sketch, self._begun, self._at, touched=preview.touched).with_groups(sketch)
         if shown and not self._adds and not (inside.items | inside.starts) - set(shown):
             single = vertices_in_box(sketch, self._begun, self._at, shown)
@@ -254,9 +243,9 @@ class Box(Drag):
                 return single
         return inside
 
-    def ended(self, context: Workspace) -> None:
+    def ended(self) -> None:
         if self._begun != self._at:
-            context.select(self._before.plus(self.found(context)))
+            self.context.select(self._before.plus(self.found()))
 
     def preview(self) -> Preview:
         return Preview(box=(self._begun, self._at), touched=self._at[0] < self._begun[0])
@@ -315,7 +304,7 @@ class SelectTool(Tool):
             if self.drag is None and event.is_apart_from(self.begun.raw):
                 self.drag = self._begun(context, self.begun)
             if self.drag is not None:
-                self.drag.to(context, event)
+                self.drag.to(event)
                 self.guides = self.drag.guides
 
     def _begun(self, context: Workspace, pressed: PointerEvent) -> Drag:
@@ -337,8 +326,8 @@ class SelectTool(Tool):
         if self._gone or pressed is None:
             return
         if drag is not None:
-            drag.to(context, event)
-            drag.ended(context)
+            drag.to(event)
+            drag.ended()
         elif self._handle is None and not event.shift:
             found, chosen = _owners_at(context, pressed), context.selection.owners
             if not found:
@@ -367,9 +356,9 @@ class SelectTool(Tool):
         if (drag := self.drag) is None:
             super().enter(context, text)
             return
-        drag.enter(context, text)
+        drag.enter(text)
         self.drag, self._gone, self.guides = None, True, ()
-        drag.ended(context)
+        drag.ended()
 
     def cancel(self, context: Workspace) -> bool:
         had = bool(self.drag or context.selection)
