@@ -19,7 +19,7 @@ from robocov_app.editor.model.geometry import (
 )
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import in_words, place_words
-from robocov_app.editor.tools.tool import PointerEvent, Tool, constrained_point
+from robocov_app.editor.tools.tool import PointerEvent, Tool
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)
@@ -41,10 +41,10 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
 
 def test_shift_holds_the_angle_and_nothing_else_does() -> None:
     aim = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
-    assert constrained_point(aim, (0.0, 0.0)) == (3.0, 0.2)
+    assert aim.constrained((0.0, 0.0)) == (3.0, 0.2)
     shifted = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
-    assert constrained_point(shifted, (0.0, 0.0)) == (3.0, 0.0)
-    assert constrained_point(shifted, None) == (3.0, 0.2)
+    assert shifted.constrained((0.0, 0.0)) == (3.0, 0.0)
+    assert shifted.constrained(None) == (3.0, 0.2)
 
 
 def test_lengths_and_angles_are_told_as_people_write_them() -> None:

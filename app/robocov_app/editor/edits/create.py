@@ -54,8 +54,7 @@ def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
 
 def boundary_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     words = "boundary drawn" if sketch.boundary is None else "boundary drawn anew"
-    after = replace(sketch, boundary=_outline(points, "a boundary"))
-    return Change(after, Selection(boundary=True), words)
+    return Change(replace(sketch, boundary=_outline(points, "a boundary")), Selection(boundary=True), words)
 
 
 def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:

@@ -73,8 +73,7 @@ def removed(sketch: Sketch, number: int) -> Change:
 
 
 def moved(sketch: Sketch, number: int, dx: float, dy: float) -> Change:
-    feature = Affine.shift(dx, dy).thing(_feature(sketch, number))
-    return _changed(sketch, number, feature, "moved")
+    return _changed(sketch, number, Affine.shift(dx, dy).thing(_feature(sketch, number)), "moved")
 
 
 def peak_sized(sketch: Sketch, number: int, sigma: float) -> Change:

@@ -95,8 +95,7 @@ def _filled(sketch: Sketch, where: BaseGeometry) -> Change:
 def _beyond(free: MultiPolygon, largest: BaseGeometry, others: list[BaseGeometry]) -> BaseGeometry:
     """Return those parts of the free space that hold any of some places, without the largest part."""
     parts = shapely.get_parts(free - largest.buffer(SAGITTA))
-    wanted = shapely.union_all(others).buffer(-SAGITTA)
-    return shapely.union_all(parts[shapely.intersects(parts, wanted)])
+    return shapely.union_all(parts[shapely.intersects(parts, shapely.union_all(others).buffer(-SAGITTA))])
 
 
 def _start_moved(sketch: Sketch, name: str, where: BaseGeometry, radius: float) -> Change | None:

@@ -97,8 +97,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     points, ring_of = shapely.get_coordinates(rings, return_index=True)
     is_edge = ring_of[1:] == ring_of[:-1]
     ring = ring_of[1:][is_edge]
-    middles = ((points[1:] + points[:-1]) / 2)[is_edge]
-    off = ~shapely.dwithin(walls, shapely.points(middles), _TOUCHING)
+    off = ~shapely.dwithin(walls, shapely.points(((points[1:] + points[:-1]) / 2)[is_edge]), _TOUCHING)
     first = np.searchsorted(ring, np.arange(len(rings)))
     before = np.arange(len(ring)) - 1
     before[first] = np.append(first[1:], len(ring)) - 1

@@ -50,8 +50,7 @@ class Item:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived again."""
-        state = {name: getattr(self, name) for name in ("key", *MARKS)}
-        return state | {"shape": replace(self.shape)}
+        return {name: getattr(self, name) for name in ("key", *MARKS)} | {"shape": replace(self.shape)}
 
 
 @dataclass(frozen=True)

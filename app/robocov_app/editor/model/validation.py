@@ -221,8 +221,7 @@ def _drawn(points: Array) -> BaseGeometry | None:
 
 def _meetings(points: Array, polygon: Polygon) -> list[Point]:
     """Return where an outline meets itself, left to right: ends of its noded pieces that not two share."""
-    ring = LineString(np.concatenate([points, points[:1]]))
-    pieces = shapely.get_parts(shapely.unary_union(ring))
+    pieces = shapely.get_parts(shapely.unary_union(LineString(np.concatenate([points, points[:1]]))))
     ends = np.concatenate([np.asarray(piece.coords)[[0, -1]] for piece in pieces])
     places, counts = np.unique(ends, axis=0, return_counts=True)
     meeting = places[counts > 2] if (counts > 2).any() else places[counts != 2]
@@ -291,8 +290,7 @@ def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: 
     for k in np.flatnonzero(away < radius).tolist():
         words = f"{_spot(spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
         yield Problem(words, points[k], name, False, "spot")
-    tree = shapely.STRtree(points)
-    pairs = tree.query(points, predicate="dwithin", distance=2 * radius).T
+    pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=2 * radius).T
     for i, j in sorted((i, j) for i, j in pairs.tolist() if i < j):
         gap = math.dist(spec.positions[i], spec.positions[j])
         if gap < 2 * radius:
@@ -335,8 +333,7 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
     for item in sound:
         if item.shape.path is None:
             continue
-        area = env.swept_area(item.shape.polygon, item.shape.path)
-        met, beyond = env.in_the_way(area, standing, inside)
+        met, beyond = env.in_the_way(env.swept_area(item.shape.polygon, item.shape.path), standing, inside)
         names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
             where = shapely.union_all([*met.values(), beyond])

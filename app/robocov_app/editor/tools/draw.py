@@ -12,7 +12,7 @@ from robocov_app.editor.model.coordinates import length_of, next_point_of, size_
 from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
 from robocov_app.editor.model.selection import Change
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
 from robocov_app.toolkit.draw_tools import SAME, Outline
 
 
@@ -39,7 +39,7 @@ class DrawTool(Tool):
         return Preview(points, closed, True, words=words)
 
     def placed(self, event: PointerEvent) -> Point:
-        return constrained_point(event, self.origin)
+        return event.constrained(self.origin)
 
     def end_for(self, text: str) -> Point | None:
         """Return where a drag from the first point ends for a typed size; None where that is no size."""

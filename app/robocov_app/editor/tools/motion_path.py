@@ -5,7 +5,7 @@ from robocov_app.editor.edits import paths
 from robocov_app.editor.model.geometry import bearing_words
 from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Selection
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
 
 NEAR = 0.75  # part of a finger's width within which a way point is taken hold of
 
@@ -50,7 +50,7 @@ class MotionPathTool(Tool):
             context.say("now click where it goes")
         else:
             at = None if path is None else paths.leg_at(path, event.raw, 0.5 * event.reach)
-            point = event.point if at is not None else constrained_point(event, self._last)
+            point = event.point if at is not None else event.constrained(self._last)
             context.change(paths.way_point_added(context.sketch, subject, point, at, self.speed))
             count = len(path.points) if path is not None else 1
             self.chosen = self._held = count if at is None else at
@@ -68,8 +68,7 @@ class MotionPathTool(Tool):
         if path is None or self._held >= len(path.points):
             self._held = None
         elif self.change is not None or event.is_apart_from(path.points[self._held]):
-            before = path.points[self._held - 1] if self._held else None
-            to = constrained_point(event, before)
+            to = event.constrained(path.points[self._held - 1] if self._held else None)
             self.change = paths.way_point_moved(context.sketch, subject, self._held, to)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:

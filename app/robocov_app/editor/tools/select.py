@@ -227,8 +227,7 @@ class Box(Drag):
     def __init__(self, context: Workspace, begun: Point, *, adds: bool) -> None:
         super().__init__(context, Selection())
         self._begun = self._at = begun
-        self._before = context.selection if adds else Selection()
-        self._adds = adds
+        self._before, self._adds = context.selection if adds else Selection(), adds
 
     def to(self, event: PointerEvent) -> None:
         self._at = event.raw
@@ -239,7 +238,7 @@ class Box(Drag):
         inside = in_box(sketch, self._begun, self._at, touched=preview.touched).with_groups(sketch)
         if shown and not self._adds and not (inside.items | inside.starts) - set(shown):
             single = vertices_in_box(sketch, self._begun, self._at, shown)
-            if single.vertices and len(single.vertices) < sum(len(points_of(sketch, each)) for each in shown):
+            if 0 < len(single.vertices) < sum(len(points_of(sketch, each)) for each in shown):
                 return single
         return inside
 
@@ -265,14 +264,13 @@ class SelectTool(Tool):
         self.drag: Drag | None = None
         self._handle: Handle | None = None
         self._narrows = False
-        self._gone = False  # what the press began is done with, though the button is held down still
 
     @property
     def busy(self) -> bool:
         return self.drag is not None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self.begun, self.drag, self._narrows, self._gone = event, None, False, False
+        self.begun, self.drag, self._narrows = event, None, False
         self._handle = _handle_at(context, event)
         vertex = self._handle.vertex if self._handle is not None else None
         if vertex is not None:
@@ -300,12 +298,12 @@ class SelectTool(Tool):
         if self.begun is None:
             self.near = _handle_at(context, event)
             self.hovered = None if self.near else next(iter(_owners_at(context, event)), None)
-        elif not self._gone:
-            if self.drag is None and event.is_apart_from(self.begun.raw):
-                self.drag = self._begun(context, self.begun)
-            if self.drag is not None:
-                self.drag.to(event)
-                self.guides = self.drag.guides
+            return
+        if self.drag is None and event.is_apart_from(self.begun.raw):
+            self.drag = self._begun(context, self.begun)
+        if self.drag is not None:
+            self.drag.to(event)
+            self.guides = self.drag.guides
 
     def _begun(self, context: Workspace, pressed: PointerEvent) -> Drag:
         handle, whole = self._handle, context.selection.without_vertices()
@@ -323,12 +321,10 @@ class SelectTool(Tool):
         """Do what was dragged; a click selects one of what is selected, and again what lies below."""
         pressed, drag = self.begun, self.drag
         self.begun, self.drag, self.guides = None, None, ()
-        if self._gone or pressed is None:
-            return
         if drag is not None:
             drag.to(event)
             drag.ended()
-        elif self._handle is None and not event.shift:
+        elif pressed is not None and self._handle is None and not event.shift:
             found, chosen = _owners_at(context, pressed), context.selection.owners
             if not found:
                 context.select(Selection())
@@ -345,7 +341,7 @@ class SelectTool(Tool):
         if edge is None or _handle_at(context, event) is not None:
             self.press(context, event)
             return
-        self.begun, self.drag, self._gone = event, None, True
+        self.begun = self.drag = None
         if not event.ctrl:
             # on the edge, but at a round place
             to = context.snapped(edge.point, event.reach).point
@@ -357,13 +353,13 @@ class SelectTool(Tool):
             super().enter(context, text)
             return
         drag.enter(text)
-        self.drag, self._gone, self.guides = None, True, ()
+        self.begun, self.drag, self.guides = None, None, ()
         drag.ended()
 
     def cancel(self, context: Workspace) -> bool:
         had = bool(self.drag or context.selection)
         if self.drag is not None:
-            self.drag, self._gone, self.guides = None, True, ()
+            self.begun, self.drag, self.guides = None, None, ()
         elif had:
             context.select(Selection.of(*{vertex.of for vertex in context.selection.vertices}))
         return had

@@ -38,11 +38,8 @@ class Handle:
 
 def handled(selection: Selection) -> tuple[Owner, ...]:
     """Return whose vertices are shown: of the one thing that is selected, or of selected vertices."""
-    of_vertices = {vertex.of for vertex in selection.vertices}
-    owners = selection.owners
-    if of_vertices:
-        return tuple(sorted(of_vertices | owners, key=str))
-    return tuple(owners) if len(owners) == 1 else ()
+    owners = selection.owners | {vertex.of for vertex in selection.vertices}
+    return tuple(sorted(owners, key=str)) if selection.vertices or len(owners) == 1 else ()
 
 
 def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> Box | None:
@@ -56,8 +53,7 @@ def frame_of(sketch: Sketch, selection: Selection, pixel: float) -> Box | None:
 
 def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle, ...]:
     found: list[Handle] = []
-    frame = frame_of(sketch, selection, pixel)
-    if frame is not None:
+    if (frame := frame_of(sketch, selection, pixel)) is not None:
         low_x, low_y, high_x, high_y = frame
         columns = (-1, 0, 1) if high_x - low_x > ROOMY * pixel else (-1, 1)
         rows = (-1, 0, 1) if high_y - low_y > ROOMY * pixel else (-1, 1)
@@ -67,8 +63,7 @@ def handles(sketch: Sketch, selection: Selection, pixel: float) -> tuple[Handle,
     for owner in handled(selection):
         box = None if owner == BOUNDARY or selection.vertices else box_of(sketch, owner)
         if box is None or max(box[2] - box[0], box[3] - box[1]) >= SMALL * pixel:
-            points = points_of(sketch, owner)
-            found += [Handle("vertex", at, vertex) for vertex, at in points[:MOST_VERTICES]]
+            found += [Handle("vertex", at, vertex) for vertex, at in points_of(sketch, owner)[:MOST_VERTICES]]
     return tuple(found)
 
 
@@ -99,6 +94,10 @@ class PointerEvent:
         """Return whether the hand that pressed there has moved on purpose."""
         return distance(place, self.raw) >= 0.25 * self.reach
 
+    def constrained(self, origin: Point | None) -> Point:
+        """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
+        return at_round_angle(origin, self.raw) if self.shift and origin is not None else self.point
+
 
 @dataclass(frozen=True)
 class Preview:
@@ -124,14 +123,11 @@ class Workspace:
         self.document = document
         self.version = 0  # grows whenever panel and sheet have to look again at what there is
         self.snaps = set(SNAPS)
-        self.grid, self.snap_angle = 0.1, 15.0
-        self.wall_width = 0.1
+        self.grid, self.snap_angle, self.wall_width = 0.1, 15.0, 0.1
         self.pixel = 0.01  # m; what a pixel at scale 1 is on the sheet
         self.snapper = Snapper()
-        self.message = ""  # what was said last, empty when it is old
-        self.trouble = False
-        self.now = 0.0
-        self.said = 0.0
+        self.message, self.trouble = "", False  # what was said last, empty when it is old
+        self.now = self.said = 0.0
         self._handles: Latest[tuple[Handle, ...]] = Latest()
 
     @property
@@ -246,10 +242,3 @@ class Tool:
     def shape_of_cursor(self, context: Workspace) -> str:
         """Return what the cursor looks like over the map: arrow, cross, hand, move, ..."""
         return "cross"
-
-
-def constrained_point(event: PointerEvent, origin: Point | None) -> Point:
-    """Return where a point goes: with Shift on a line at a round angle from where the line comes from."""
-    if event.shift and origin is not None:
-        return at_round_angle(origin, event.raw)
-    return event.point
