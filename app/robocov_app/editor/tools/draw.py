@@ -5,7 +5,7 @@ from itertools import pairwise
 from math import copysign
 
 from robocov import environment as env
-from robocov.environment import Obstacle, Point
+from robocov.environment import Point
 from robocov.errors import MapError, counted
 from robocov_app.editor.edits import create
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
@@ -95,8 +95,7 @@ class DrawTool(Tool):
 
     def enter(self, context: Workspace, text: str) -> None:
         outline = self.outline
-        end = self.end_for(text) if len(self.points) == 1 else None
-        if end is not None:
+        if len(self.points) == 1 and (end := self.end_for(text)) is not None:
             self._finish_drag(context, end)
             return
         outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
@@ -112,8 +111,7 @@ class DrawTool(Tool):
 
     def _far_corner(self, text: str) -> Point:
         """Return the corner of a rectangle of a typed size, on the cursor's side of the first."""
-        width, height = size_of(text)
-        (x, y), (to_x, to_y) = self.points[0], self.outline.at
+        (x, y), (to_x, to_y), (width, height) = self.points[0], self.outline.at, size_of(text)
         return x + (width if to_x >= x else -width), y + (height if to_y >= y else -height)
 
 
@@ -138,7 +136,7 @@ class WallTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
-        shapes: tuple[Obstacle, ...] = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
+        shapes = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         words = f"{bearing_words(points[-2], points[-1])}   {length_words(context.wall_width)} wide"
         return Preview(points, False, True, shapes, words=words)
 
@@ -232,19 +230,17 @@ class RectangleTool(DrawTool):
     def placed(self, event: PointerEvent) -> Point:
         if not event.shift or not self.points:
             return event.point
-        x, y = self.points[0]
-        dx, dy = event.point[0] - x, event.point[1] - y
-        side = max(abs(dx), abs(dy))
-        return x + copysign(side, dx), y + copysign(side, dy)
+        (x, y), (to_x, to_y) = self.points[0], event.point
+        side = max(abs(to_x - x), abs(to_y - y))
+        return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
 
     def end_for(self, text: str) -> Point:
         return self._far_corner(text)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
-        wide, high = abs(bx - ax), abs(by - ay)
-        ring = rectangle(*points)
-        shapes: tuple[Obstacle, ...] = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
+        wide, high, ring = abs(bx - ax), abs(by - ay), rectangle(*points)
+        shapes = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
         words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
         return Preview(ring, True, shapes=shapes, words=words)
 
@@ -265,7 +261,7 @@ class CircleTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        shapes: tuple[Obstacle, ...] = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
+        shapes = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
         return Preview(points, shapes=shapes, words=f"radius {length_words(radius)}")
 
 
