@@ -5,8 +5,6 @@ from dataclasses import replace
 from functools import partial, reduce
 
 import shapely
-from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, counted
@@ -70,9 +68,9 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
 
 def clipped(sketch: Sketch, selection: Selection) -> Change:
     """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected."""
-    if sketch.boundary is None or len(sketch.boundary) < 3 or not Polygon(sketch.boundary).is_valid:
+    if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be sound first")
-    inside = Polygon(sketch.boundary)
+    inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
     shapes: dict[int, Sequence[Obstacle]] = {
         item.key: outlines(_intersection(item.geometry, inside), item.shape.name)
@@ -96,8 +94,8 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
             shapes[item.key] = outlines(item.geometry, shape.name)
     boundary = sketch.boundary
     meant = everything or selection.boundary
-    if meant and boundary is not None and len(boundary) >= 3 and not Polygon(boundary).is_valid:
-        parts = outlines(shapely.make_valid(Polygon(boundary)))
+    if meant and boundary is not None and len(boundary) >= 3 and not shapely.Polygon(boundary).is_valid:
+        parts = outlines(shapely.make_valid(shapely.Polygon(boundary)))
         boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
     if not (shapes or redrawn):
@@ -108,7 +106,7 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
     return replace(change, selection=selected)
 
 
-def _union(items: Sequence[Item]) -> BaseGeometry:
+def _union(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID)
 
 
@@ -123,7 +121,7 @@ def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
 
 
 def _in_place(
-    sketch: Sketch, items: Sequence[Item], parts: Sequence[BaseGeometry], words: str, empty: str = ""
+    sketch: Sketch, items: Sequence[Item], parts: Sequence[shapely.Geometry], words: str, empty: str = ""
 ) -> Change:
     """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
     lowest, *others = items

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import LineString, MultiPoint
 from shapely.ops import substring
 
 from robocov import environment as env
@@ -45,7 +44,7 @@ def circle_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
 
 def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
     line = distinct(ring_near(points), closed=False)
-    if len(line) < 2 or LineString(line).length < SHORTEST:
+    if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
     if not SMALLEST <= width <= LARGEST:
         raise MapError(f"a wall's width is at least {1000 * SMALLEST:g} mm")
@@ -120,7 +119,7 @@ def _encodable(text: str) -> str:
 
 def _outline(points: Sequence[Point], what: str) -> Ring:
     ring = distinct(ring_near(points))
-    if len(ring) < 3 or MultiPoint(ring).convex_hull.area < SHORTEST**2:
+    if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
         raise MapError(f"{what} needs three corners that enclose something")
     return ring
 
@@ -185,18 +184,18 @@ def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
     return replace_obstacles(sketch, {key: pieces}, words)
 
 
-def _line(sketch: Sketch, key: int) -> LineString:
+def _line(sketch: Sketch, key: int) -> shapely.LineString:
     wall = sketch.item(key).shape
     if not isinstance(wall, env.WallObstacle) or len(set(wall.points)) < 2:
         raise MapError("doors are opened in walls")
-    return LineString(wall.points)
+    return shapely.LineString(wall.points)
 
 
-def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
+def _span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
     middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
     return middle - width / 2, middle + width / 2
 
 
-def _along(line: LineString, length: float) -> Point:
+def _along(line: shapely.LineString, length: float) -> Point:
     ((x, y),) = line.interpolate(length).coords
     return x, y

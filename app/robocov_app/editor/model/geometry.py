@@ -8,7 +8,6 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import Point, PolygonObstacle, Ring
@@ -104,7 +103,7 @@ def box_around(boxes: Iterable[Box]) -> Box:
     return min(low_x), min(low_y), max(high_x), max(high_y)
 
 
-def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
+def outlines(geometry: shapely.Geometry, name: str | None = None) -> tuple[PolygonObstacle, ...]:
     """Return the polygons of a geometry, to tenths of a millimetre, the largest first, without crumbs."""
     snapped = shapely.simplify(shapely.set_precision(geometry, 10.0**-DECIMALS), 0.0)
     parts = [part for part in shapely.get_parts(snapped) if isinstance(part, Polygon) and not _is_crumb(part)]
@@ -117,7 +116,7 @@ def outlines(geometry: BaseGeometry, name: str | None = None) -> tuple[PolygonOb
     return tuple(found)
 
 
-def _is_crumb(part: BaseGeometry) -> bool:
+def _is_crumb(part: shapely.Geometry) -> bool:
     low_x, low_y, high_x, high_y = part.bounds
     return not min(high_x - low_x, high_y - low_y) >= SMALLEST  # of what is empty these are no numbers
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
 from robocov.environment import SAGITTA, Gap, Point, gaps_narrower, narrowest_gap
@@ -62,7 +61,7 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     )
 
 
-def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[BaseGeometry, ...], MultiPolygon]:
+def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry, ...], MultiPolygon]:
     """Return what a robot sweeps from anywhere in each part that it can drive in, and what it never touches.
 
     Swept parts, the largest first, are the connected pieces of the free space's opening by the robot's disc.
@@ -131,7 +130,7 @@ def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) ->
 
 
 def _cut_off(
-    reached: tuple[BaseGeometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
+    reached: tuple[shapely.Geometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
 ) -> Iterator[Problem]:
     if not free.is_empty and not reached:
         yield Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)
@@ -141,7 +140,7 @@ def _cut_off(
         yield Problem(f"{parts}: {area:.3g} m² are cut off from the largest", sealed, None, False, "cut off")
 
 
-def _polygons(geometry: BaseGeometry) -> list[Polygon]:
+def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
 
 

@@ -9,8 +9,6 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 import shapely
-from shapely import GeometryCollection, LineString, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
 from robocov.density import Density
@@ -40,7 +38,7 @@ class Item:
     hidden: bool = False  # not shown in the editor either; robots meet it all the same
 
     @cached_property
-    def geometry(self) -> BaseGeometry:
+    def geometry(self) -> shapely.Geometry:
         """Covered area as a valid shapely geometry, m: a line or a point where it covers nothing."""
         return geometry_of(self.shape)
 
@@ -251,22 +249,22 @@ def kind_and_name(shape: Obstacle) -> str:
     return f"{kind} “{shape.name}”" if shape.name else kind
 
 
-def geometry_of(shape: Obstacle) -> BaseGeometry:
+def geometry_of(shape: Obstacle) -> shapely.Geometry:
     """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
     if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):
-            return GeometryCollection()
+            return shapely.GeometryCollection()
         return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
     points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
     if not _is_near(points) or not points:
-        return GeometryCollection()
-    line = LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
+        return shapely.GeometryCollection()
+    line = shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
     if isinstance(shape, env.WallObstacle):
         return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
     if len(points) < 3:
         return line
     holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
-    polygon = shape.polygon if len(holes) == len(shape.holes) else Polygon(points, holes)
+    polygon = shape.polygon if len(holes) == len(shape.holes) else shapely.Polygon(points, holes)
     return polygon if polygon.is_valid else shapely.make_valid(polygon)
 
 

@@ -10,7 +10,6 @@ from typing import Literal, TypeAlias
 import numpy as np
 import shapely
 from shapely import LineString, MultiPoint, MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
 from robocov.arrays import Array
@@ -44,7 +43,7 @@ class Problem:
 
     words: str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
     # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
-    where: BaseGeometry | None
+    where: shapely.Geometry | None
     of: Owner | None = None  # None of the map as a whole
     grave: bool = True  # the map cannot run so; else it is a warning
     kind: Kind = "other"
@@ -213,7 +212,7 @@ def _far_faults(points: Ring) -> Iterator[Problem]:
             return
 
 
-def _drawn(points: Array) -> BaseGeometry | None:
+def _drawn(points: Array) -> shapely.Geometry | None:
     if not len(points):
         return None
     return LineString(points) if len(points) > 1 else shapely.Point(points[0])
