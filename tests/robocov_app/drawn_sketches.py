@@ -187,7 +187,7 @@ def changes(draw, sketch):
     key = owner if isinstance(owner, int) else 0
     deeds = [
         lambda: create.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
-        lambda: create.rectangle_drawn(sketch, a, b),
+        lambda: create.rectangle_drawn(sketch, [a, b]),
         lambda: create.circle_drawn(sketch, a, length),
         lambda: create.wall_drawn(sketch, [a, b], length),
         lambda: create.boundary_drawn(sketch, [a, b, (b[0], a[1])]),

@@ -58,7 +58,7 @@ def test_what_is_drawn_lies_on_top_and_is_selected(sketch):
     assert change.words == "circle drawn"
     wall = create.wall_drawn(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
     assert wall.sketch.obstacles[-1].shape == WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15)
-    box = create.rectangle_drawn(sketch, (3.0, 2.0), (1.0, 5.0))
+    box = create.rectangle_drawn(sketch, [(3.0, 2.0), (1.0, 5.0)])
     assert box.sketch.obstacles[-1].shape.vertices == ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
     ring = create.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
     assert ring.sketch.obstacles[-1].shape.vertices == ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
@@ -88,7 +88,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     [
         (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1)]), "three corners"),
         (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
-        (lambda s: create.rectangle_drawn(s, (0, 0), (0, 3)), "a width and a height"),
+        (lambda s: create.rectangle_drawn(s, [(0, 0), (0, 3)]), "a width and a height"),
         (lambda s: create.circle_drawn(s, (0, 0), 0.0), "needs a radius"),
         (lambda s: create.circle_drawn(s, (math.nan, 0), 1.0), "too far away"),
         (lambda s: create.circle_drawn(s, (1e8, 0), 1.0), "too far away"),

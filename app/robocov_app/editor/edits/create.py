@@ -31,8 +31,8 @@ def polygon_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     return drawn(sketch, env.PolygonObstacle(_outline(points, "a polygon")))
 
 
-def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
-    low, high = ring_near(np.array([np.minimum(a, b), np.maximum(a, b)]))
+def rectangle_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
+    low, high = ring_near(np.sort(np.array(points, dtype=float), axis=0))  # of two opposite corners
     if min(high[0] - low[0], high[1] - low[1]) < SHORTEST:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
     return replace(drawn(sketch, env.PolygonObstacle(rectangle(low, high))), words="rectangle drawn")

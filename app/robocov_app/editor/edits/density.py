@@ -7,7 +7,7 @@ from typing import TypeAlias
 import shapely
 
 from robocov.density import HEAVIEST, Density, Gaussian, Gaussians, Raster, WeightedArea, WeightedPolygons
-from robocov.environment import Point, PolygonObstacle
+from robocov.environment import Point, PolygonObstacle, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
 from robocov_app.editor.edits.create import SHORTEST
@@ -42,9 +42,14 @@ def peak_added(sketch: Sketch, center: Point, sigma: float, weight: float) -> Ch
     return _put(sketch, (*features_of(sketch), peak), "hot spot added")
 
 
-def area_added(sketch: Sketch, points: Sequence[Point], weight: float) -> Change:
+def area_added(
+    sketch: Sketch, points: Ring, weight: float, holes: tuple[Ring, ...] = (), name: str | None = None
+) -> Change:
     """Add an area of constant weight on top; without a density, to one that is 1 everywhere."""
-    return _area_put(sketch, WeightedArea(tuple(points), weight))
+    if isinstance(sketch.density, Gaussians | Raster):
+        raise _other_kind(sketch.density, ", areas are not")
+    area = _sound(WeightedArea(distinct(ring_near(points)), weight, holes, name))
+    return _put(sketch, (*features_of(sketch), area), "area added")
 
 
 def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
@@ -54,15 +59,8 @@ def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
         raise MapError("select polygons first: they become areas that count more, or less")
     after = sketch.without(selection.items)
     for shape in shapes:
-        after = _area_put(after, WeightedArea(shape.vertices, weight, shape.holes, shape.name)).sketch
+        after = area_added(after, shape.vertices, weight, shape.holes, shape.name).sketch
     return Change(after, Selection(), f"{counted(len(shapes), 'polygon')} made an area of the density")
-
-
-def _area_put(sketch: Sketch, area: WeightedArea) -> Change:
-    if isinstance(sketch.density, Gaussians | Raster):
-        raise _other_kind(sketch.density, ", areas are not")
-    area = _sound(replace(area, vertices=distinct(ring_near(area.vertices))))
-    return _put(sketch, (*features_of(sketch), area), "area added")
 
 
 def removed(sketch: Sketch, number: int) -> Change:

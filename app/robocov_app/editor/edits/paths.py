@@ -17,10 +17,6 @@ from robocov_app.editor.model.sketch import Sketch
 FIRST_SPEED = 0.5  # metres a second of a new path, until another speed is typed
 
 
-def path_of(sketch: Sketch, key: int) -> ObstaclePath | None:
-    return sketch.item(key).shape.path
-
-
 def moving(sketch: Sketch) -> tuple[int, ...]:
     return tuple(item.key for item in sketch.obstacles if item.shape.path is not None)
 
@@ -34,7 +30,7 @@ def way_point_added(
     sketch: Sketch, key: int, point: Point, at: int | None = None, speed: float = FIRST_SPEED
 ) -> Change:
     """Add a way point, last or before `at`; the first makes a path from the middle, `speed` in m/s."""
-    path = path_of(sketch, key)
+    path = sketch.item(key).shape.path
     if path is None:
         geometry = sketch.item(key).geometry
         if geometry.is_empty:
@@ -119,7 +115,7 @@ def path_words(path: ObstaclePath | None) -> str:
 
 
 def _path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
-    path = path_of(sketch, key)
+    path = sketch.item(key).shape.path
     if path is None or not 0 <= number < len(path.points):
         raise MapError("there is no such way point any more")
     return path

@@ -271,11 +271,9 @@ def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> 
     """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
     if not 0.0 < degrees <= 30.0:
         raise MapError("an angle of up to 30 degrees was wanted")
-
-    def straight(rings: tuple[Ring, ...], closed: bool) -> tuple[Ring, ...]:
-        return tuple(_straight(ring, degrees, closed) for ring in rings)
-
-    after, changed = _redrawn(sketch, selection, straight)
+    after, changed = _redrawn(
+        sketch, selection, lambda rings, closed: tuple(_straight(ring, degrees, closed) for ring in rings)
+    )
     if not changed:
         raise MapError(f"no edge is within {degrees:g} degrees of level or upright, and not so already")
     return Change(after, selection.without_vertices(), f"{counted(len(changed), 'outline')} straightened")

@@ -223,9 +223,7 @@ class RectangleTool(DrawTool):
     name = "rectangle"
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.rectangle_drawn(context.sketch, *points)
+    make = staticmethod(create.rectangle_drawn)
 
     def placed(self, event: PointerEvent) -> Point:
         if not event.shift or not self.points:

@@ -109,7 +109,7 @@ class MotionPathTool(Tool):
         if subject is None:
             return None
         if self.change is not None:
-            path = paths.path_of(self.change.sketch, subject)
+            path = self.change.sketch.item(subject).shape.path
         if path is None:
             return Preview(words=f"where it goes, {self.speed:g} m/s")
         words = paths.path_words(path)
@@ -128,4 +128,4 @@ def _led_of(context: Workspace) -> tuple[int | None, ObstaclePath | None]:
     if len(chosen.items) != 1 or chosen.starts or chosen.boundary:
         return None, None
     (key,) = chosen.items
-    return key, paths.path_of(context.sketch, key)
+    return key, context.sketch.item(key).shape.path
