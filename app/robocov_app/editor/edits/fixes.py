@@ -41,8 +41,33 @@ _SPARE = 1e-3  # metres by which a widened gap is wider than a robot
 
 
 def fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
+    owner: Any = problem.of  # problems of each kind have the place and the owner that its fix needs
+    where: Any = problem.where
     with suppress(MapError):
-        return _fixed(sketch, problem, radius)
+        match problem.kind:
+            case "no boundary":
+                low_x, low_y, high_x, high_y = sketch.bounds or (0.0, 0.0, 10.0, 10.0)
+                by = _MARGIN if sketch.bounds else 0.0
+                ring = rectangle(rounded((low_x - by, low_y - by)), rounded((high_x + by, high_y + by)))
+                words = "boundary drawn round everything"
+                return Change(replace(sketch, boundary=ring), Selection(boundary=True), words)
+            case "sealed":
+                return _filled(sketch, where)
+            case "cut off":
+                free = examined(sketch, radius)[1]
+                return _filled(sketch, _beyond(free, reach_of(free, radius)[0][0], [where]))
+            case "narrow":
+                return _widened(sketch, where, 2.0 * radius)
+            case "crossing":
+                return boolean.repaired(sketch, Selection.of(owner))
+            case "outside" | "twice":
+                return properties.deleted(sketch, Selection.of(owner))
+            case "double":
+                rings = [distinct(points, closed=closed) for _, points, closed in sketch.rings_of(owner)]
+                words = f"{numbered_name(sketch, owner)}: vertices merged"
+                return Change(sketch.with_rings(owner, rings), Selection.of(owner), words)
+            case "spot" | "no room":
+                return _start_moved(sketch, owner, where, radius)
     return None
 
 
@@ -52,36 +77,6 @@ def unreachable_filled(sketch: Sketch, radius: float) -> Change:
     if not reached:
         raise MapError(f"no robot of radius {radius:g} m fits anywhere")
     return _filled(sketch, _beyond(free, reached[0], [*reached[1:], untouched, *list(free.geoms)[1:]]))
-
-
-def _fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
-    owner: Any = problem.of  # problems of each kind have the place and the owner that its fix needs
-    where: Any = problem.where
-    match problem.kind:
-        case "no boundary":
-            low_x, low_y, high_x, high_y = sketch.bounds or (0.0, 0.0, 10.0, 10.0)
-            by = _MARGIN if sketch.bounds else 0.0
-            ring = rectangle(rounded((low_x - by, low_y - by)), rounded((high_x + by, high_y + by)))
-            words = "boundary drawn round everything"
-            return Change(replace(sketch, boundary=ring), Selection(boundary=True), words)
-        case "sealed":
-            return _filled(sketch, where)
-        case "cut off":
-            free = examined(sketch, radius)[1]
-            return _filled(sketch, _beyond(free, reach_of(free, radius)[0][0], [where]))
-        case "narrow":
-            return _widened(sketch, where, 2.0 * radius)
-        case "crossing":
-            return boolean.repaired(sketch, Selection.of(owner))
-        case "outside" | "twice":
-            return properties.deleted(sketch, Selection.of(owner))
-        case "double":
-            rings = [distinct(points, closed=closed) for _, points, closed in sketch.rings_of(owner)]
-            words = f"{numbered_name(sketch, owner)}: vertices merged"
-            return Change(sketch.with_rings(owner, rings), Selection.of(owner), words)
-        case "spot" | "no room":
-            return _start_moved(sketch, owner, where, radius)
-    return None
 
 
 def _filled(sketch: Sketch, where: BaseGeometry) -> Change:

@@ -27,7 +27,6 @@ _STRAIGHT = math.radians(0.1)  # a corner that turns by less has nothing to be c
 _MOST_SEGMENTS = 256
 _STEPS = 12  # tolerances that are tried, each half of the one before, until nothing crosses
 
-_Disc: TypeAlias = env.CircleObstacle | env.DiscStart
 _Cut: TypeAlias = Callable[[float], tuple[float, int]]  # length and segments for the angle of a turn
 _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
@@ -48,26 +47,21 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
         place_of(sketch, vertex)
         by_owner[vertex.of][vertex] = place
     for owner, moves in by_owner.items():
-        thing = sketch.thing(owner)
-        if isinstance(thing, env.CircleObstacle | env.DiscStart):
-            sketch = sketch.with_thing(owner, _with_rim(thing, moves))
+        disc = sketch.thing(owner)
+        if isinstance(disc, env.CircleObstacle | env.DiscStart):
+            first = min(moves, key=lambda vertex: vertex.index)
+            place = point_near(moves[first])
+            radius = disc.radius if first.index == 0 else tenths(math.dist(disc.center, place))
+            if first.index and radius < SMALLEST:
+                raise MapError("a circle needs a radius: drag its rim away from its centre")
+            center = disc.center if first.index else place
+            sketch = sketch.with_thing(owner, replace(disc, center=center, radius=radius))
             continue
         rings = [list(ring) for ring in sketch.ring_points(owner)]
         for vertex, place in zip(moves, ring_near(list(moves.values())), strict=True):
             rings[vertex.ring][vertex.index] = place
         sketch = sketch.with_rings(owner, rings)
     return sketch
-
-
-def _with_rim(disc: _Disc, moves: Mapping[Vertex, Point]) -> _Disc:
-    first = min(moves, key=lambda vertex: vertex.index)
-    place = point_near(moves[first])
-    if first.index == 0:
-        return replace(disc, center=place)
-    radius = tenths(math.dist(disc.center, place))
-    if radius < SMALLEST:
-        raise MapError("a circle needs a radius: drag its rim away from its centre")
-    return replace(disc, radius=radius)
 
 
 def inserted(sketch: Sketch, edge: Edge) -> Change:
@@ -86,8 +80,21 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
     if not selection.vertices:
         raise MapError("select vertices first")
     after = sketch
-    for owner, by_ring in _by_ring(sketch, selection.vertices).items():
-        after = _with_fewer(after, owner, by_ring)
+    for owner, gone in _by_ring(sketch, selection.vertices).items():
+        thing, rings = sketch.thing(owner), []
+        if isinstance(thing, env.DiscStart):
+            raise MapError("the points of a disc cannot be deleted: delete the start itself")
+        if isinstance(thing, env.CircleObstacle):
+            raise MapError("the points of a circle cannot be deleted: delete the circle itself")
+        least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
+        for number, ring in enumerate(sketch.ring_points(owner)):
+            kept = tuple(point for k, point in enumerate(ring) if k not in gone[number])
+            # a hole goes that has too few left, but one that was broken before and is not touched stays
+            if number == 0 or not gone[number] or len(kept) >= 3:
+                rings.append(kept)
+        if owner == BOUNDARY and len(rings[0]) < least:
+            raise MapError("the boundary needs three corners at least")
+        after = after.with_rings(owner, rings) if len(rings[0]) >= least else after.without({owner})
     words = f"{Selection(vertices=selection.vertices).words(sketch)} deleted"
     return Change(after, selection.without_vertices().within(after), words)
 
@@ -98,26 +105,6 @@ def _by_ring(sketch: Sketch, vertices: Iterable[Vertex]) -> dict[Owner, dict[int
         place_of(sketch, vertex)
         found[vertex.of][vertex.ring].add(vertex.index)
     return found
-
-
-def _with_fewer(sketch: Sketch, owner: Owner, gone: Mapping[int, set[int]]) -> Sketch:
-    rings = [
-        tuple(point for k, point in enumerate(ring) if k not in gone.get(number, ()))
-        for number, ring in enumerate(sketch.ring_points(owner))
-    ]
-    thing = sketch.thing(owner)
-    if isinstance(thing, env.DiscStart):
-        raise MapError("the points of a disc cannot be deleted: delete the start itself")
-    if isinstance(thing, env.CircleObstacle):
-        raise MapError("the points of a circle cannot be deleted: delete the circle itself")
-    least = {env.PointsStart: 1, env.WallObstacle: 2}.get(type(thing), 3)
-    if owner == BOUNDARY and len(rings[0]) < least:
-        raise MapError("the boundary needs three corners at least")
-    if len(rings[0]) < least:
-        return sketch.without({owner})
-    # a hole goes that has too few left, but one that was broken before and is not touched stays
-    kept = [ring for k, ring in enumerate(rings) if k == 0 or k not in gone or len(ring) >= 3]
-    return sketch.with_rings(owner, kept)
 
 
 def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
