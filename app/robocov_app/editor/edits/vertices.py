@@ -224,8 +224,9 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
         raise MapError("select two or more walls to join, and nothing else")
     chain, *rest = [wall.points for wall in shapes]
     while rest:
-        ways = [(*_chained(chain, line), line) for line in rest]
-        _, chain, line = min(ways, key=lambda way: way[0])
+        ways = [(a, b, line) for line in rest for a in (chain, chain[::-1]) for b in (line, line[::-1])]
+        a, b, line = min(ways, key=lambda way: math.dist(way[0][-1], way[1][0]))
+        chain = (*a, *(b[1:] if math.dist(a[-1], b[0]) <= _SAME else b))
         rest.remove(line)
     name = next((wall.name for wall in shapes if wall.name is not None), None)
     note = next((item.note for item in items if item.note), "")
@@ -233,13 +234,6 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
     kept = sketch.without(item.key for item in items[1:]).obstacles
     after = replace(sketch, obstacles=tuple(whole if item.key == whole.key else item for item in kept))
     return Change(after, Selection.of(whole.key), f"{len(items)} walls joined")
-
-
-def _chained(chain: Ring, line: Ring) -> tuple[float, Ring]:
-    """Return the gap between two lines, m, and the line that they make where their ends are nearest."""
-    ways = [(math.dist(a[-1], b[0]), a, b) for a in (chain, chain[::-1]) for b in (line, line[::-1])]
-    gap, a, b = min(ways, key=lambda way: way[0])
-    return gap, (*a, *(b[1:] if gap <= _SAME else b))
 
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:

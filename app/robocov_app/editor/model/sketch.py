@@ -217,12 +217,7 @@ class Sketch:
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
-        for _, spec in self.starts:
-            if isinstance(spec, env.PointsStart):
-                points += spec.positions
-            elif isinstance(spec, env.DiscStart):
-                (x, y), r = spec.center, abs(spec.radius)
-                points += [(x - r, y - r), (x + r, y + r)]
+        points += [point for name, _ in self.starts for ring in self.ring_points(name) for point in ring]
         corners = np.concatenate([as_array(points), shapely.bounds(self.geometries).reshape(-1, 2)])
         corners = corners[np.isfinite(corners).all(axis=1)]
         if not len(corners):

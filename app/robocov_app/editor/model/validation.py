@@ -313,7 +313,13 @@ def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner 
             words = " lies on another one that is just the same"
             yield Problem(words, item.geometry, item.key, False, "twice")
         below.add(form)
-    yield from _double_vertices(sketch)
+    for owner in sketch.owners:
+        for _, ring, closed in sketch.rings_of(owner):
+            if 3 <= len(set(ring)) < len(ring):
+                steps = pairwise((*ring, ring[0]) if closed else ring)
+                if twice := [at for at, after in steps if at == after]:
+                    words = f": two vertices lie in the same place, {place_words(*twice[0])}"
+                    yield Problem(words, MultiPoint(twice), owner, False, "double")
     yield from _paths(sketch, bad)
     if free.is_empty:
         return
@@ -337,16 +343,6 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
         if names:
             where = shapely.union_all([*met.values(), beyond])
             yield Problem(f" moves through {listed(names)}", where, item.key, False)
-
-
-def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
-    for owner in sketch.owners:
-        for _, ring, closed in sketch.rings_of(owner):
-            if 3 <= len(set(ring)) < len(ring):
-                steps = pairwise((*ring, ring[0]) if closed else ring)
-                if twice := [at for at, after in steps if at == after]:
-                    words = f": two vertices lie in the same place, {place_words(*twice[0])}"
-                    yield Problem(words, MultiPoint(twice), owner, False, "double")
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
