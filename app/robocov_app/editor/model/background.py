@@ -24,8 +24,7 @@ class Background:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    # the file, as it stands in the map: relative to the map's folder, or absolute
-    path: Annotated[str, Field(min_length=1)]
+    path: Annotated[str, Field(min_length=1)]  # as in the map: relative to its folder, or absolute
     pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]  # (width, height)
     scale: Annotated[float, Field(gt=0.0)] = 0.01  # m; side of a pixel
     corner: tuple[float, float] = (0.0, 0.0)  # m; where the picture's lower left corner lies

@@ -23,10 +23,7 @@ _SIZES = "type width and height in metres, such as 3 x 2"
 
 
 def length_of(text: str, *, now: float | None = None) -> float:
-    """Return a length in metres: ``3.2``, ``3,2``, ``120cm``, ``1200 mm``, ``3m``, ``4'``, ``6"``, ``4'6"``.
-
-    With `now`, what it is at present, also ``+0.5``, ``-0.5``, ``*2``, ``/2`` and ``50%``.
-    """
+XX
     typed = _clean(text)
     sign = typed[:1]
     if now is not None and sign and sign in "*/×÷":
@@ -41,10 +38,7 @@ def length_of(text: str, *, now: float | None = None) -> float:
 
 
 def point_of(text: str, *, last: Point | None = None) -> Point:
-    """Return a place in metres: ``3.2 1.5``, ``3,2 1,5``, ``320 cm; 1.5 m``; ``2<45``, at 45 degrees.
-
-    Relative to `last`: ``@0.5 0``, ``@2<45``, and ``+0.5 0``, whose first sign is a plus.
-    """
+    """Return a place, m: ``3,2 1,5``, ``320 cm; 1.5 m``, ``2<45``; from `last` ``@2<45``, ``+0.5 0``."""
     typed = _clean(text)
     relative = typed[:1] in ("@", "+")
     if relative and last is None:
@@ -62,10 +56,7 @@ def point_of(text: str, *, last: Point | None = None) -> Point:
 
 
 def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point:
-    """Return the next point of a line that is drawn: as `point_of`, or a mere length towards the cursor.
-
-    ``<45`` alone keeps the cursor's distance at that angle.
-    """
+    """Return the next point of a line: as `point_of`, a length towards the cursor, or its own at ``<45``."""
     typed = _clean(text)
     if last is not None and towards is not None:
         dx, dy = towards[0] - last[0], towards[1] - last[1]

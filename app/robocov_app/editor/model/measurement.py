@@ -27,12 +27,9 @@ class Measurement:
 
     free_area: float  # m²
     components: tuple[float, ...]  # m²; areas of the connected parts of the free space, the largest first
-    # m²; areas that a robot can sweep without passing a gap that is too narrow, the largest first: more than
-    # one means that some places are out of reach from others
-    reached: tuple[float, ...]
+    reached: tuple[float, ...]  # m²; areas that a robot can sweep, each out of reach from the others, too
     gap: Gap | None  # the narrowest passage; None where there is none
-    # free space that keeps such robots out: at passages that are too narrow, the largest disc that passes;
-    # all that no robot touches from anywhere, but for corners that are merely too sharp for a disc
+    # at passages that are too narrow, the largest disc that passes; and what no robot touches, as `reach_of`
     impassable: MultiPolygon
     sealed: MultiPolygon  # free space where robots fit, but that is cut off from the largest part for them
     vertices: int  # of boundary, walls, polygons and their holes

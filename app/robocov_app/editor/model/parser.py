@@ -18,13 +18,13 @@ from robocov_app.editor.model.sketch import Item, Sketch
 _MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
 _OBSTACLES = {"polygon": env.PolygonObstacle, "circle": env.CircleObstacle, "wall": env.WallObstacle}
 _STARTS = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
+# parser method of each key
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
 _READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
-"""Parser method of each key."""
 
+# extent of a raster on a map without a boundary, m, unless it states its own
 _UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""Extent of a raster on a map without a boundary, m, unless it states its own."""
 
 _Read = TypeVar("_Read")
 

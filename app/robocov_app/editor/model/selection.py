@@ -17,9 +17,7 @@ class Vertex:
 
     of: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
     ring: int  # 0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon
-    # in the ring. Of a circle, and of a start that is a disc: 0 the centre, and 1 to 4 its rim in the east,
-    # north, west and south
-    index: int
+    index: int  # in the ring; of a disc: 0 the centre, 1 to 4 its rim in the east, north, west, south
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,7 @@ from robocov_app.editor.model.geometry import Box, as_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
-Owner: TypeAlias = int | str
-"""Owner of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,7 @@ class Item:
     """An obstacle of a sketch."""
 
     key: int  # who it is, whatever it looks like: stays the same through every edit; not in the file
-    # as `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners
-    shape: Obstacle
+    shape: Obstacle  # in a draft it may break rules, such as a polygon with two corners
     note: str = ""  # what people wrote about it
     group: str = ""  # the name of the group that it is in; empty for none
     locked: bool = False  # not to be taken by the mouse
@@ -61,8 +59,7 @@ class Sketch:
     obstacles: tuple[Item, ...] = ()  # from the bottom to the top
     starts: tuple[tuple[str, StartSpec], ...] = ()  # the first is the default
     background: Background | None = None
-    # free keys of the file, without what the editor keeps there itself
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict)  # the file's free keys, without the editor's
     schema: str | None = None  # the file's ``$schema``
     density: Density | None = None  # how much each place counts; pictures are read when the map is
 

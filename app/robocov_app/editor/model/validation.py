@@ -42,8 +42,7 @@ class Problem:
     """Something that is wrong, or may be."""
 
     words: str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
-    # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
-    where: shapely.Geometry | None
+    where: shapely.Geometry | None  # a point, an edge, an area; None where it is nowhere
     of: Owner | None = None  # None of the map as a whole
     grave: bool = True  # the map cannot run so; else it is a warning
     kind: Kind = "other"
