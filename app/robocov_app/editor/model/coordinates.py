@@ -23,7 +23,7 @@ _SIZES = "type width and height in metres, such as 3 x 2"
 
 
 def length_of(text: str, *, now: float | None = None) -> float:
-XX
+    """Return a length, m: ``3,2``, ``1200 mm``, ``4'6"``; from `now` also ``+0.5``, ``/2``, ``50%``."""
     typed = _clean(text)
     sign = typed[:1]
     if now is not None and sign and sign in "*/×÷":
