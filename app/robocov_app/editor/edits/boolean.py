@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial, reduce
+from typing import Any
 
 import shapely
 
@@ -120,9 +121,7 @@ def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
     return items
 
 
-def _in_place(
-    sketch: Sketch, items: Sequence[Item], parts: Sequence[shapely.Geometry], words: str, empty: str = ""
-) -> Change:
+def _in_place(sketch: Sketch, items: list[Item], parts: list[Any], words: str, empty: str = "") -> Change:
     """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
     lowest, *others = items
     shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]

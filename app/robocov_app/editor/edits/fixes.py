@@ -21,18 +21,11 @@ from robocov_app.editor.model.selection import Change, Selection, Vertex, number
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Kind, Problem, examined
 
-TITLES: Final[dict[Kind, str]] = {
-    "no boundary": "Draw one",
-    "crossing": "Repair",
-    "double": "Merge",
-    "narrow": "Widen",
-    "spot": "Move",
-    "no room": "Move",
-    "outside": "Delete",
-    "twice": "Delete",
-    "sealed": "Fill",
-    "cut off": "Fill",
-}
+_TITLES: dict[str, tuple[Kind, ...]] = {
+    "Draw one": ("no boundary",), "Repair": ("crossing",), "Merge": ("double",), "Widen": ("narrow",),
+    "Move": ("spot", "no room"), "Delete": ("outside", "twice"), "Fill": ("sealed", "cut off"),
+}  # fmt: skip
+TITLES: Final = {kind: title for title, kinds in _TITLES.items() for kind in kinds}
 """Button label of the fix for each kind of problem; other kinds have none."""
 
 _MARGIN = 0.5  # metres between a boundary that is drawn round everything and what it is drawn round

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from shapely import LineString
@@ -129,9 +130,7 @@ def _paths(sketch: Sketch, selection: Selection) -> dict[int, ObstaclePath]:
     return paths
 
 
-def _with_paths(
-    sketch: Sketch, selection: Selection, paths: Mapping[int, ObstaclePath | None], words: str
-) -> Change:
+def _with_paths(sketch: Sketch, selection: Selection, paths: Mapping[int, Any], words: str) -> Change:
     shapes = {key: replace(sketch.item(key).shape, path=path) for key, path in paths.items()}
     return Change(sketch.with_shapes(shapes), selection, f"{Selection.of(*paths).words(sketch)}: {words}")
 
@@ -139,7 +138,7 @@ def _with_paths(
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:
     if np.ptp(path.points, axis=0).max() < SMALLEST or LineString(path.points).length < SMALLEST:
         raise MapError("the way points lie in one place: click somewhere else")
-    after = sketch.with_thing(key, replace(sketch.item(key).shape, path=path))
+    after = sketch.with_things({key: replace(sketch.item(key).shape, path=path)})
     return Change(after, Selection.of(key), f"{sketch.display_name(key)}: {words}")
 
 

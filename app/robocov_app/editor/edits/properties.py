@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
 from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
@@ -39,7 +40,7 @@ def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
         starts = tuple((name if each == owner else each, spec) for each, spec in sketch.starts)
         return Change(replace(sketch, starts=starts), Selection.of(name), words)
     words = words if name else f"{sketch.display_name(owner)}: name taken away"
-    after = sketch.with_thing(owner, replace(sketch.item(owner).shape, name=name or None))
+    after = sketch.with_things({owner: replace(sketch.item(owner).shape, name=name or None)})
     return Change(after, Selection.of(owner), words)
 
 
@@ -68,14 +69,12 @@ def ungrouped(sketch: Sketch, selection: Selection) -> Change:
 
 
 def locked(sketch: Sketch, selection: Selection) -> Change:
-    change = _marked(sketch, selection, "locked", locked=True)
-    return replace(change, selection=replace(selection, items=frozenset()))
+    return _marked(sketch, selection, "locked", locked=True)
 
 
 def hidden(sketch: Sketch, selection: Selection) -> Change:
     """Hide obstacles in the editor; robots meet them all the same."""
-    change = _marked(sketch, selection, "hidden", hidden=True)
-    return replace(change, selection=replace(selection, items=frozenset()))
+    return _marked(sketch, selection, "hidden", hidden=True)
 
 
 def released(sketch: Sketch) -> Change:
@@ -94,7 +93,8 @@ def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | boo
         for item in sketch.obstacles
     )
     words = f"{Selection(items=selection.items).words(sketch)} {words}"
-    return Change(replace(sketch, obstacles=items), selection, words)
+    left = replace(selection, items=frozenset()) if True in marks.values() else selection
+    return Change(replace(sketch, obstacles=items), left, words)
 
 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
@@ -110,28 +110,27 @@ def titled(sketch: Sketch, name: str | None = None, description: str | None = No
 
 
 def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
-    if not SMALLEST <= width <= LARGEST:
-        raise MapError(f"a width of at least {1000 * SMALLEST:g} mm was wanted")
-    shapes = {key: sketch.item(key).shape for key in selection.items}
-    walls = {key: shape for key, shape in shapes.items() if isinstance(shape, WallObstacle)}
-    if not walls:
-        raise MapError("select walls first")
-    after = sketch.with_shapes({key: replace(wall, width=tenths(width)) for key, wall in walls.items()})
-    return Change(after, selection, f"{Selection.of(*walls).words(sketch)} made {tenths(width):g} m wide")
+    """Give the selected walls another width, m."""
+    return _sized(sketch, selection, WallObstacle, "width", width, "select walls first", "made {:g} m wide")
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    if not SMALLEST <= radius <= LARGEST:
-        raise MapError(f"a radius of at least {1000 * SMALLEST:g} mm was wanted")
-    things = {owner: sketch.thing(owner) for owner in selection.owners}
-    discs = {owner: each for owner, each in things.items() if isinstance(each, CircleObstacle | DiscStart)}
-    if not discs:
-        raise MapError("select circles first, or starts that are discs")
-    after = sketch
-    for owner, disc in discs.items():
-        after = after.with_thing(owner, replace(disc, radius=tenths(radius)))
-    words = f"{Selection.of(*discs).words(sketch)} given a radius of {tenths(radius):g} m"
-    return Change(after, selection, words)
+    """Give the selected circles and discs another radius, m."""
+    missing, kinds = "select circles first, or starts that are discs", (CircleObstacle, DiscStart)
+    return _sized(sketch, selection, kinds, "radius", radius, missing, "given a radius of {:g} m")
+
+
+def _sized(
+    sketch: Sketch, selection: Selection, kinds: Any, name: str, size: float, missing: str, words: str
+) -> Change:
+    if not SMALLEST <= size <= LARGEST:
+        raise MapError(f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
+    things: dict[Owner, Any] = {owner: sketch.thing(owner) for owner in selection.owners}
+    sized = {owner: thing for owner, thing in things.items() if isinstance(thing, kinds)}
+    if not sized:
+        raise MapError(missing)
+    after = sketch.with_things({o: replace(thing, **{name: tenths(size)}) for o, thing in sized.items()})
+    return Change(after, selection, f"{Selection.of(*sized).words(sketch)} {words.format(tenths(size))}")
 
 
 def raised(sketch: Sketch, selection: Selection, where: str) -> Change:

@@ -316,9 +316,8 @@ def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     owners = selection.owners
     single = [vertex for vertex in selection.vertices if vertex.of not in owners]
     places = dict(zip(single, affine.ring([place_of(sketch, vertex) for vertex in single]), strict=True))
-    sketch = sketch.with_shapes({key: affine.thing(sketch.item(key).shape) for key in selection.items})
-    for name in selection.starts:
-        sketch = sketch.with_start(name, affine.thing(sketch.start(name)))
+    things = selection.items | selection.starts
+    sketch = sketch.with_things({owner: affine.thing(sketch.thing(owner)) for owner in things})
     if selection.boundary and sketch.boundary is not None:
         sketch = replace(sketch, boundary=affine.ring(sketch.boundary))
     return with_places(sketch, places) if places else sketch

@@ -55,7 +55,7 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
             if first.index and radius < SMALLEST:
                 raise MapError("a circle needs a radius: drag its rim away from its centre")
             center = disc.center if first.index else place
-            sketch = sketch.with_thing(owner, replace(disc, center=center, radius=radius))
+            sketch = sketch.with_things({owner: replace(disc, center=center, radius=radius)})
             continue
         rings = [list(ring) for ring in sketch.ring_points(owner)]
         for vertex, place in zip(moves, ring_near(list(moves.values())), strict=True):

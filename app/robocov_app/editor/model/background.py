@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import count, islice
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -113,15 +113,13 @@ MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 _HOME = "editor"  # the editor's free key, unless that holds something of somebody else
 _LISTS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OURS = {*_LISTS, "background"}
+_Keys: TypeAlias = Mapping[str, Any]
+_Marks: TypeAlias = dict[int, dict[str, Any]]  # by the place of their obstacle
+_Names: TypeAlias = Sequence[str | None]  # of the obstacles
 _LOST = "notes of obstacles that are gone"
 
 
-def annotated(
-    extra: Mapping[str, Any],
-    marks: Mapping[int, Mapping[str, Any]],
-    names: Sequence[str | None],
-    background: Background | None,
-) -> dict[str, Any]:
+def annotated(extra: _Keys, marks: _Marks, names: _Names, background: Background | None) -> dict[str, Any]:
     """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():
@@ -137,9 +135,7 @@ def annotated(
     return {**extra, home: {**extra.get(home, {}), **ours}}
 
 
-def taken_apart(
-    extra: Mapping[str, Any], names: Sequence[str | None]
-) -> tuple[dict[int, dict[str, Any]], Background | None, dict[str, Any]]:
+def taken_apart(extra: _Keys, names: _Names) -> tuple[_Marks, Background | None, dict[str, Any]]:
     """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
     for home in islice(_homes(), len(extra) + 1):
         held = extra.get(home)
@@ -149,7 +145,7 @@ def taken_apart(
         sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
         if not sound or ("background" in held and background is None):
             continue
-        marks: dict[int, dict[str, Any]] = {}
+        marks: _Marks = {}
         rest = {key: value for key, value in held.items() if key not in _OURS}
         for key, kept in _LISTS.items():
             taken = set()
@@ -186,7 +182,7 @@ def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
     )
 
 
-def _obstacle_of(entry: Mapping[str, Any], names: Sequence[str | None]) -> int | None:
+def _obstacle_of(entry: _Keys, names: _Names) -> int | None:
     k, name = entry["obstacle"], entry.get("name")
     there = 0 <= k < len(names)
     if not (there and names[k] == name) and name is not None and names.count(name) == 1:

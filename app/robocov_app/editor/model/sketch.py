@@ -20,6 +20,7 @@ from robocov_app.editor.model.background import MARKS, Background, annotated, ta
 from robocov_app.editor.model.geometry import Box, as_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
+_LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
 Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
 
@@ -130,17 +131,13 @@ class Sketch:
         """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
         if owner == BOUNDARY:
             return () if self.boundary is None else (self.boundary,)
-        thing = self.thing(owner)
+        thing: Any = self.thing(owner)
         if isinstance(thing, env.PolygonObstacle):
             return (thing.vertices, *thing.holes)
-        if isinstance(thing, env.WallObstacle):
-            return (thing.points,)
-        if isinstance(thing, env.PointsStart):
-            return (thing.positions,)
         if isinstance(thing, env.CircleObstacle | env.DiscStart):
             (x, y), r = thing.center, thing.radius
             return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
-        return ()
+        return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
 
     def rings_of(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
         """Return the rings of something: number, points, whether it is closed; none of circles and starts."""
@@ -157,9 +154,8 @@ class Sketch:
             return replace(self, boundary=line)
         thing: Any = self.thing(owner)
         if isinstance(thing, env.PolygonObstacle):
-            return self.with_thing(owner, replace(thing, vertices=line, holes=tuple(holes)))
-        key = "points" if isinstance(thing, env.WallObstacle) else "positions"
-        return self.with_thing(owner, replace(thing, **{key: line}))
+            return self.with_things({owner: replace(thing, vertices=line, holes=tuple(holes))})
+        return self.with_things({owner: replace(thing, **{_LINES[type(thing)]: line})})
 
     @cached_property
     def places(self) -> Mapping[int, int]:
@@ -195,8 +191,10 @@ class Sketch:
         """Return the sketch with a start changed in its place, or added as the last."""
         return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
 
-    def with_thing(self, owner: Owner, thing: Any) -> Sketch:
-        return self.with_start(owner, thing) if isinstance(owner, str) else self.with_shapes({owner: thing})
+    def with_things(self, things: Mapping[Any, Any]) -> Sketch:
+        """Return the sketch with other obstacles and starts in place of some."""
+        after = self.with_shapes({owner: thing for owner, thing in things.items() if isinstance(owner, int)})
+        return replace(after, starts=tuple((name, things.get(name, spec)) for name, spec in self.starts))
 
     def without(self, owners: Iterable[Owner]) -> Sketch:
         gone = frozenset(owners)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.edits.properties import underlaid
 from robocov_app.editor.model.background import Background, levelled, to_scale
@@ -21,11 +20,6 @@ class ReferenceImageTool(Tool):
     def __init__(self) -> None:
         super().__init__()
         self.moved: Background | None = None  # the picture where it is being dragged to
-        self._points: list[Point] = []
-
-    @property
-    def busy(self) -> bool:
-        return bool(self._points)
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
         if context.sketch.background is None:
@@ -47,38 +41,34 @@ class ReferenceImageTool(Tool):
             corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
             context.change(underlaid(context.sketch, replace(moved, corner=corner)))
         elif begun is not None:
-            self._points = [*self._points[-1:], event.raw]
-            if len(self._points) == 2:
+            self.clicked = [*self.clicked[-1:], event.raw]
+            if len(self.clicked) == 2:
                 context.say("type how many metres apart the points are; Enter alone makes their line level")
 
     def finish(self, context: Workspace) -> bool:
-        if len(self._points) != 2 or context.sketch.background is None:
+        if len(self.clicked) != 2 or context.sketch.background is None:
             return False
-        (a, b), self._points = self._points, []
+        (a, b), self.clicked = self.clicked, []
         context.change(underlaid(context.sketch, levelled(context.sketch.background, a, b)))
         return True
 
     def enter(self, context: Workspace, text: str) -> None:
-        if len(self._points) != 2 or context.sketch.background is None:
+        if len(self.clicked) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
-        a, b = self._points
+        a, b = self.clicked
         laid = to_scale(context.sketch.background, a, b, length_of(text))
-        self._points = []
+        self.clicked = []
         context.change(underlaid(context.sketch, laid))
 
-    def back(self, context: Workspace) -> bool:
-        return bool(self._points and self._points.pop())
-
     def cancel(self, context: Workspace) -> bool:
-        had = bool(self._points or self.begun)
-        self._points, self.begun, self.moved = [], None, None
-        return had
+        self.moved = None
+        return super().cancel(context)
 
     def preview(self, context: Workspace) -> Preview | None:
-        if not self._points:
+        if not self.clicked:
             return None
-        line = (*self._points, self.at)[:2]
+        line = (*self.clicked, self.at)[:2]
         words = f"now {length_words(distance(*line))}"
-        if len(self._points) == 2:
+        if len(self.clicked) == 2:
             words += "; type how far apart they are, or Enter makes them level"
         return Preview(line, words=words)

@@ -22,6 +22,7 @@ from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
 from robocov_app.render.surface_cache import Latest
 
+Dragged: TypeAlias = Iterable[Owner | Vertex]
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
 
 MANY = 1500  # vertices of a map from which on the window does not wait for its targets
@@ -31,9 +32,7 @@ _MOST_EDGES = 8  # edges near a point that are looked at: more can only be where
 class Targets:
     """Snap targets, with `more` points, without what is dragged; outlines of walls and circles too."""
 
-    def __init__(
-        self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
-    ) -> None:
+    def __init__(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> None:
         dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
         owners: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
         for each in without:
@@ -114,9 +113,7 @@ class Snapper:
         self._latest: Latest[Future[Targets]] = Latest()
         self._pool = ThreadPoolExecutor(1, "targets")
 
-    def targets(
-        self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
-    ) -> Targets | None:
+    def targets(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> Targets | None:
         """Return what to snap to; None as long as that is being worked out."""
         look = frozenset(without), tuple(more)
         coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))

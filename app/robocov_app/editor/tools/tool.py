@@ -185,6 +185,7 @@ class Tool:
     def __init__(self) -> None:
         self.guides: tuple[Guide, ...] = ()
         self.begun: PointerEvent | None = None  # where the button was pressed that is held down
+        self.clicked: list[Point] = []  # m; points of something that is half done
         self.at: Point = (0.0, 0.0)  # m; where the cursor is
         self.change: Change | None = None  # what letting go of the mouse would make
 
@@ -195,7 +196,7 @@ class Tool:
     @property
     def busy(self) -> bool:
         """Whether something is half done."""
-        return self.begun is not None
+        return self.begun is not None or bool(self.clicked)
 
     @property
     def origin(self) -> Point | None:
@@ -225,11 +226,11 @@ class Tool:
 
     def back(self, context: Workspace) -> bool:
         """Take Backspace: the last point goes; return whether there was one."""
-        return False
+        return bool(self.clicked and self.clicked.pop())
 
     def cancel(self, context: Workspace) -> bool:
         """Take Escape; return whether there was something to give up."""
-        had, self.begun, self.change = self.busy, None, None
+        had, self.begun, self.change, self.clicked = self.busy, None, None, []
         return had
 
     def enter(self, context: Workspace, text: str) -> None:
