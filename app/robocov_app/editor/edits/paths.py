@@ -8,7 +8,7 @@ import numpy as np
 from shapely import LineString
 
 from robocov.arrays import Array
-from robocov.environment import ObstaclePath, Point, Repeat
+from robocov.environment import ObstaclePath, Point
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
 from robocov_app.editor.model.geometry import as_array, middle_of, nearest_on, point_near
@@ -66,13 +66,9 @@ def path_removed(sketch: Sketch, selection: Selection) -> Change:
 def path_turned(sketch: Sketch, selection: Selection) -> Change:
     """Let the selected obstacles come back the way they went, or if they do that go in a loop."""
     paths = _paths(sketch, selection)
-    repeat: Repeat = "back-and-forth"
-    if all(path.repeat == repeat for path in paths.values()):
-        repeat = "loop"
-    turned = {key: replace(path, repeat=repeat) for key, path in paths.items()}
-    return _with_paths(
-        sketch, selection, turned, f"goes {'in a loop' if repeat == 'loop' else 'back and forth'}"
-    )
+    loops = all(path.repeat == "back-and-forth" for path in paths.values())
+    turned = {key: replace(path, repeat="loop" if loops else "back-and-forth") for key, path in paths.items()}
+    return _with_paths(sketch, selection, turned, "goes in a loop" if loops else "goes back and forth")
 
 
 def path_paced(sketch: Sketch, selection: Selection, speed: float) -> Change:

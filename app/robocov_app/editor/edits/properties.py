@@ -85,13 +85,11 @@ def released(sketch: Sketch) -> Change:
     return _marked(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
-def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | bool) -> Change:
+def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> Change:
     if not selection.items:
         raise MapError("select obstacles first")
-    items = tuple(
-        replace(item, **marks) if item.key in selection.items else item  # type: ignore[arg-type]
-        for item in sketch.obstacles
-    )
+    chosen = selection.items
+    items = tuple(replace(item, **marks) if item.key in chosen else item for item in sketch.obstacles)
     words = f"{Selection(items=selection.items).words(sketch)} {words}"
     left = replace(selection, items=frozenset()) if True in marks.values() else selection
     return Change(replace(sketch, obstacles=items), left, words)

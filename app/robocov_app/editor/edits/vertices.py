@@ -264,10 +264,8 @@ def _redrawn(
     sketch: Sketch, selection: Selection, redraw: Callable[[tuple[Ring, ...], bool], tuple[Ring, ...]]
 ) -> tuple[Sketch, list[tuple[Ring, Ring]]]:
     """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
-    everything = not (selection.items or selection.boundary)
-    owners = [key for key in sketch.places if everything or key in selection.items]
-    owners += [BOUNDARY] if selection.boundary else []
-    outlines = {owner: found for owner in owners if (found := sketch.rings_of(owner))}
+    chosen = selection.owners if selection.items or selection.boundary else sketch.places.keys()
+    outlines = {each: found for each in sketch.owners if each in chosen and (found := sketch.rings_of(each))}
     if not outlines:
         raise MapError("select polygons, walls or the boundary first")
     after, changed = sketch, []
@@ -284,10 +282,9 @@ def _simpler(rings: tuple[Ring, ...], tolerance: float, closed: bool) -> tuple[R
     def is_sound(rings: tuple[Ring, ...]) -> bool:
         return not closed or (min(map(len, rings)) >= 3 and bool(Polygon(rings[0], rings[1:]).is_valid))
 
-    sound = is_sound(rings)
     for step in range(_STEPS):
         fewer = tuple(_fewer(ring, tolerance / 2**step, closed) for ring in rings)
-        if is_sound(fewer) >= sound:
+        if is_sound(fewer) >= is_sound(rings):
             return fewer
     return rings
 

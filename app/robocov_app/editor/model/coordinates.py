@@ -121,10 +121,9 @@ def _pair(typed: str, signs: str) -> tuple[float, float]:
         parted.append(re.split(r"\s*,\s*", typed))
     # the unit of a length may stand apart from it
     parted.append(re.split(r"\s+(?=[+\-.,\d])", typed))
-    two = next(
-        (parts for parts in parted if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts))), ["", ""]
-    )
-    return _length(two[0]), _length(two[1])
+    fits = [parts for parts in parted if len(parts) == 2 and all(map(_LENGTH.fullmatch, parts))]
+    a, b = fits[0] if fits else ("", "")
+    return _length(a), _length(b)
 
 
 def _angle(typed: str) -> float:

@@ -9,7 +9,7 @@ import shapely
 from robocov.arrays import Array, BoolArray
 from robocov.environment import DiscStart, Point, PointsStart
 from robocov_app.editor.model.geometry import as_array, nearest_on
-from robocov_app.editor.model.selection import Edge, Selection, Vertex
+from robocov_app.editor.model.selection import Edge, Selection, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
@@ -62,43 +62,34 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
 
 def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
     """Return all that lies in a box, `touched`: or only touches it; the boundary counts only as a whole."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    area = shapely.box(*low, *high)
+    box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
     if touched:
-        places = sketch.tree.query(area, predicate="intersects")
+        places = sketch.tree.query(box, predicate="intersects")
     else:
-        corners = _inside(shapely.bounds(sketch.geometries), low, high)
+        corners = _inside(shapely.bounds(sketch.geometries), a, b)
         places = np.flatnonzero(corners.reshape(-1, 2).all(axis=1))
     items = [sketch.obstacles[k] for k in places.tolist()]
     starts = []
     for name, spec in sketch.starts:
-        inside = _inside([point for ring in sketch.ring_points(name) for point in ring], low, high)
+        inside = _inside([at for _, at in points_of(sketch, name)], a, b)
         caught = inside.any() if touched else inside.size and inside.all()
         if touched and isinstance(spec, DiscStart):
-            caught = shapely.distance(area, shapely.Point(spec.center)) <= spec.radius
+            caught = shapely.distance(box, shapely.Point(spec.center)) <= spec.radius
         starts += [name] if caught else []
-    ring = _inside(sketch.boundary or (), low, high)
-    return Selection(
-        frozenset(item.key for item in items if item.takeable),
-        starts=frozenset(starts),
-        boundary=bool(ring.size and ring.all()),
-    )
+    ring = _inside(sketch.boundary or (), a, b)
+    keys = frozenset(item.key for item in items if item.takeable)
+    return Selection(keys, starts=frozenset(starts), boundary=bool(ring.size and ring.all()))
 
 
 def vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    found = [
-        Vertex(owner, ring, k)
-        for owner in owners
-        for ring, points in enumerate(sketch.ring_points(owner))
-        for k in np.flatnonzero(_inside(points, low, high)).tolist()
-    ]
-    return Selection(vertices=frozenset(found))
+    pairs = [pair for owner in owners for pair in points_of(sketch, owner)]
+    inside = np.flatnonzero(_inside([at for _, at in pairs], a, b)).tolist()
+    return Selection(vertices=frozenset(pairs[k][0] for k in inside))
 
 
-def _inside(points: Sequence[Point] | Array, low: Array, high: Array) -> BoolArray:
+def _inside(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
     at = as_array(points)
-    return np.asarray(((at >= low) & (at <= high)).all(axis=1))
+    return np.asarray(((at >= np.minimum(a, b)) & (at <= np.maximum(a, b))).all(axis=1))
 
 
 def _items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:

@@ -7,17 +7,21 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from robocov import environment as env
-from robocov.environment import Obstacle, Point, Ring
+from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
 from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of
 from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import taken_apart
-from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.model.sketch import KINDS, Item, Sketch
 
 _MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
-_OBSTACLES = {"polygon": env.PolygonObstacle, "circle": env.CircleObstacle, "wall": env.WallObstacle}
-_STARTS = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
+_OBSTACLES: dict[str, type[Obstacle]] = {kind: shape for shape, kind in KINDS.items()}
+_STARTS: dict[str, type[StartSpec]] = {
+    "disc": env.DiscStart,
+    "uniform": env.UniformStart,
+    "points": env.PointsStart,
+}
 # parser method of each key
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
@@ -46,9 +50,7 @@ def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> 
     reader = _Reader(where)
     members = reader.members(document, (), _MAP)
     obstacles = reader.typed(list, members.get("obstacles", []), ("obstacles",), "a list of obstacles")
-    shapes: list[Obstacle] = [
-        reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)
-    ]
+    shapes = [reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)]
     starts = reader.typed(dict, members.get("starts", {}), ("starts",), "an object")
     extra = reader.typed(dict, members.get("extra", {}), ("extra",), "an object")
     marks, background, others = taken_apart(extra, [shape.name for shape in shapes])

@@ -41,11 +41,9 @@ class Selection:
 
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
-        return cls(
-            items=frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY),
-            starts=frozenset(each for each in owners if isinstance(each, str)),
-            boundary=BOUNDARY in owners,
-        )
+        items = frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY)
+        starts = frozenset(each for each in owners if isinstance(each, str))
+        return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
     def all(cls, sketch: Sketch) -> Selection:
@@ -72,12 +70,9 @@ class Selection:
 
     def within(self, sketch: Sketch) -> Selection:
         """Return what of the selection there is in a sketch, as after undoing."""
-        return Selection(
-            self.items & sketch.places.keys(),
-            frozenset(vertex for vertex in self.vertices if exists(sketch, vertex)),
-            self.starts & dict(sketch.starts).keys(),
-            self.boundary and sketch.boundary is not None,
-        )
+        items, starts = self.items & sketch.places.keys(), self.starts & dict(sketch.starts).keys()
+        vertices = frozenset(vertex for vertex in self.vertices if exists(sketch, vertex))
+        return Selection(items, vertices, starts, self.boundary and sketch.boundary is not None)
 
     def without_vertices(self) -> Selection:
         return replace(self, vertices=frozenset())

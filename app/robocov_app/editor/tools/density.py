@@ -79,8 +79,7 @@ class DensityTool(Tool):
     def preview(self, context: Workspace) -> Preview | None:
         features = density.features_of(self.change.sketch if self.change is not None else context.sketch)
         dots = [_middle(feature) for feature in features]
-        for feature in features:
-            dots += feature.vertices if isinstance(feature, WeightedArea) else ()
+        dots += [point for area in features if isinstance(area, WeightedArea) for point in area.vertices]
         shown, words = self.chosen, ""
         if self.begun is not None and self.change is not None:
             shown = self._taken if self._taken is not None else len(features) - 1
@@ -91,9 +90,8 @@ class DensityTool(Tool):
                 words = f"σ {length_words(density.spread_of(feature))}, {words}"
         if not features and not words:
             return None
-        return Preview(
-            words=words, rings=tuple(map(_outline, features)), dots=tuple(dots), chosen=self.chosen
-        )
+        rings = tuple(map(_outline, features))
+        return Preview(words=words, rings=rings, dots=tuple(dots), chosen=self.chosen)
 
     def shape_of_cursor(self, context: Workspace) -> str:
         return "move" if self._taken is not None and self.begun is not None else "cross"
@@ -104,9 +102,10 @@ class DensityTool(Tool):
             return density.area_added(sketch, rectangle(begun, to), self.weight)
         if number is None:
             return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
-        if number >= len(density.features_of(sketch)):
+        features = density.features_of(sketch)
+        if number >= len(features):
             return None
-        feature = density.features_of(sketch)[number]
+        feature = features[number]
         if isinstance(feature, Gaussian):
             if self._corner is not None:
                 return density.peak_sized(sketch, number, distance(feature.center, to))

@@ -318,7 +318,5 @@ class DoorTool(Tool):
             return None
         a, b = create.door_at(context.sketch, self._wall, self.at, self.width)
         if self.begun is not None and distance(self.begun.point, self.at) > 0.1 * self.width:
-            a, b = (
-                create.on_wall(context.sketch, self._wall, place) for place in (self.begun.point, self.at)
-            )
+            a, b = (create.on_wall(context.sketch, self._wall, at) for at in (self.begun.point, self.at))
         return Preview((a, b), words=f"door, {length_words(distance(a, b))}")

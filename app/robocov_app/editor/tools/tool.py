@@ -20,9 +20,7 @@ BESIDE = 11.0  # pixels at scale 1 between what is selected and the box around i
 KNOB = 24.0  # pixels at scale 1 that the knob is above the box
 SNAPS_WITHIN = 0.6  # part of a finger's width: a line that is far off is not to beat the grid
 ROOMY = 34.0  # pixels at scale 1 that a side of the box has at least when there is a handle in its middle
-SMALL = (
-    26.0  # pixels at scale 1 of a thing below which its vertices are no handles, so that it can be dragged
-)
+SMALL = 26.0  # pixels at scale 1 of a thing below which its vertices are no handles: it is to be dragged
 MOST_VERTICES = 4000  # vertices that are shown at most: more could not be told apart
 
 
