@@ -273,15 +273,15 @@ def test_parts_are_found_by_key():
     sketch, (a, b) = Sketch().added([CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")])
     assert sketch.item(b).note == "note"
     assert sketch.fresh_key > max(a, b)
-    wider = sketch.with_shapes({b: WallObstacle(HALL, 0.2)})
+    wider = sketch.with_things({b: WallObstacle(HALL, 0.2)})
     assert wider.item(a) is sketch.item(a)
     assert wider.item(b).shape == WallObstacle(HALL, 0.2)
     assert wider.item(b).note == "note"
     assert sketch.without([a]).obstacles == (sketch.item(b),)
     with pytest.raises(KeyError):
         sketch.item(99)
-    sketch = sketch.with_start("s", UniformStart()).with_start("t", UniformStart())
-    sketch = sketch.with_start("s", DiscStart((0.0, 0.0), 1.0))
+    sketch = sketch.with_things({"s": UniformStart(), "t": UniformStart()})
+    sketch = sketch.with_things({"s": DiscStart((0.0, 0.0), 1.0)})
     assert sketch.starts == (("s", DiscStart((0.0, 0.0), 1.0)), ("t", UniformStart()))
     assert sketch.start("t") == UniformStart()
 

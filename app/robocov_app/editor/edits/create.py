@@ -15,7 +15,7 @@ from robocov.mapfile.models import LARGEST, LONGEST_LABEL, SMALLEST
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
-from robocov_app.editor.model.sketch import Sketch, kind_and_name
+from robocov_app.editor.model.sketch import Sketch
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
 _LONGEST_TEXT = 10_000
@@ -23,7 +23,7 @@ _LONGEST_TEXT = 10_000
 
 def drawn(sketch: Sketch, shape: Obstacle) -> Change:
     after, keys = sketch.added([shape])
-    return Change(after, Selection.of(*keys), f"{kind_and_name(shape)} drawn")
+    return Change(after, Selection.of(*keys), f"{after.display_name(keys[0])} drawn")
 
 
 def polygon_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
@@ -73,7 +73,7 @@ def anywhere_added(sketch: Sketch) -> Change:
 
 def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     name = free_name(sketch, "start")
-    return Change(sketch.with_start(name, spec), Selection.of(name), f"start “{name}” added")
+    return Change(sketch.with_things({name: spec}), Selection.of(name), f"start “{name}” added")
 
 
 def added(
@@ -84,7 +84,7 @@ def added(
     names = []
     for name, spec in starts:
         names.append(free_name(after, name or "start"))
-        after = after.with_start(names[-1], spec)
+        after = after.with_things({names[-1]: spec})
     return after, Selection.of(*keys, *names)
 
 

@@ -115,7 +115,7 @@ def _widened(sketch: Sketch, gap: LineString, width: float) -> Change | None:
     for item, a, _ in sides:
         if shorter := _shortened(item.shape, a, lack):
             words = f"{numbered_name(sketch, item.key)} shortened by {lack:.2g} m"
-            return Change(sketch.with_shapes({item.key: shorter}), Selection.of(item.key), words)
+            return Change(sketch.with_things({item.key: shorter}), Selection.of(item.key), words)
     here, there = ({item.key for item, a, _ in sides if a == end} for end, _ in ends)
     alone = [side for side in sides if side[0].key not in here & there]
     if not alone or gap.length == 0.0:

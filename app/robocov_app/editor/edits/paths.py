@@ -128,7 +128,7 @@ def _paths(sketch: Sketch, selection: Selection) -> dict[int, ObstaclePath]:
 
 def _with_paths(sketch: Sketch, selection: Selection, paths: Mapping[int, Any], words: str) -> Change:
     shapes = {key: replace(sketch.item(key).shape, path=path) for key, path in paths.items()}
-    return Change(sketch.with_shapes(shapes), selection, f"{Selection.of(*paths).words(sketch)}: {words}")
+    return Change(sketch.with_things(shapes), selection, f"{Selection.of(*paths).words(sketch)}: {words}")
 
 
 def _put(sketch: Sketch, key: int, path: ObstaclePath, words: str) -> Change:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from robocov import environment as env
-from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov.environment import Obstacle, Point, Ring
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
 from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of
@@ -17,11 +17,7 @@ from robocov_app.editor.model.sketch import KINDS, Item, Sketch
 
 _MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
 _OBSTACLES: dict[str, type[Obstacle]] = {kind: shape for shape, kind in KINDS.items()}
-_STARTS: dict[str, type[StartSpec]] = {
-    "disc": env.DiscStart,
-    "uniform": env.UniformStart,
-    "points": env.PointsStart,
-}
+_STARTS: dict[str, Any] = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
 # parser method of each key
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")

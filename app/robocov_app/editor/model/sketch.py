@@ -122,10 +122,11 @@ class Sketch:
 
     def display_name(self, owner: Owner) -> str:
         """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
-        if owner == BOUNDARY:
-            return "boundary"
-        name = f"start “{owner}”" if isinstance(owner, str) else kind_and_name(self.item(owner).shape)
-        return one_line(name)
+        if isinstance(owner, str):
+            return one_line(f"start “{owner}”")
+        shape = None if owner == BOUNDARY else self.item(owner).shape
+        kind = "boundary" if shape is None else KINDS[type(shape)]
+        return one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
 
     def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
         """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
@@ -163,9 +164,7 @@ class Sketch:
 
     @cached_property
     def geometries(self) -> Any:  # an array of shapely geometries
-        geometries = np.empty(len(self.obstacles), dtype=object)
-        geometries[:] = [item.geometry for item in self.obstacles]
-        return geometries
+        return np.array([item.geometry for item in self.obstacles], dtype=object)
 
     @cached_property
     def tree(self) -> shapely.STRtree:
@@ -173,7 +172,7 @@ class Sketch:
 
     @property
     def fresh_key(self) -> int:
-        return max((item.key for item in self.obstacles), default=-1) + 1
+        return max(self.places, default=-1) + 1
 
     def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
@@ -181,20 +180,14 @@ class Sketch:
         items = [Item(k, *pair) for k, pair in enumerate(pairs, self.fresh_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
-    def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
-        """Return the sketch with other shapes for some keys; what stays equal stays the same object."""
-        changed = {key: shape for key, shape in shapes.items() if shape != self.item(key).shape}
-        items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
-        return replace(self, obstacles=tuple(items))
-
-    def with_start(self, name: str, spec: StartSpec) -> Sketch:
-        """Return the sketch with a start changed in its place, or added as the last."""
-        return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
-
     def with_things(self, things: Mapping[Any, Any]) -> Sketch:
-        """Return the sketch with other obstacles and starts in place of some."""
-        after = self.with_shapes({owner: thing for owner, thing in things.items() if isinstance(owner, int)})
-        return replace(after, starts=tuple((name, things.get(name, spec)) for name, spec in self.starts))
+        """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
+        changed = {
+            k: shape for k, shape in things.items() if isinstance(k, int) and shape != self.item(k).shape
+        }
+        items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
+        starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
+        return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
 
     def without(self, owners: Iterable[Owner]) -> Sketch:
         gone = frozenset(owners)
@@ -232,11 +225,6 @@ def draft_document(sketch: Sketch) -> dict[str, Any]:
 def sketch_text(sketch: Sketch) -> str:
     """Return the text of the file of a sketch, as `robocov.mapfile.dump_map` has it."""
     return dump_document(draft_document(sketch))
-
-
-def kind_and_name(shape: Obstacle) -> str:
-    kind = KINDS[type(shape)]
-    return f"{kind} “{shape.name}”" if shape.name else kind
 
 
 def geometry_of(shape: Obstacle) -> shapely.Geometry:
