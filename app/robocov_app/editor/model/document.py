@@ -86,12 +86,10 @@ class History:
 
     @property
     def past(self) -> tuple[str, ...]:
-        """Undoable changes in words, the newest first."""
         return tuple(step.after.words for step in reversed(self._done))
 
     @property
     def future(self) -> tuple[str, ...]:
-        """Redoable changes in words, the next first."""
         return tuple(step.after.words for step in reversed(self._undone))
 
     def break_drag(self) -> None:

@@ -111,18 +111,15 @@ def _middle(gap: Gap) -> Point:
 def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
     """Warn of each passage that is too narrow: of several gaps in one marked place, of the narrowest."""
     found: dict[int, Problem] = {}
-    tree = shapely.STRtree(marks)
+    tree, narrows = shapely.STRtree(marks), f"too narrow for robots of radius {radius:g} m"
     for gap in narrow:
+        words = f"the gap at {place_words(*_middle(gap))} is {gap.width:.3g} m wide: {narrows}"
         mark = int(tree.nearest(shapely.Point(_middle(gap))))
-        if mark not in found:
-            at = place_words(*_middle(gap))
-            words = f"the gap at {at} is {gap.width:.3g} m wide: too narrow for robots of radius {radius:g} m"
-            found[mark] = Problem(words, LineString(gap.between), None, False, "narrow")
+        found.setdefault(mark, Problem(words, LineString(gap.between), None, False, "narrow"))
     problems = list(found.values())
     if more := problems[_MOST_GAPS:]:
-        words = f"{len(more)} more gaps are too narrow for robots of radius {radius:g} m"
         where = shapely.union_all([problem.where for problem in more])
-        problems[_MOST_GAPS:] = [Problem(words, where, None, False)]
+        problems[_MOST_GAPS:] = [Problem(f"{len(more)} more gaps are {narrows}", where, None, False)]
     return problems
 
 

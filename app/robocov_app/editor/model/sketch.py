@@ -70,7 +70,7 @@ class Sketch:
     @classmethod
     def from_environment(cls, environment: env.Environment) -> Sketch:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        shapes, free_keys = environment.obstacles, to_json(environment).get("extra", {})
+        shapes, free_keys = environment.obstacles, dict(environment.extra)
         marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
         return cls(
             name=environment.name,

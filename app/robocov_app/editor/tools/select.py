@@ -11,7 +11,7 @@ from robocov_app.editor.model.coordinates import angle_of, length_of, next_point
 from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of
 from robocov_app.editor.model.sketch import Owner
-from robocov_app.editor.tools.snapping import Guide, snapped, snapped_angle, snapped_move
+from robocov_app.editor.tools.snapping import Guide, Snap, snapped_angle, snapped_move
 from robocov_app.editor.tools.tool import Handle, PointerEvent, Preview, Tool, Workspace, handle_at, side_of
 
 MANY_POINTS = 1000  # points of what is moved from which on it is moved as a picture
@@ -28,8 +28,9 @@ _CURSORS |= {(-x, -y): shape for (x, y), shape in _CURSORS.items()}
 class Drag:
     """Something that is dragged: each move gives the change that letting go would make."""
 
-    def __init__(self, context: Workspace, moving: Selection) -> None:
+    def __init__(self, context: Workspace, moving: Selection, begun: Point) -> None:
         self.context, self.moving = context, moving
+        self._begun = self._at = begun
         self.change: Change | None = None
         self.guides: tuple[Guide, ...] = ()
         self.words = ""  # beside the cursor
@@ -49,11 +50,8 @@ class Drag:
 
     def snapped_to(self, event: PointerEvent, to: Point, origin: Point | None = None) -> Point:
         """Return where a place snaps to anything but what is dragged, unless Ctrl is held down."""
-        self.guides, without = (), self.moving.vertices or self.moving.owners
-        targets = None if event.ctrl else self.context.snapper.targets(self.context.sketch, without)
-        if targets is None:
-            return to
-        snap = snapped(to, targets, self.context.snapping(event.reach), origin)
+        dragged = self.moving.vertices or self.moving.owners
+        snap = Snap(to) if event.ctrl else self.context.snapped(to, event.reach, origin, without=dragged)
         self.guides = snap.guides
         return snap.point
 
@@ -62,8 +60,7 @@ class Moving(Drag):
     """Moves whole things, or copies them; by an `offset`, m, where a change in each frame took too long."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
-        super().__init__(context, selection)
-        self._begun = self._at = begun
+        super().__init__(context, selection, begun)
         points = [at for owner in selection.owners for _, at in points_of(context.sketch, owner)]
         self._points = points[:: max(1, len(points) // FEW_POINTS)]
         self.offset = (0.0, 0.0) if len(points) > MANY_POINTS else None
@@ -74,9 +71,8 @@ class Moving(Drag):
         self.copies, self.guides = event.alt, ()
         to = geometry.at_round_angle(self._begun, event.raw) if event.shift else event.raw
         by = [to[0] - self._begun[0], to[1] - self._begun[1]]
-        free = event.ctrl or event.shift
-        targets = None if free else self.context.snapper.targets(self.context.sketch, self.moving.owners)
-        if targets is not None:
+        targets = self.context.snapper.targets(self.context.sketch, self.moving.owners)
+        if targets is not None and not (event.ctrl or event.shift):
             snap = snapped_move(self._points, by[0], by[1], targets, self.context.snapping(event.reach))
             self.guides = snap.guides
             for axis in (0, 1):
@@ -118,14 +114,13 @@ class MovingVertices(Drag):
     """Moves single vertices: the one that was taken, and those that are selected with it."""
 
     def __init__(self, context: Workspace, taken: Vertex, selection: Selection) -> None:
-        super().__init__(context, Selection(vertices=selection.vertices | {taken}))
-        self._begun = self._at = place_of(context.sketch, taken)
+        dragged = Selection(vertices=selection.vertices | {taken})
+        super().__init__(context, dragged, place_of(context.sketch, taken))
         # the vertex before it on its ring, or after a wall's first; None of circles and starts
         self._origin: Point | None = None
-        for ring, points, closed in context.sketch.rings_of(taken.of):
-            if ring == taken.ring:
-                first = taken.index == 0 and not closed
-                self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]
+        for _, points, closed in context.sketch.rings_of(taken.of)[taken.ring : taken.ring + 1]:
+            first = taken.index == 0 and not closed
+            self._origin = points[min(1, len(points) - 1) if first else taken.index - 1]
 
     def to(self, event: PointerEvent) -> None:
         """Follow the mouse; with Shift at a round angle from the vertex before, with Ctrl freely."""
@@ -151,7 +146,7 @@ class Turning(Drag):
     """Turns whole things about the middle of their box."""
 
     def __init__(self, context: Workspace, selection: Selection, begun: Point) -> None:
-        super().__init__(context, selection)
+        super().__init__(context, selection, begun)
         self.about = geometry.middle_of(bounds_of(context.sketch, selection) or (0.0, 0.0, 0.0, 0.0))
         self._from = geometry.bearing(self.about, begun)
 
@@ -177,7 +172,7 @@ class Scaling(Drag):
     """Scales whole things by a corner or a side of their box; the opposite one stays."""
 
     def __init__(self, context: Workspace, selection: Selection, handle: Handle) -> None:
-        super().__init__(context, selection)
+        super().__init__(context, selection, handle.at)
         self._side = handle.side
         self._bounds = bounds_of(context.sketch, selection) or (0.0, 0.0, 1.0, 1.0)
         self._taken = side_of(self._bounds, self._side)
@@ -225,8 +220,7 @@ class Box(Drag):
     """Selects what lies in a box; drawn to the left also what it touches."""
 
     def __init__(self, context: Workspace, begun: Point, *, adds: bool) -> None:
-        super().__init__(context, Selection())
-        self._begun = self._at = begun
+        super().__init__(context, Selection(), begun)
         self._before, self._adds = context.selection if adds else Selection(), adds
 
     def to(self, event: PointerEvent) -> None:

@@ -11,7 +11,7 @@ from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.geometry import Box, at_round_angle, distance, middle_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
-from robocov_app.editor.tools.snapping import SNAPS, Guide, Snap, Snapper, Snapping, snapped
+from robocov_app.editor.tools.snapping import SNAPS, Dragged, Guide, Snap, Snapper, Snapping, snapped
 from robocov_app.render.surface_cache import Latest
 
 Kind: TypeAlias = Literal["vertex", "scale", "turn"]
@@ -149,8 +149,10 @@ class Workspace:
         kinds = frozenset(kind for name in self.snaps for kind in SNAPS[name][1])
         return Snapping(SNAPS_WITHIN * reach, self.grid, self.snap_angle, kinds)
 
-    def snapped(self, raw: Point, reach: float, origin: Point | None = None, more: Ring = ()) -> Snap:
-        targets = self.snapper.targets(self.sketch, (), more)
+    def snapped(
+        self, raw: Point, reach: float, origin: Point | None = None, more: Ring = (), without: Dragged = ()
+    ) -> Snap:
+        targets = self.snapper.targets(self.sketch, without, more)
         return Snap(raw) if targets is None else snapped(raw, targets, self.snapping(reach), origin)
 
     def change(self, change: Change, *, drag: Hashable | None = None) -> None:
