@@ -10,6 +10,7 @@ import shapely
 from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import outlines, tenths
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
@@ -48,10 +49,8 @@ def divided(sketch: Sketch, selection: Selection) -> Change:
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
     """Grow the selected obstacles by so many metres on every side, with sharp corners; shrink with by < 0."""
-    if not SMALLEST <= abs(by) <= LARGEST:
-        raise MapError(f"a length of at least {1000 * SMALLEST:g} mm was wanted")
-    if not selection.items:
-        raise MapError("select obstacles first")
+    require(SMALLEST <= abs(by) <= LARGEST, f"a length of at least {1000 * SMALLEST:g} mm was wanted")
+    require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
     for item in selection.items_in(sketch):
         if isinstance(item.shape, CircleObstacle):
@@ -61,8 +60,7 @@ def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
             # corners sharper than a right angle would reach far out: they are cut off
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
             shapes[item.key] = outlines(buffered, item.shape.name)
-        if not shapes[item.key]:
-            raise MapError(f"nothing would be left of the {sketch.display_name(item.key)}")
+        require(shapes[item.key], f"nothing would be left of the {sketch.display_name(item.key)}")
     words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
     return replace_obstacles(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
 
@@ -78,8 +76,7 @@ def clipped(sketch: Sketch, selection: Selection) -> Change:
         for item in sketch.obstacles
         if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
     }
-    if not shapes:
-        raise MapError("nothing sticks out of the boundary")
+    require(shapes, "nothing sticks out of the boundary")
     return replace_obstacles(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
 
 
@@ -99,8 +96,7 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
         parts = outlines(shapely.make_valid(shapely.Polygon(boundary)))
         boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
-    if not (shapes or redrawn):
-        raise MapError("there is nothing to repair: no outline crosses itself")
+    require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
     words = f"{counted(len(shapes) + redrawn, 'outline')} repaired"
     change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
     selected = replace(change.selection, boundary=redrawn and boundary is not None)
@@ -113,8 +109,7 @@ def _union(items: Sequence[Item]) -> shapely.Geometry:
 
 def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
     items = selection.items_in(sketch)
-    if len(items) < 2:
-        raise MapError(f"select two or more obstacles to {verb}")
+    require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
             raise MapError(f"the {sketch.display_name(item.key)} covers nothing: repair or delete it first")
@@ -125,6 +120,5 @@ def _in_place(sketch: Sketch, items: list[Item], parts: list[Any], words: str, e
     """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
     lowest, *others = items
     shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]
-    if not shapes:
-        raise MapError(empty or "nothing is left")
+    require(shapes, empty or "nothing is left")
     return replace_obstacles(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)

@@ -9,6 +9,7 @@ from robocov.mapfile import dump_document
 from robocov.mapfile.models import HEAD
 from robocov_app.editor.edits.create import added
 from robocov_app.editor.edits.transform import bounds_of, moved
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import middle_of
 from robocov_app.editor.model.parser import sketch_of
 from robocov_app.editor.model.selection import Change, Selection
@@ -38,8 +39,7 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
         shapes.append((PolygonObstacle(part.boundary), ""))
     after, new = added(sketch, shapes, part.starts)
     selection = replace(new, boundary=new_boundary)
-    if not selection:
-        raise MapError("there is nothing to paste in what was copied")
+    require(selection, "there is nothing to paste in what was copied")
     after = replace(after, boundary=part.boundary) if new_boundary else after
     bounds = bounds_of(after, selection)
     by = [0.0, 0.0]
@@ -52,10 +52,8 @@ def pasted(sketch: Sketch, text: str, at: Point | None = None, grid: float | Non
 
 
 def _part(text: str) -> Sketch:
-    if not text.strip():
-        raise MapError("there is nothing to paste")
-    if text.lstrip()[:1] not in ("{", "["):
-        raise MapError("what was copied is no part of a map")
+    require(text.strip(), "there is nothing to paste")
+    require(text.lstrip()[:1] in ("{", "["), "what was copied is no part of a map")
     try:
         value = parse(text, "what was copied")
         if isinstance(value, dict) and "format" in value:
@@ -63,8 +61,7 @@ def _part(text: str) -> Sketch:
             return sketch_of({**value, "format": HEAD["format"]} if ours else value, "what was copied")
         obstacles = [value] if isinstance(value, dict) else value
         if not obstacles or not all(isinstance(each, dict) for each in obstacles):
-            if len(obstacles) < 3:
-                raise MapError("three points at least, obstacles or a map were wanted")
+            require(len(obstacles) >= 3, "three points at least, obstacles or a map were wanted")
             obstacles = [{"kind": "polygon", "vertices": obstacles}]
         return sketch_of({**HEAD, "obstacles": obstacles}, "what was copied")
     except MapError as error:

@@ -12,6 +12,7 @@ from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, LONGEST_LABEL, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
@@ -46,8 +47,7 @@ def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
     line = distinct(ring_near(points), closed=False)
     if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
-    if not SMALLEST <= width <= LARGEST:
-        raise MapError(f"a wall's width is at least {1000 * SMALLEST:g} mm")
+    require(SMALLEST <= width <= LARGEST, f"a wall's width is at least {1000 * SMALLEST:g} mm")
     return drawn(sketch, env.WallObstacle(line, tenths(width)))
 
 
@@ -62,8 +62,7 @@ def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
 
 def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
     places = tuple(dict.fromkeys(ring_near(points)))
-    if not places:
-        raise MapError("a start needs a place for a robot at least")
+    require(places, "a start needs a place for a robot at least")
     return _start_added(sketch, env.PointsStart(places))
 
 
@@ -99,16 +98,13 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 def label_of(name: str) -> str:
     name = _encodable(" ".join(name.split()))
-    if len(name) > LONGEST_LABEL:
-        raise MapError(f"a name has at most {LONGEST_LABEL} characters")
-    if any(ord(char) < 32 or ord(char) == 127 for char in name):
-        raise MapError("a name is text on one line")
+    require(len(name) <= LONGEST_LABEL, f"a name has at most {LONGEST_LABEL} characters")
+    require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
     return name
 
 
 def text_of(text: str, what: str) -> str:
-    if len(text) > _LONGEST_TEXT:
-        raise MapError(f"{what} has at most {_LONGEST_TEXT} characters")
+    require(len(text) <= _LONGEST_TEXT, f"{what} has at most {_LONGEST_TEXT} characters")
     return _encodable(text.strip())
 
 
@@ -125,8 +121,7 @@ def _outline(points: Sequence[Point], what: str) -> Ring:
 
 
 def _radius(radius: float, what: str) -> float:
-    if not SHORTEST <= radius <= LARGEST:
-        raise MapError(f"{what} needs a radius: drag from its middle to its rim")
+    require(SHORTEST <= radius <= LARGEST, f"{what} needs a radius: drag from its middle to its rim")
     return tenths(radius)
 
 
@@ -148,8 +143,7 @@ def on_wall(sketch: Sketch, key: int, point: Point) -> Point:
 
 
 def door_width(width: float) -> float:
-    if not SHORTEST <= width <= LARGEST:
-        raise MapError(f"a door's width is at least {100 * SHORTEST:g} cm")
+    require(SHORTEST <= width <= LARGEST, f"a door's width is at least {100 * SHORTEST:g} cm")
     return width
 
 
@@ -178,8 +172,7 @@ def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
         for low, high in ((0.0, begin), (end, line.length))
         if high - low >= SMALLEST
     ]
-    if not pieces:
-        raise MapError(f"nothing would be left of the {sketch.display_name(key)}")
+    require(pieces, f"nothing would be left of the {sketch.display_name(key)}")
     words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"
     return replace_obstacles(sketch, {key: pieces}, words)
 

@@ -12,6 +12,7 @@ from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST
 from robocov_app.editor.edits.create import SHORTEST
 from robocov_app.editor.edits.transform import Affine
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
@@ -55,8 +56,9 @@ def area_added(
 def areas_made(sketch: Sketch, selection: Selection, weight: float) -> Change:
     chosen = [item.shape for item in selection.items_in(sketch)]
     shapes = [shape for shape in chosen if isinstance(shape, PolygonObstacle)]
-    if not shapes or len(shapes) < len(chosen):
-        raise MapError("select polygons first: they become areas that count more, or less")
+    require(
+        len(shapes) == len(chosen) > 0, "select polygons first: they become areas that count more, or less"
+    )
     after = sketch.without(selection.items)
     for shape in shapes:
         after = area_added(after, shape.vertices, weight, shape.holes, shape.name).sketch
@@ -108,8 +110,7 @@ def floor_set(sketch: Sketch, floor: float) -> Change:
 
 
 def density_removed(sketch: Sketch) -> Change:
-    if sketch.density is None:
-        raise MapError("every place counts the same already")
+    require(sketch.density is not None, "every place counts the same already")
     return Change(replace(sketch, density=None), Selection(), "density taken away")
 
 
@@ -151,8 +152,8 @@ def _put(sketch: Sketch, features: Sequence[Feature], words: str, base: float | 
     base = now if base is None else base
     peaks = tuple(each for each in features if isinstance(each, Gaussian))
     areas = tuple(each for each in features if isinstance(each, WeightedArea))
-    if areas and not max(base, *(area.weight for area in areas)) > 0.0:
-        raise MapError("some place must have a weight above 0")
+    heaviest = max([base, *(area.weight for area in areas)])
+    require(heaviest > 0.0 or not areas, "some place must have a weight above 0")
     after = replace(sketch, density=WeightedPolygons(areas, base) if areas else Gaussians(peaks, base))
     return Change(after, Selection(), words)
 
@@ -165,8 +166,7 @@ def _changed(sketch: Sketch, number: int, feature: Feature, words: str) -> Chang
 
 def _feature(sketch: Sketch, number: int) -> Feature:
     features = features_of(sketch)
-    if not 0 <= number < len(features):
-        raise MapError("there is no such hot spot any more")
+    require(0 <= number < len(features), "there is no such hot spot any more")
     return features[number]
 
 
@@ -184,8 +184,7 @@ def _sound(area: WeightedArea) -> WeightedArea:
 
 
 def _sigma(sigma: float) -> float:
-    if not SHORTEST <= sigma <= LARGEST:
-        raise MapError("a hot spot needs a size: drag from its middle outwards")
+    require(SHORTEST <= sigma <= LARGEST, "a hot spot needs a size: drag from its middle outwards")
     return tenths(sigma)
 
 

@@ -15,6 +15,7 @@ from robocov.environment import SAGITTA, Obstacle, Point, PointsStart, WallObsta
 from robocov.errors import MapError
 from robocov_app.editor.edits import boolean, properties, transform
 from robocov_app.editor.edits.vertices import with_places
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, outlines, rectangle, rounded
 from robocov_app.editor.model.measurement import reach_of
 from robocov_app.editor.model.selection import Change, Selection, Vertex, numbered_name, place_of
@@ -67,15 +68,13 @@ def fixed(sketch: Sketch, problem: Problem, radius: float) -> Change | None:
 def unreachable_filled(sketch: Sketch, radius: float) -> Change:
     free = examined(sketch, radius)[1]
     reached, untouched = reach_of(free, radius)
-    if not reached:
-        raise MapError(f"no robot of radius {radius:g} m fits anywhere")
+    require(reached, f"no robot of radius {radius:g} m fits anywhere")
     return _filled(sketch, _beyond(free, reached[0], [*reached[1:], untouched, *list(free.geoms)[1:]]))
 
 
 def _filled(sketch: Sketch, where: BaseGeometry) -> Change:
     shapes = outlines(where.buffer(_OVER, join_style="mitre", mitre_limit=2.0))
-    if not shapes:
-        raise MapError("there is nothing to fill")
+    require(shapes, "there is nothing to fill")
     after, keys = sketch.added(shapes)
     return Change(after, Selection.of(*keys), "filled what cannot be reached")
 

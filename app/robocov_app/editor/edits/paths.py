@@ -11,6 +11,7 @@ from robocov.arrays import Array
 from robocov.environment import ObstaclePath, Point
 from robocov.errors import MapError
 from robocov.mapfile.models import FASTEST, SLOWEST, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import as_array, middle_of, nearest_on, point_near
 from robocov_app.editor.model.selection import Change, Selection
 from robocov_app.editor.model.sketch import Sketch
@@ -34,8 +35,7 @@ def way_point_added(
     path = sketch.item(key).shape.path
     if path is None:
         geometry = sketch.item(key).geometry
-        if geometry.is_empty:
-            raise MapError("what covers nothing cannot move")
+        require(not geometry.is_empty, "what covers nothing cannot move")
         ends = point_near(middle_of(geometry.bounds)), point_near(point)
         return _put(sketch, key, ObstaclePath(ends, _speed(speed), "back-and-forth"), "moves")
     where = len(path.points) if at is None else at
@@ -121,8 +121,7 @@ def _path(sketch: Sketch, key: int, number: int) -> ObstaclePath:
 def _paths(sketch: Sketch, selection: Selection) -> dict[int, ObstaclePath]:
     shapes = {item.key: item.shape for item in selection.items_in(sketch)}
     paths = {key: shape.path for key, shape in shapes.items() if shape.path is not None}
-    if not paths:
-        raise MapError("select an obstacle that moves first; the tool Path gives one a path")
+    require(paths, "select an obstacle that moves first; the tool Path gives one a path")
     return paths
 
 

@@ -9,6 +9,7 @@ from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import vertices
 from robocov_app.editor.edits.create import label_of, text_of
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import outlines, tenths
 from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
@@ -17,8 +18,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
     """Delete what is selected; of single vertices, what `vertices.deleted` deletes."""
-    if not selection:
-        raise MapError("select something first")
+    require(selection, "select something first")
     after = sketch.without(selection.items | selection.starts)
     after = replace(after, boundary=None if selection.boundary else sketch.boundary)
     others = Selection(vertices=selection.vertices).within(after)
@@ -30,13 +30,10 @@ def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
     """Name an obstacle or a start; an empty name takes an obstacle's name away."""
     name = label_of(name)
     words = f"{sketch.display_name(owner)} renamed to “{name}”"
-    if owner == BOUNDARY:
-        raise MapError("the boundary has no name; the map has one")
+    require(owner != BOUNDARY, "the boundary has no name; the map has one")
     if isinstance(owner, str):
-        if not name:
-            raise MapError("a start needs a name")
-        if name != owner and name in dict(sketch.starts):
-            raise MapError(f"there is a start “{name}” already")
+        require(name, "a start needs a name")
+        require(name == owner or name not in dict(sketch.starts), f"there is a start “{name}” already")
         starts = tuple((name if each == owner else each, spec) for each, spec in sketch.starts)
         return Change(replace(sketch, starts=starts), Selection.of(name), words)
     words = words if name else f"{sketch.display_name(owner)}: name taken away"
@@ -45,8 +42,7 @@ def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
 
 
 def noted(sketch: Sketch, selection: Selection, note: str) -> Change:
-    if not selection.items:
-        raise MapError("select obstacles first: notes are written to them")
+    require(selection.items, "select obstacles first: notes are written to them")
     note = text_of(note, "a note")
     words = f"note on {Selection(items=selection.items).words(sketch)}{'' if note else ' taken away'}"
     return replace(_marked(sketch, selection, "", note=note), words=words)
@@ -54,8 +50,7 @@ def noted(sketch: Sketch, selection: Selection, note: str) -> Change:
 
 def grouped(sketch: Sketch, selection: Selection, name: str = "") -> Change:
     """Put the selected obstacles into a group, a new one without a name: a click selects all of it."""
-    if len(selection.items) < 2:
-        raise MapError("select two or more obstacles to group")
+    require(len(selection.items) >= 2, "select two or more obstacles to group")
     taken = {item.group for item in sketch.obstacles}
     name = label_of(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
     return _marked(sketch, selection, f"grouped as “{name}”", group=name)
@@ -63,8 +58,7 @@ def grouped(sketch: Sketch, selection: Selection, name: str = "") -> Change:
 
 def ungrouped(sketch: Sketch, selection: Selection) -> Change:
     keys = [key for key in selection.items if sketch.item(key).group]
-    if not keys:
-        raise MapError("select obstacles that are in a group")
+    require(keys, "select obstacles that are in a group")
     return _marked(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
@@ -80,14 +74,12 @@ def hidden(sketch: Sketch, selection: Selection) -> Change:
 def released(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected then."""
     keys = [item.key for item in sketch.obstacles if not item.takeable]
-    if not keys:
-        raise MapError("nothing is locked or hidden")
+    require(keys, "nothing is locked or hidden")
     return _marked(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
 def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> Change:
-    if not selection.items:
-        raise MapError("select obstacles first")
+    require(selection.items, "select obstacles first")
     chosen = selection.items
     items = tuple(replace(item, **marks) if item.key in chosen else item for item in sketch.obstacles)
     words = f"{Selection(items=selection.items).words(sketch)} {words}"
@@ -99,8 +91,7 @@ def titled(sketch: Sketch, name: str | None = None, description: str | None = No
     after, words = sketch, "map described"
     if name is not None:
         name = label_of(name)
-        if not name:
-            raise MapError("a map needs a name")
+        require(name, "a map needs a name")
         after, words = replace(after, name=name), f"map named “{name}”"
     if description is not None:
         after = replace(after, description=text_of(description, "a description"))
@@ -121,21 +112,17 @@ def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
 def _sized(
     sketch: Sketch, selection: Selection, kinds: Any, name: str, size: float, missing: str, words: str
 ) -> Change:
-    if not SMALLEST <= size <= LARGEST:
-        raise MapError(f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
+    require(SMALLEST <= size <= LARGEST, f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
     things: dict[Owner, Any] = {owner: sketch.thing(owner) for owner in selection.owners}
     sized = {owner: thing for owner, thing in things.items() if isinstance(thing, kinds)}
-    if not sized:
-        raise MapError(missing)
+    require(sized, missing)
     after = sketch.with_things({o: replace(thing, **{name: tenths(size)}) for o, thing in sized.items()})
     return Change(after, selection, f"{Selection.of(*sized).words(sketch)} {words.format(tenths(size))}")
 
 
 def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
-    if not selection.items:
-        raise MapError("select obstacles first")
-    if where not in ("top", "bottom"):
-        raise MapError("top or bottom was wanted")
+    require(selection.items, "select obstacles first")
+    require(where in ("top", "bottom"), "top or bottom was wanted")
     upper = selection.items if where == "top" else sketch.places.keys() - selection.items
     order = tuple(sorted(sketch.obstacles, key=lambda item: item.key in upper))
     way = "brought to the top" if where == "top" else "sent to the bottom"
@@ -144,8 +131,7 @@ def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
 
 
 def start_first(sketch: Sketch, name: str) -> Change:
-    if name not in dict(sketch.starts):
-        raise MapError(f"there is no start “{one_line(name)}”")
+    require(name in dict(sketch.starts), f"there is no start “{one_line(name)}”")
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
     words = f"start “{one_line(name)}” made the default"
     return Change(replace(sketch, starts=starts), Selection.of(name), words)
@@ -154,13 +140,11 @@ def start_first(sketch: Sketch, name: str) -> Change:
 def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     """Turn the selected circles and walls into polygons, whose vertices can be edited one by one."""
     chosen = [item for item in selection.items_in(sketch) if not isinstance(item.shape, PolygonObstacle)]
-    if not chosen:
-        raise MapError("select circles or walls first")
+    require(chosen, "select circles or walls first")
     shapes = {}
     for item in chosen:
         polygons = outlines(item.geometry, item.shape.name)
-        if not polygons:
-            raise MapError(f"the {sketch.display_name(item.key)} covers nothing: it cannot become a polygon")
+        require(polygons, f"the {sketch.display_name(item.key)} covers nothing: it cannot become a polygon")
         shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
     change = replace_obstacles(sketch, shapes, f"{Selection.of(*shapes).words(sketch)} turned into polygons")
     return replace(change, selection=change.selection.plus(selection.without_vertices()))

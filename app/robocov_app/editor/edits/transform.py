@@ -18,7 +18,7 @@ from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits.create import added
 from robocov_app.editor.edits.vertices import with_places
-from robocov_app.editor.model import geometry
+from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.background import turned
 from robocov_app.editor.model.geometry import Box, box_around, middle_of, tenths
 from robocov_app.editor.model.selection import Change, Selection, place_of
@@ -116,8 +116,7 @@ def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
 
 def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
     """Turn what is selected counter-clockwise, by default about the middle of its bounding box."""
-    if not math.isfinite(degrees):
-        raise MapError("an angle in degrees was wanted")
+    require(math.isfinite(degrees), "an angle in degrees was wanted")
     return _change(sketch, selection, Affine.turn(degrees, about or _middle(sketch, selection)), "turned")
 
 
@@ -138,10 +137,8 @@ def resized(sketch: Sketch, selection: Selection, width: float | None, height: f
     for wanted, there, name in ((width, wide, "width"), (height, high, "height")):
         if wanted is not None and not SMALLEST <= wanted <= LARGEST:
             raise MapError(f"a {name} from {1000 * SMALLEST:g} mm to {LARGEST / 1000:g} km was wanted")
-        if wanted is not None and there < SMALLEST:
-            raise MapError(f"it has no {name} that could be scaled")
-    if width is None and height is None:
-        raise MapError("a width or a height was wanted")
+        require(wanted is None or there >= SMALLEST, f"it has no {name} that could be scaled")
+    require(width is not None or height is not None, "a width or a height was wanted")
     fx, fy = (width or 0.0) / max(wide, SMALLEST), (height or 0.0) / max(high, SMALLEST)
     # walls keep their width, so that the box does not quite grow by the factor: go nearer step by step
     for _ in range(20):
@@ -166,26 +163,22 @@ def placed(sketch: Sketch, selection: Selection, x: float | None, y: float | Non
 
 def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
     """Mirror what is selected about the middle of its box: axis "x" swaps left and right, "y" up and down."""
-    if axis not in ("x", "y"):
-        raise MapError("an axis x or y was wanted")
+    require(axis in ("x", "y"), "an axis x or y was wanted")
     factors = (-1.0, 1.0) if axis == "x" else (1.0, -1.0)
     return _change(sketch, selection, Affine.stretch(*factors, _middle(sketch, selection)), "mirrored")
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
     whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
-    if not whole:
-        raise MapError("select obstacles or starts to copy")
+    require(whole, "select obstacles or starts to copy")
     return Change(*_copied(sketch, whole, Affine.shift(dx, dy)), f"{whole.words(sketch)} duplicated")
 
 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
     """Copy the selected obstacles into columns and rows, (dx, dy) m apart, the originals in a corner."""
     whole = Selection(items=selection.items)
-    if not whole:
-        raise MapError("select obstacles to copy")
-    if columns < 1 or rows < 1 or columns * rows < 2:
-        raise MapError("two columns or rows at least were wanted")
+    require(whole, "select obstacles to copy")
+    require(columns >= 1 and rows >= 1 and columns * rows >= 2, "two columns or rows at least were wanted")
     if columns * rows * len(whole.items) > _MOST_COPIES:
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
     after, everything = sketch, whole
@@ -197,20 +190,17 @@ def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: f
 
 def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
     """Align selected obstacles and starts, or vertices, at a side of their box, or of a selected boundary."""
-    if side not in SIDES:
-        raise MapError(f"one of {', '.join(SIDES)} was wanted")
+    require(side in SIDES, f"one of {', '.join(SIDES)} was wanted")
     words = {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
     if selection.vertices and not selection.owners:
         places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
-        if len(places) < 2:
-            raise MapError("select two or more vertices to align")
+        require(len(places) >= 2, "select two or more vertices to align")
         level = _level(box_around((*place, *place) for place in places.values()), side)
         new = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
         return Change(with_places(sketch, new), selection, f"{selection.words(sketch)} aligned {words}")
     boxes = _boxes(sketch, selection)
     frame = box_of(sketch, BOUNDARY) if selection.boundary else None
-    if selection.boundary and frame is None:
-        raise MapError("there is no boundary to align with")
+    require(frame is not None or not selection.boundary, "there is no boundary to align with")
     if len(boxes) < (1 if frame else 2):
         raise MapError(f"select {'' if frame else 'two or more '}obstacles or starts to align")
     frame = frame or box_around(boxes.values())
@@ -221,12 +211,10 @@ def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
 
 def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """Spread three or more selected things, with equal gaps between their boxes; first and last stay."""
-    if axis not in ("x", "y"):
-        raise MapError("an axis x or y was wanted")
+    require(axis in ("x", "y"), "an axis x or y was wanted")
     a = "xy".index(axis)
     boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
-    if len(boxes) < 3:
-        raise MapError("select three or more obstacles or starts to distribute")
+    require(len(boxes) >= 3, "select three or more obstacles or starts to distribute")
     low, sizes = boxes[0][1][a], [box[a + 2] - box[a] for _, box in boxes]
     gap = (boxes[-1][1][a + 2] - low - sum(sizes)) / (len(boxes) - 1)
     off: dict[Owner, float] = {}
@@ -239,8 +227,7 @@ def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
 
 def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     """Turn map, picture and density about `a`: the line to `b` becomes level or upright."""
-    if math.dist(a, b) < SMALLEST:
-        raise MapError("two points that are apart were wanted")
+    require(math.dist(a, b) >= SMALLEST, "two points that are apart were wanted")
     degrees = geometry.angle_to_level(a, b)
     affine = Affine.turn(degrees, a)
     everything = Selection.of(*sketch.owners).within(sketch)
@@ -307,8 +294,7 @@ def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> 
 
 def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) -> Change:
     selection = selection.within(sketch)  # an undo in the middle of a drag may have taken things away
-    if not selection:
-        raise MapError("select something first")
+    require(selection, "select something first")
     return Change(_placed(sketch, selection, affine), selection, f"{selection.words(sketch)} {words}")
 
 

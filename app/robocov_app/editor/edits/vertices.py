@@ -19,6 +19,7 @@ from robocov.arrays import Array
 from robocov.environment import Point, Ring
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import as_array, distinct, point_near, ring_near, tenths
 from robocov_app.editor.model.selection import Change, Edge, Selection, Vertex, place_of, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
@@ -33,8 +34,7 @@ _SAME = 1e-4  # ends of walls that are closer, in metres, are one point
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
     """Move the selected vertices by (dx, dy) m; a rim's vertex changes the radius."""
-    if not selection.vertices:
-        raise MapError("select vertices first")
+    require(selection.vertices, "select vertices first")
     places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
     after = with_places(sketch, {vertex: (x + dx, y + dy) for vertex, (x, y) in places.items()})
     return Change(after, selection, f"{Selection(vertices=selection.vertices).words(sketch)} moved")
@@ -67,8 +67,7 @@ def with_places(sketch: Sketch, places: Mapping[Vertex, Point]) -> Sketch:
 def inserted(sketch: Sketch, edge: Edge) -> Change:
     rings = [list(ring) for ring in sketch.ring_points(edge.of)]
     counts = {number: len(ring) - (not closed) for number, ring, closed in sketch.rings_of(edge.of)}
-    if not 0 <= edge.index < counts.get(edge.ring, 0):
-        raise MapError("there is no such edge any more")
+    require(0 <= edge.index < counts.get(edge.ring, 0), "there is no such edge any more")
     rings[edge.ring].insert(edge.index + 1, point_near(edge.point))
     new = Selection(vertices=frozenset({Vertex(edge.of, edge.ring, edge.index + 1)}))
     words = f"vertex inserted in {sketch.display_name(edge.of)}"
@@ -77,8 +76,7 @@ def inserted(sketch: Sketch, edge: Edge) -> Change:
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
     """Delete the selected vertices, and with too few left the hole or obstacle; the boundary keeps three."""
-    if not selection.vertices:
-        raise MapError("select vertices first")
+    require(selection.vertices, "select vertices first")
     after = sketch
     for owner, gone in _by_ring(sketch, selection.vertices).items():
         thing, rings = sketch.thing(owner), []
@@ -92,8 +90,7 @@ def deleted(sketch: Sketch, selection: Selection) -> Change:
             # a hole goes that has too few left, but one that was broken before and is not touched stays
             if number == 0 or not gone[number] or len(kept) >= 3:
                 rings.append(kept)
-        if owner == BOUNDARY and len(rings[0]) < least:
-            raise MapError("the boundary needs three corners at least")
+        require(owner != BOUNDARY or len(rings[0]) >= least, "the boundary needs three corners at least")
         after = after.with_rings(owner, rings) if len(rings[0]) >= least else after.without({owner})
     words = f"{Selection(vertices=selection.vertices).words(sketch)} deleted"
     return Change(after, selection.without_vertices().within(after), words)
@@ -117,15 +114,13 @@ def hole_filled(sketch: Sketch, key: int, ring: int) -> Change:
 
 def bevelled(sketch: Sketch, selection: Selection, length: float) -> Change:
     """Cut the selected corners off, `length` metres from each along both edges; ends of walls are none."""
-    if not 0.0 < length < math.inf:
-        raise MapError("a bevel needs a length above 0 m")
+    require(0.0 < length < math.inf, "a bevel needs a length above 0 m")
     return _cut(sketch, selection, lambda turn: (length, 1), "bevelled")
 
 
 def rounded_off(sketch: Sketch, selection: Selection, radius: float) -> Change:
     """Round the selected corners with a radius in metres, to a millimetre, by arcs that touch both edges."""
-    if not 0.0 < radius < math.inf:
-        raise MapError("a radius above 0 m was wanted")
+    require(0.0 < radius < math.inf, "a radius above 0 m was wanted")
 
     def cut(turn: float) -> tuple[float, int]:
         step = 2.0 * math.acos(max(1.0 - env.SAGITTA / radius, 0.0))
@@ -145,8 +140,7 @@ def _cut(sketch: Sketch, selection: Selection, wanted: _Cut, words: str) -> Chan
                 rings[number] = distinct(ring_near(np.concatenate(arcs)), closed=closed)
                 count += len(cuts)
                 after = after.with_rings(owner, rings)
-    if not count:
-        raise MapError("select corners first, of polygons, walls or the boundary")
+    require(count, "select corners first, of polygons, walls or the boundary")
     words = f"{count} corners {words}" if count > 1 else f"corner {words}"
     return Change(after, selection.without_vertices(), words)
 
@@ -160,8 +154,7 @@ def _cuts(ring: Ring, indices: set[int], closed: bool, wanted: _Cut) -> dict[int
         turn = abs(cmath.phase((after - at) * (at - before).conjugate()))
         if not closed and k in (0, count - 1):
             continue
-        if turn > math.pi - _STRAIGHT:
-            raise MapError("a corner that turns right back cannot be cut off")
+        require(turn <= math.pi - _STRAIGHT, "a corner that turns right back cannot be cut off")
         if turn >= _STRAIGHT:
             cuts[k] = wanted(turn)
     for k, (length, _) in cuts.items():
@@ -191,8 +184,7 @@ def _arc(ring: Ring, k: int, length: float, segments: int) -> Array:
 def extended(sketch: Sketch, vertex: Vertex, point: Point) -> Change:
     """Go on with a wall from its first or last vertex; the new one is selected then."""
     points = _wall(sketch, vertex).points
-    if vertex.index not in (0, len(points) - 1):
-        raise MapError("a wall goes on from its ends only")
+    require(vertex.index in (0, len(points) - 1), "a wall goes on from its ends only")
     at = 0 if vertex.index == 0 else len(points)
     after = sketch.with_rings(vertex.of, [(*points[:at], point_near(point), *points[at:])])
     selection = Selection(vertices=frozenset({Vertex(vertex.of, 0, at)}))
@@ -220,8 +212,7 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
     """Join the selected walls by their nearest ends, as wide as the lowest, with the first name and note."""
     items = selection.items_in(sketch)
     shapes = [item.shape for item in items if isinstance(item.shape, env.WallObstacle)]
-    if len(shapes) < 2 or len(shapes) < len(items):
-        raise MapError("select two or more walls to join, and nothing else")
+    require(len(shapes) == len(items) >= 2, "select two or more walls to join, and nothing else")
     chain, *rest = [wall.points for wall in shapes]
     while rest:
         ways = [(a, b, line) for line in rest for a in (chain, chain[::-1]) for b in (line, line[::-1])]
@@ -238,25 +229,21 @@ def joined(sketch: Sketch, selection: Selection) -> Change:
 
 def simplified(sketch: Sketch, selection: Selection, tolerance: float) -> Change:
     """Leave vertices out, to `tolerance` m, by Douglas and Peucker (1973): nothing comes to cross itself."""
-    if not 0.0 <= tolerance <= LARGEST:
-        raise MapError("a tolerance of 0 m or more was wanted")
+    require(0.0 <= tolerance <= LARGEST, "a tolerance of 0 m or more was wanted")
     after, changed = _redrawn(sketch, selection, lambda rings, closed: _simpler(rings, tolerance, closed))
     count = sum(len(old) - len(new) for old, new in changed)
-    if not count:
-        raise MapError("no vertex can be left out at that tolerance")
+    require(count, "no vertex can be left out at that tolerance")
     words = "1 vertex left out" if count == 1 else f"{count} vertices left out"
     return Change(after, selection.without_vertices(), words)
 
 
 def straightened(sketch: Sketch, selection: Selection, degrees: float = 5.0) -> Change:
     """Make edges horizontal or vertical that nearly are; those in line come to lie on one line."""
-    if not 0.0 < degrees <= 30.0:
-        raise MapError("an angle of up to 30 degrees was wanted")
+    require(0.0 < degrees <= 30.0, "an angle of up to 30 degrees was wanted")
     after, changed = _redrawn(
         sketch, selection, lambda rings, closed: tuple(_straight(ring, degrees, closed) for ring in rings)
     )
-    if not changed:
-        raise MapError(f"no edge is within {degrees:g} degrees of level or upright, and not so already")
+    require(changed, f"no edge is within {degrees:g} degrees of level or upright, and not so already")
     return Change(after, selection.without_vertices(), f"{counted(len(changed), 'outline')} straightened")
 
 
@@ -266,8 +253,7 @@ def _redrawn(
     """Redraw what is selected, or all obstacles; return the sketch, and what rings were and became."""
     chosen = selection.owners if selection.items or selection.boundary else sketch.places.keys()
     outlines = {each: found for each in sketch.owners if each in chosen and (found := sketch.rings_of(each))}
-    if not outlines:
-        raise MapError("select polygons, walls or the boundary first")
+    require(outlines, "select polygons, walls or the boundary first")
     after, changed = sketch, []
     for owner, ((_, _, closed), *_) in outlines.items():
         rings = sketch.ring_points(owner)

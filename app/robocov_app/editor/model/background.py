@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import angle_to_level, cos_sin
 
 MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
@@ -73,8 +74,7 @@ def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Bac
 
 def to_scale(background: Background, a: Point, b: Point, metres: float) -> Background:
     """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
-    if not (math.isfinite(metres) and metres > 0.0):
-        raise MapError("the length between the two points must be above 0 m")
+    require(0.0 < metres < math.inf, "the length between the two points must be above 0 m")
     _require_apart(background, a, b)
     factor = metres / math.dist(a, b)
     if not 1e-6 <= background.scale * factor <= 1e3:
@@ -99,8 +99,7 @@ def turned(background: Background, degrees: float, about: Point) -> Background:
 
 
 def _require_apart(background: Background, a: Point, b: Point) -> None:
-    if math.dist(a, b) < 2 * background.scale:
-        raise MapError("click two points of the picture that are farther apart")
+    require(math.dist(a, b) >= 2 * background.scale, "click two points of the picture that are farther apart")
 
 
 def _short(value: float) -> int | float:

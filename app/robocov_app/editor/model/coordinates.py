@@ -9,6 +9,7 @@ import re
 from robocov.environment import Point
 from robocov.errors import MapError, shown
 from robocov.mapfile.models import FARTHEST, LARGEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import cos_sin
 
 _METRIC = {"": 1.0, "m": 1.0, "km": 1000.0, "dm": 0.1, "cm": 0.01, "mm": 0.001}
@@ -28,8 +29,7 @@ def length_of(text: str, *, now: float | None = None) -> float:
     sign = typed[:1]
     if now is not None and sign and sign in "*/×÷":
         factor = _wanted(_number(typed[1:]), text, _LENGTHS)
-        if sign in "/÷" and factor == 0.0:
-            raise MapError(f"{shown(text)}: nothing can be divided by 0")
+        require(sign not in "/÷" or factor != 0.0, f"{shown(text)}: nothing can be divided by 0")
         return _limited(now * factor if sign in "*×" else now / factor, text)
     if now is not None and typed.endswith("%"):
         return _limited(now * _wanted(_number(typed[:-1]), text, _LENGTHS) / 100.0, text)
@@ -66,8 +66,7 @@ def next_point_of(text: str, last: Point | None, towards: Point | None) -> Point
             return _exact(last[0] + x), _exact(last[1] + y)
         if not math.isnan(length):
             length = _limited(length, text)
-            if away == 0.0:
-                raise MapError(f"{shown(text)}: point the cursor where the line is to go")
+            require(away != 0.0, f"{shown(text)}: point the cursor where the line is to go")
             return _exact(last[0] + dx / away * length), _exact(last[1] + dy / away * length)
     return point_of(text, last=last)
 
@@ -78,8 +77,7 @@ def size_of(text: str) -> tuple[float, float]:
     both = _length(typed)
     pair = _pair(typed, "x×*") if math.isnan(both) else (both, both)
     width, height = (_wanted(value, text, _SIZES) for value in pair)
-    if min(width, height) <= 0.0:
-        raise MapError(f"{shown(text)}: width and height must be above 0 m")
+    require(min(width, height) > 0.0, f"{shown(text)}: width and height must be above 0 m")
     return _limited(width, text), _limited(height, text)
 
 
@@ -93,8 +91,7 @@ def _clean(text: str) -> str:
 
 
 def _wanted(value: float, text: str, wanted: str) -> float:
-    if math.isnan(value):
-        raise MapError(f"{shown(text)}: {wanted}")
+    require(not math.isnan(value), f"{shown(text)}: {wanted}")
     return value
 
 
@@ -143,6 +140,5 @@ def _exact(value: float) -> float:
 
 
 def _limited(length: float, text: str) -> float:
-    if abs(length) > LARGEST:
-        raise MapError(f"{shown(text)}: at most {LARGEST / 1000:g} km was wanted")
+    require(abs(length) <= LARGEST, f"{shown(text)}: at most {LARGEST / 1000:g} km was wanted")
     return _exact(length)

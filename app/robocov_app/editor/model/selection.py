@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from robocov.environment import Obstacle, Point
-from robocov.errors import MapError, counted
+from robocov.errors import counted
+from robocov_app.editor.model import require
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
@@ -143,6 +144,5 @@ def exists(sketch: Sketch, vertex: Vertex) -> bool:
 
 def place_of(sketch: Sketch, vertex: Vertex) -> Point:
     """Return where a vertex is, m; MapError when there is none."""
-    if not exists(sketch, vertex):
-        raise MapError("there is no such vertex any more")
+    require(exists(sketch, vertex), "there is no such vertex any more")
     return sketch.ring_points(vertex.of)[vertex.ring][vertex.index]

@@ -8,6 +8,7 @@ from robocov import environment as env
 from robocov.environment import Point
 from robocov.errors import MapError, counted
 from robocov_app.editor.edits import create
+from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
 from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
 from robocov_app.editor.model.selection import Change
@@ -292,8 +293,7 @@ class DoorTool(Tool):
     def press(self, context: Workspace, event: PointerEvent) -> None:
         self.begun, self.at = event, event.point
         self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
-        if self._wall is None:
-            raise MapError("click a wall: doors are opened in walls")
+        require(self._wall is not None, "click a wall: doors are opened in walls")
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
         self.at = event.point

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from robocov.errors import MapError
 from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background, levelled, to_scale
 from robocov_app.editor.model.coordinates import length_of
 from robocov_app.editor.model.geometry import distance, length_words
@@ -22,8 +23,7 @@ class ReferenceImageTool(Tool):
         self.moved: Background | None = None  # the picture where it is being dragged to
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        if context.sketch.background is None:
-            raise MapError("there is no picture under the map: Ctrl B takes one")
+        require(context.sketch.background is not None, "there is no picture under the map: Ctrl B takes one")
         self.begun = event
 
     def twice(self, context: Workspace, event: PointerEvent) -> None:

@@ -6,7 +6,7 @@ from robocov.environment import CircleObstacle, Point
 from robocov.errors import MapError
 from robocov_app.editor.edits import transform, vertices
 from robocov_app.editor.edits.transform import bounds_of
-from robocov_app.editor.model import geometry
+from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.coordinates import angle_of, length_of, next_point_of
 from robocov_app.editor.model.hit_test import edge_at, in_box, owners_at, vertices_in_box
 from robocov_app.editor.model.selection import Change, Selection, Vertex, place_of, points_of
@@ -209,8 +209,7 @@ class Scaling(Drag):
         axis = 0 if self._side[0] else 1
         now = self._bounds[2 + axis] - self._bounds[axis]
         factor = length_of(text, now=now) / now
-        if factor <= 0.0:
-            raise MapError(f"“{text}”: a size above 0 was wanted")
+        require(factor > 0.0, f"“{text}”: a size above 0 was wanted")
         both = self._even or (self._side[0] and self._side[1])
         fx, fy = (factor if both or axis == k else 1.0 for k in (0, 1))
         self._scale(fx, fy, self._fixed)
