@@ -16,7 +16,7 @@ from robocov.errors import MapError
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.edits import boolean, clipboard, create, properties, transform, vertices
 from robocov_app.editor.model.background import Background
-from robocov_app.editor.model.selection import Edge, Selection, points_of, rings_of
+from robocov_app.editor.model.selection import Change, Edge, Selection, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined
 
@@ -179,7 +179,7 @@ def changes(draw, sketch):
     edges = [
         Edge(each, ring, k, points[k])
         for each in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, _ in rings_of(sketch, each)
+        for ring, points, _ in sketch.rings_of(each)
         for k in range(len(points))
     ]
     edge = draw(st.sampled_from(edges)) if edges else Edge(BOUNDARY, 0, 0, a)
@@ -187,7 +187,7 @@ def changes(draw, sketch):
     key = owner if isinstance(owner, int) else 0
     deeds = [
         lambda: create.polygon_drawn(sketch, [a, b, (a[0], b[1])]),
-        lambda: create.rectangle_drawn(sketch, a, b),
+        lambda: create.rectangle_drawn(sketch, [a, b]),
         lambda: create.circle_drawn(sketch, a, length),
         lambda: create.wall_drawn(sketch, [a, b], length),
         lambda: create.boundary_drawn(sketch, [a, b, (b[0], a[1])]),
@@ -217,7 +217,7 @@ def changes(draw, sketch):
         lambda: properties.made_boundary(sketch, selection),
         lambda: properties.underlaid(sketch, Background("plan.png", (40, 30))),
         lambda: vertices.moved(sketch, selection, dx, dy),
-        lambda: vertices.put(sketch, dict.fromkeys(handles, a)),
+        lambda: Change(vertices.with_places(sketch, dict.fromkeys(handles, a)), selection, "put"),
         lambda: vertices.inserted(sketch, edge),
         lambda: vertices.extended(sketch, handles[0], a) if handles else None,
         lambda: vertices.deleted(sketch, selection),

@@ -149,7 +149,7 @@ def test_moving_a_vertex_changes_one_line(data):
     to = data.draw(st.tuples(st.integers(-99999, 99999), st.integers(-99999, 99999)))
     moved = (to[0] / 10000, to[1] / 10000)
     before = sketch_text(sketch).splitlines()
-    after = sketch_text(vertices.put(sketch, {vertex: moved}).sketch).splitlines()
+    after = sketch_text(vertices.with_places(sketch, {vertex: moved})).splitlines()
     changed = [line for line in difflib.ndiff(before, after) if line[:2] in ("- ", "+ ")]
     assert len(changed) <= 2
     assert len(before) == len(after)
@@ -273,15 +273,15 @@ def test_parts_are_found_by_key():
     sketch, (a, b) = Sketch().added([CircleObstacle((0.0, 0.0), 1.0), (WallObstacle(HALL, 0.1), "note")])
     assert sketch.item(b).note == "note"
     assert sketch.fresh_key > max(a, b)
-    wider = sketch.with_shapes({b: WallObstacle(HALL, 0.2)})
+    wider = sketch.with_things({b: WallObstacle(HALL, 0.2)})
     assert wider.item(a) is sketch.item(a)
     assert wider.item(b).shape == WallObstacle(HALL, 0.2)
     assert wider.item(b).note == "note"
     assert sketch.without([a]).obstacles == (sketch.item(b),)
     with pytest.raises(KeyError):
         sketch.item(99)
-    sketch = sketch.with_start("s", UniformStart()).with_start("t", UniformStart())
-    sketch = sketch.with_start("s", DiscStart((0.0, 0.0), 1.0))
+    sketch = sketch.with_things({"s": UniformStart(), "t": UniformStart()})
+    sketch = sketch.with_things({"s": DiscStart((0.0, 0.0), 1.0)})
     assert sketch.starts == (("s", DiscStart((0.0, 0.0), 1.0)), ("t", UniformStart()))
     assert sketch.start("t") == UniformStart()
 

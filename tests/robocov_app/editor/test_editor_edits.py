@@ -58,7 +58,7 @@ def test_what_is_drawn_lies_on_top_and_is_selected(sketch):
     assert change.words == "circle drawn"
     wall = create.wall_drawn(sketch, [(1.0, 1.0), (1.0, 1.0), (2.0, 1.0)], 0.15)
     assert wall.sketch.obstacles[-1].shape == WallObstacle(((1.0, 1.0), (2.0, 1.0)), 0.15)
-    box = create.rectangle_drawn(sketch, (3.0, 2.0), (1.0, 5.0))
+    box = create.rectangle_drawn(sketch, [(3.0, 2.0), (1.0, 5.0)])
     assert box.sketch.obstacles[-1].shape.vertices == ((1.0, 2.0), (3.0, 2.0), (3.0, 5.0), (1.0, 5.0))
     ring = create.polygon_drawn(sketch, [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
     assert ring.sketch.obstacles[-1].shape.vertices == ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
@@ -88,7 +88,7 @@ def test_boundary_and_starts_are_drawn(sketch):
     [
         (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1)]), "three corners"),
         (lambda s: create.polygon_drawn(s, [(0, 0), (1, 1), (2, 2)]), "enclose something"),
-        (lambda s: create.rectangle_drawn(s, (0, 0), (0, 3)), "a width and a height"),
+        (lambda s: create.rectangle_drawn(s, [(0, 0), (0, 3)]), "a width and a height"),
         (lambda s: create.circle_drawn(s, (0, 0), 0.0), "needs a radius"),
         (lambda s: create.circle_drawn(s, (math.nan, 0), 1.0), "too far away"),
         (lambda s: create.circle_drawn(s, (1e8, 0), 1.0), "too far away"),
@@ -249,7 +249,7 @@ def test_single_vertices_go_along_unless_their_owner_does(sketch):
     assert change.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (4.0, 2.0), (1.0, 2.0))
     assert change.sketch.item(1).shape.center == (7.0, 4.0)
     once = transform.moved(sketch, Selection(frozenset({0}), frozenset({corner})), 1.0, 0.0)
-    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).shape(BOX)
+    assert once.sketch.item(0).shape == Affine.shift(1.0, 0.0).thing(BOX)
     turned = transform.rotated(sketch, Selection(vertices=frozenset({corner, Vertex(0, 0, 3)})), 180.0)
     assert turned.sketch.item(0).shape.vertices == ((1.0, 1.0), (3.0, 1.0), (1.0, 2.0), (3.0, 2.0))
 
@@ -258,7 +258,7 @@ def test_copies(sketch):
     noted = properties.noted(sketch, Selection.of(0), "oak").sketch
     change = transform.duplicated(noted, Selection.of(0, "corner", "all"), 1.0, 0.5)
     copy = change.sketch.obstacles[-1]
-    assert copy.shape == Affine.shift(1.0, 0.5).shape(BOX)
+    assert copy.shape == Affine.shift(1.0, 0.5).thing(BOX)
     assert copy.note == "oak"
     assert change.sketch.start("corner 2") == DiscStart((2.0, 5.5), 0.8)
     assert change.selection == Selection.of(copy.key, "corner 2", "all 2")
@@ -343,8 +343,8 @@ def test_groups_locks_and_what_is_hidden_are_kept_in_the_map(sketch):
     assert not in_box(unseen, (-50.0, -50.0), (50.0, 50.0)).items and not Selection.all(unseen).items
     assert parse_sketch(sketch_text(unseen), "again") == unseen
     assert Sketch.from_environment(unseen.environment()) == unseen
-    shown = properties.hidden(unseen, Selection.of(1, 2), False)
-    assert shown.sketch == held.sketch and shown.words == "2 obstacles shown"
+    shown = properties.released(unseen)
+    assert shown.sketch == change.sketch and shown.words == "3 obstacles unlocked and shown"
     apart = properties.ungrouped(held.sketch, Selection.of(0, 1, 2))
     assert not any(item.group for item in apart.sketch.obstacles)
     for deed, words in [

@@ -24,7 +24,7 @@ DESK = PolygonObstacle(((5.0, 7.0), (7.0, 7.0), (7.0, 8.0), (5.0, 8.0)))
 
 
 def led(sketch: Sketch, key: int = 0) -> ObstaclePath:
-    path = paths.path_of(sketch, key)
+    path = sketch.item(key).shape.path
     assert path is not None
     return path
 
@@ -50,7 +50,7 @@ def test_way_points_move_and_go_and_with_the_last_but_one_the_path() -> None:
     assert led(moved).points[1] == (7.0, 3.0)
     fewer = paths.way_point_removed(moved, 0, 0).sketch
     assert led(fewer).points == ((7.0, 3.0), (8.0, 6.0))
-    assert paths.path_of(paths.way_point_removed(fewer, 0, 1).sketch, 0) is None
+    assert paths.way_point_removed(fewer, 0, 1).sketch.item(0).shape.path is None
     with pytest.raises(MapError, match="no such way point"):
         paths.way_point_moved(sketch, 0, 3, (1.0, 1.0))
     with pytest.raises(MapError, match="in one place"):
@@ -65,7 +65,7 @@ def test_speed_and_what_happens_at_the_end() -> None:
     assert [led(turned, key).repeat for key in (0, 2)] == ["back-and-forth"] * 2
     assert led(paths.path_turned(turned, both).sketch).repeat == "loop"
     paced = paths.path_paced(sketch, both, 0.25).sketch
-    assert led(paced, 2).speed == 0.25 and paths.path_of(paced, 1) is None
+    assert led(paced, 2).speed == 0.25 and paced.item(1).shape.path is None
     gone = paths.path_removed(sketch, both).sketch
     assert paths.moving(sketch) == (0, 2) and paths.moving(gone) == ()
     for act in (
@@ -116,7 +116,7 @@ def test_who_is_moved_turned_or_scaled_takes_its_path_along(shape) -> None:
     assert led(moved).points == ((3.0, 1.5), (9.0, 1.5), (9.0, 5.5))
     turned = transform.rotated(sketch, one, 90.0, (2.0, 2.0)).sketch
     assert led(turned).points == ((2.0, 2.0), (2.0, 8.0), (-2.0, 8.0))
-    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).shape(replace(shape, path=ROUND))
+    stretched = Affine.stretch(2.0, 1.0, (2.0, 2.0)).thing(replace(shape, path=ROUND))
     assert stretched.path == replace(ROUND, points=((2.0, 2.0), (14.0, 2.0), (14.0, 6.0)))
 
 

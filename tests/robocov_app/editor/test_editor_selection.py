@@ -21,11 +21,8 @@ from robocov_app.editor.model.selection import (
     Edge,
     Selection,
     Vertex,
-    display_name,
     place_of,
     points_of,
-    ring_points,
-    rings_of,
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
@@ -82,7 +79,7 @@ def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
     lines = [
         shapely.LineString([*points, *points[:1]] if closed else points)
         for owner in owners
-        for _, points, closed in rings_of(sketch, owner)
+        for _, points, closed in sketch.rings_of(owner)
     ]
     nearest = min(line.distance(shapely.Point(point)) for line in lines)
     edge = edge_at(sketch, point, reach, owners)
@@ -90,7 +87,7 @@ def test_vertices_and_edges_are_the_nearest_of_all(sketch, point, reach):
         assert edge is None
     else:
         assert math.dist(point, edge.point) == pytest.approx(nearest, abs=1e-9)
-        ring = ring_points(sketch, edge.of)[edge.ring]
+        ring = sketch.ring_points(edge.of)[edge.ring]
         a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
         assert shapely.LineString([a, b]).distance(shapely.Point(edge.point)) < 1e-9
 
@@ -109,8 +106,8 @@ def test_handles(sketch):
     assert points_of(sketch, "all") == ()
     assert len(points_of(sketch, BOUNDARY)) == 4
     assert points_of(sketch, 77) == points_of(sketch, "none") == ()
-    assert [closed for _, _, closed in rings_of(sketch, 2)] == [False]
-    assert rings_of(sketch, 1) == rings_of(sketch, "disc") == ()
+    assert [closed for _, _, closed in sketch.rings_of(2)] == [False]
+    assert sketch.rings_of(1) == sketch.rings_of("disc") == ()
     with pytest.raises(MapError, match="no such vertex"):
         place_of(sketch, Vertex(0, 0, 4))
 
@@ -169,7 +166,7 @@ def test_selections_in_words(sketch):
     }
     for expected, selection in words.items():
         assert selection.words(sketch) == expected
-    assert display_name(sketch, BOUNDARY) == "boundary"
+    assert sketch.display_name(BOUNDARY) == "boundary"
 
 
 def test_picking_among_a_thousand_measures_only_what_is_near(monkeypatch):

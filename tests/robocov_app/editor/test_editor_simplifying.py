@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from robocov.environment import CircleObstacle, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.edits.vertices import simplified, straightened
-from robocov_app.editor.model.selection import Selection, ring_points
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 
 
@@ -50,7 +50,7 @@ def test_holes_do_not_come_to_cross_their_outline():
     assert sketch.item(key).shape.polygon.is_valid
     change = simplified(sketch, Selection.of(key), 2.0)
     assert change.sketch.item(key).shape.polygon.is_valid
-    assert len(ring_points(change.sketch, key)[1]) < 120
+    assert len(change.sketch.ring_points(key)[1]) < 120
 
 
 def test_walls_keep_their_ends_and_the_boundary_is_asked_for():
@@ -102,7 +102,7 @@ def test_what_is_straight_stays_and_what_was_not_is_then(sketch, degrees):
             assert change.sketch.item(item.key) is item
             continue
         for before, after in zip(
-            ring_points(sketch, item.key), ring_points(change.sketch, item.key), strict=True
+            sketch.ring_points(item.key), change.sketch.ring_points(item.key), strict=True
         ):
             assert len(before) == len(after)
             if before == after:

@@ -4,6 +4,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robocov.environment import ObstaclePath, UniformStart
+from robocov_app.editor.edits.create import free_name
+from robocov_app.editor.edits.paths import path_words
+from robocov_app.editor.edits.transform import Affine
+from robocov_app.editor.model import geometry
 from robocov_app.editor.model.geometry import (
     ANGLE,
     at_round_angle,
@@ -12,7 +17,9 @@ from robocov_app.editor.model.geometry import (
     length_words,
     ring_area,
 )
-from robocov_app.editor.tools.tool import PointerEvent, Tool, constrained_point
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.model.validation import in_words, place_words
+from robocov_app.editor.tools.tool import PointerEvent, Tool
 
 NUMBERS = st.floats(-100, 100).map(lambda value: round(value, 3))
 POINTS = st.tuples(NUMBERS, NUMBERS)
@@ -34,10 +41,10 @@ def test_a_straightened_line_has_a_round_angle_and_is_the_nearest_such(origin, p
 
 def test_shift_holds_the_angle_and_nothing_else_does() -> None:
     aim = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1)
-    assert constrained_point(aim, (0.0, 0.0)) == (3.0, 0.2)
+    assert aim.constrained((0.0, 0.0)) == (3.0, 0.2)
     shifted = PointerEvent((3.0, 0.2), (3.0, 0.1), 0.1, shift=True)
-    assert constrained_point(shifted, (0.0, 0.0)) == (3.0, 0.0)
-    assert constrained_point(shifted, None) == (3.0, 0.2)
+    assert shifted.constrained((0.0, 0.0)) == (3.0, 0.0)
+    assert shifted.constrained(None) == (3.0, 0.2)
 
 
 def test_lengths_and_angles_are_told_as_people_write_them() -> None:
@@ -45,6 +52,23 @@ def test_lengths_and_angles_are_told_as_people_write_them() -> None:
     assert bearing_words((0, 0), (1, 1)) == "1.41 m  ∠ 45°"
     assert bearing_words((0, 0), (1, -1e-9)) == "1.00 m  ∠ 0°"
     assert length_words(0.05) == "5.0 cm"
+    assert (length_words(12.3456), length_words(1234.5)) == ("12.35 m", "1234.5 m")
+    assert (geometry.point_words((1.0, -0.001)), place_words(1.25, 0.0)) == ("(1.00, 0.00) m", "(1.25, 0)")
+    assert path_words(ObstaclePath(((0.0, 0.0), (3.0, 0.0)), 0.5)) == "0.5 m/s, loop of 6 m in 12 s"
+    assert free_name(Sketch(starts=(("start", UniformStart()),)), "start") == "start 2"
+    assert in_words('map: starts["a b"].positions[1]: x', Sketch()) == "start “a b”, place 2: x"
+
+
+def test_points_and_angles_are_exact_where_they_are_round() -> None:
+    assert (geometry.rounded((0.1 + 0.2, -0.00001)), geometry.tenths(2 / 3)) == ((0.3, 0.0), 0.6667)
+    ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.0), (0.0, 0.0)]
+    assert geometry.distinct(ring) == ((0.0, 0.0), (1.0, 0.0))
+    assert geometry.cos_sin(-90.0) == (0.0, -1.0)
+    assert geometry.angle_to_level((1.0, 1.0), (1.0, 3.0)) == 0.0
+    assert geometry.angle_to_level((0.0, 0.0), (1.0, 1.0)) == -45.0
+    assert at_round_angle((0.0, 0.0), (3.0, 0.1)) == (3.0, 0.0)
+    assert ring_area([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]) == 2.0
+    assert Affine.turn(90.0, about=(1.0, 0.0)).ring([(2.0, 0.0)]) == ((1.0, 1.0),)
 
 
 @given(st.lists(POINTS, min_size=3, max_size=8))

@@ -17,8 +17,6 @@ from robocov_app.editor.model.selection import (
     Vertex,
     place_of,
     points_of,
-    ring_points,
-    rings_of,
 )
 from robocov_app.editor.model.sketch import BOUNDARY, Sketch
 
@@ -48,18 +46,18 @@ def test_a_vertex_that_is_put_is_there(data):
     vertex, before = data.draw(st.sampled_from(points_of(sketch, owner)))
     to = data.draw(st.tuples(st.integers(-5, 15), st.integers(-5, 15)))
     place = (to[0] + 0.25, to[1] + 0.5)
-    change = vertices.put(sketch, {vertex: place})
+    after = vertices.with_places(sketch, {vertex: place})
     circle = isinstance(sketch.item(owner).shape, CircleObstacle) if owner != BOUNDARY else False
     if circle and vertex.index:
         center = place_of(sketch, Vertex(owner, 0, 0))
-        assert place_of(change.sketch, Vertex(owner, 0, 0)) == center
-        assert change.sketch.item(owner).shape.radius == pytest.approx(math.dist(center, place), abs=1e-4)
+        assert place_of(after, Vertex(owner, 0, 0)) == center
+        assert after.item(owner).shape.radius == pytest.approx(math.dist(center, place), abs=1e-4)
         return
-    assert place_of(change.sketch, vertex) == place
+    assert place_of(after, vertex) == place
     others = [other for other, _ in points_of(sketch, owner) if other != vertex]
     if not circle:
-        assert all(place_of(change.sketch, other) == place_of(sketch, other) for other in others)
-    back = vertices.put(change.sketch, {vertex: before}).sketch
+        assert all(place_of(after, other) == place_of(sketch, other) for other in others)
+    back = vertices.with_places(after, {vertex: before})
     assert back == sketch
 
 
@@ -85,14 +83,14 @@ def test_several_things_move_together(sketch):
 
 
 def test_centre_and_rim_of_discs(sketch):
-    assert vertices.put(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).sketch.start("disc") == DiscStart(
+    assert vertices.with_places(sketch, {Vertex("disc", 0, 0): (9.0, 5.0)}).start("disc") == DiscStart(
         (9.0, 5.0), 1.0
     )
-    assert vertices.put(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).sketch.start("disc") == DiscStart(
+    assert vertices.with_places(sketch, {Vertex("disc", 0, 3): (10.0, 4.0)}).start("disc") == DiscStart(
         (10.0, 6.0), 2.0
     )
     both = {Vertex(1, 0, 0): (1.0, 1.0), Vertex(1, 0, 1): (9.0, 9.0)}
-    assert vertices.put(sketch, both).sketch.item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
+    assert vertices.with_places(sketch, both).item(1).shape == CircleObstacle((1.0, 1.0), 0.5)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +100,7 @@ def test_centre_and_rim_of_discs(sketch):
         (lambda s: vertices.moved(s, picked(Vertex(0, 0, 9)), 1, 1), "no such vertex"),
         (lambda s: vertices.moved(s, picked(Vertex(99, 0, 0)), 1, 1), "no such vertex"),
         (lambda s: vertices.moved(s, picked(Vertex("none", 0, 0)), 1, 1), "no such vertex"),
-        (lambda s: vertices.put(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
+        (lambda s: vertices.with_places(s, {Vertex(1, 0, 1): (8.0, 4.0)}), "needs a radius"),
         (lambda s: vertices.inserted(s, Edge(2, 0, 2, (9.0, 2.0))), "no such edge"),
         (lambda s: vertices.inserted(s, Edge(1, 0, 0, (9.0, 2.0))), "no such edge"),
         (lambda s: vertices.extended(s, Vertex(2, 0, 1), (1.0, 1.0)), "from its ends only"),
@@ -142,11 +140,11 @@ def test_inserting_on_an_edge_changes_nothing_but_the_count(data):
     edges = [
         Edge(owner, ring, k, (0.0, 0.0))
         for owner in (BOUNDARY, *(item.key for item in sketch.obstacles))
-        for ring, points, closed in rings_of(sketch, owner)
+        for ring, points, closed in sketch.rings_of(owner)
         for k in range(len(points) - (not closed))
     ]
     edge = data.draw(st.sampled_from(edges))
-    ring = ring_points(sketch, edge.of)[edge.ring]
+    ring = sketch.ring_points(edge.of)[edge.ring]
     a, b = ring[edge.index], ring[(edge.index + 1) % len(ring)]
     middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
     change = vertices.inserted(sketch, replace(edge, point=middle))

@@ -1,24 +1,25 @@
 """Selected obstacles combined into polygons, with the place, the name and the note of the lowest."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import reduce
+from functools import partial, reduce
+from typing import Any
 
 import shapely
-from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov.environment import GRID, CircleObstacle, Obstacle, PolygonObstacle
 from robocov.errors import MapError, counted
 from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import outlines, tenths
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import Item, Sketch
+
+_difference = partial(shapely.difference, grid_size=GRID)
+_intersection = partial(shapely.intersection, grid_size=GRID)
 
 
 def united(sketch: Sketch, selection: Selection) -> Change:
-    """Unite the selected obstacles: at least two."""
     items = _chosen(sketch, selection, "unite")
     return _in_place(sketch, items, [_union(items)], f"{counted(len(items), 'obstacle')} united")
 
@@ -26,14 +27,13 @@ def united(sketch: Sketch, selection: Selection) -> Change:
 def subtracted(sketch: Sketch, selection: Selection) -> Change:
     """Cut the upper ones of the selected obstacles out of the lowest, as drawing programs do."""
     lowest, *uppers = items = _chosen(sketch, selection, "subtract")
-    left = shapely.difference(lowest.geometry, _union(uppers), grid_size=GRID)
-    what = display_name(sketch, lowest.key)
+    left = _difference(lowest.geometry, _union(uppers))
+    what = sketch.display_name(lowest.key)
     words = f"{counted(len(uppers), 'obstacle')} cut out of {what}"
     return _in_place(sketch, items, [left], words, f"nothing is left of {what}")
 
 
 def intersected(sketch: Sketch, selection: Selection) -> Change:
-    """Keep what all selected obstacles have in common."""
     items = _chosen(sketch, selection, "intersect")
     common = reduce(_intersection, (item.geometry for item in items))
     words = f"{counted(len(items), 'obstacle')} intersected"
@@ -43,49 +43,40 @@ def intersected(sketch: Sketch, selection: Selection) -> Change:
 def divided(sketch: Sketch, selection: Selection) -> Change:
     """Cut the lowest of the selected obstacles along the upper ones: the parts inside and outside them."""
     lowest, *uppers = items = _chosen(sketch, selection, "divide")
-    cutter = _union(uppers)
-    outside = shapely.difference(lowest.geometry, cutter, grid_size=GRID)
-    parts = [outside, _intersection(lowest.geometry, cutter)]
-    return _in_place(sketch, items, parts, f"{display_name(sketch, lowest.key)} divided")
+    parts = [cut(lowest.geometry, _union(uppers)) for cut in (_difference, _intersection)]
+    return _in_place(sketch, items, parts, f"{sketch.display_name(lowest.key)} divided")
 
 
 def offset(sketch: Sketch, selection: Selection, by: float) -> Change:
     """Grow the selected obstacles by so many metres on every side, with sharp corners; shrink with by < 0."""
-    if not (math.isfinite(by) and SMALLEST <= abs(by) <= LARGEST):
-        raise MapError(f"a length of at least {1000 * SMALLEST:g} mm was wanted")
-    if not selection.items:
-        raise MapError("select obstacles first")
+    require(SMALLEST <= abs(by) <= LARGEST, f"a length of at least {1000 * SMALLEST:g} mm was wanted")
+    require(selection.items, "select obstacles first")
     shapes: dict[int, Sequence[Obstacle]] = {}
-    for item in sketch.obstacles:
-        if item.key not in selection.items:
-            continue
+    for item in selection.items_in(sketch):
         if isinstance(item.shape, CircleObstacle):
             radius = tenths(item.shape.radius + by)
-            grown: Sequence[Obstacle] = [replace(item.shape, radius=radius)] if radius >= SMALLEST else []
+            shapes[item.key] = [replace(item.shape, radius=radius)] if radius >= SMALLEST else []
         else:
             # corners sharper than a right angle would reach far out: they are cut off
             buffered = item.geometry.buffer(by, join_style="mitre", mitre_limit=1.5)
-            grown = outlines(buffered, item.shape.name)
-        if not grown:
-            raise MapError(f"nothing would be left of the {display_name(sketch, item.key)}")
-        shapes[item.key] = grown
+            shapes[item.key] = outlines(buffered, item.shape.name)
+        require(shapes[item.key], f"nothing would be left of the {sketch.display_name(item.key)}")
     words = f"{Selection(items=selection.items).words(sketch)} {'grown' if by > 0 else 'shrunk'}"
     return replace_obstacles(sketch, shapes, f"{words} by {abs(tenths(by)):g} m")
 
 
 def clipped(sketch: Sketch, selection: Selection) -> Change:
     """Cut off what sticks out of the boundary of the selected obstacles, of all if none is selected."""
-    if sketch.boundary is None or len(sketch.boundary) < 3 or not Polygon(sketch.boundary).is_valid:
+    if sketch.boundary is None or len(sketch.boundary) < 3 or not shapely.Polygon(sketch.boundary).is_valid:
         raise MapError("the boundary must be sound first")
-    inside = Polygon(sketch.boundary)
+    inside = shapely.Polygon(sketch.boundary)
     shapely.prepare(inside)
     shapes: dict[int, Sequence[Obstacle]] = {
         item.key: outlines(_intersection(item.geometry, inside), item.shape.name)
         for item in sketch.obstacles
         if (not selection.items or item.key in selection.items) and not inside.covers(item.geometry)
     }
-    if not shapes:
-        raise MapError("nothing sticks out of the boundary")
+    require(shapes, "nothing sticks out of the boundary")
     return replace_obstacles(sketch, shapes, f"{counted(len(shapes), 'obstacle')} cut off at the boundary")
 
 
@@ -100,45 +91,34 @@ def repaired(sketch: Sketch, selection: Selection) -> Change:
         if min(map(len, (shape.vertices, *shape.holes))) < 3 or not shape.polygon.is_valid:
             shapes[item.key] = outlines(item.geometry, shape.name)
     boundary = sketch.boundary
-    if (everything or selection.boundary) and boundary is not None and len(boundary) >= 3:
-        polygon = Polygon(boundary)
-        if not polygon.is_valid:
-            parts = outlines(shapely.make_valid(polygon))
-            boundary = parts[0].vertices if parts else None
+    meant = everything or selection.boundary
+    if meant and boundary is not None and len(boundary) >= 3 and not shapely.Polygon(boundary).is_valid:
+        parts = outlines(shapely.make_valid(shapely.Polygon(boundary)))
+        boundary = parts[0].vertices if parts else None
     redrawn = boundary is not sketch.boundary
-    count = len(shapes) + redrawn
-    if not count:
-        raise MapError("there is nothing to repair: no outline crosses itself")
-    words = f"{counted(count, 'outline')} repaired"
+    require(shapes or redrawn, "there is nothing to repair: no outline crosses itself")
+    words = f"{counted(len(shapes) + redrawn, 'outline')} repaired"
     change = replace_obstacles(replace(sketch, boundary=boundary), shapes, words)
     selected = replace(change.selection, boundary=redrawn and boundary is not None)
     return replace(change, selection=selected)
 
 
-def _union(items: Sequence[Item]) -> BaseGeometry:
+def _union(items: Sequence[Item]) -> shapely.Geometry:
     return shapely.union_all([item.geometry for item in items], grid_size=GRID)
 
 
-def _intersection(a: BaseGeometry, b: BaseGeometry) -> BaseGeometry:
-    return shapely.intersection(a, b, grid_size=GRID)
-
-
 def _chosen(sketch: Sketch, selection: Selection, verb: str) -> list[Item]:
-    items = [item for item in sketch.obstacles if item.key in selection.items]
-    if len(items) < 2:
-        raise MapError(f"select two or more obstacles to {verb}")
+    items = selection.items_in(sketch)
+    require(len(items) >= 2, f"select two or more obstacles to {verb}")
     for item in items:
         if not item.geometry.area > 0.0:
-            raise MapError(f"the {display_name(sketch, item.key)} covers nothing: repair or delete it first")
+            raise MapError(f"the {sketch.display_name(item.key)} covers nothing: repair or delete it first")
     return items
 
 
-def _in_place(
-    sketch: Sketch, items: Sequence[Item], parts: Sequence[BaseGeometry], words: str, empty: str = ""
-) -> Change:
+def _in_place(sketch: Sketch, items: list[Item], parts: list[Any], words: str, empty: str = "") -> Change:
     """Put the polygons of some geometries in the place of obstacles, the first of which is the lowest."""
     lowest, *others = items
     shapes = [shape for part in parts for shape in outlines(part, lowest.shape.name)]
-    if not shapes:
-        raise MapError(empty or "nothing is left")
+    require(shapes, empty or "nothing is left")
     return replace_obstacles(sketch, {lowest.key: shapes, **{item.key: () for item in others}}, words)

@@ -1,101 +1,95 @@
 """Edits that draw: obstacles, the boundary, starts, and doors in walls, which stay walls."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import shapely
-from shapely import LineString
 from shapely.ops import substring
 
 from robocov import environment as env
 from robocov.environment import Obstacle, Point, Ring, StartSpec
 from robocov.errors import MapError
-from robocov.mapfile.models import LARGEST, SMALLEST
+from robocov.mapfile.models import LARGEST, LONGEST_LABEL, SMALLEST
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import distinct, point_near, rectangle, ring_near, rounded, tenths
 from robocov_app.editor.model.hit_test import obstacles_at
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
-from robocov_app.editor.model.sketch import Sketch, kind_and_name
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
+from robocov_app.editor.model.sketch import Sketch
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
-_LONGEST_NAME = 100
+_LONGEST_TEXT = 10_000
 
 
 def drawn(sketch: Sketch, shape: Obstacle) -> Change:
-    """Put a new obstacle on top, and select it."""
     after, keys = sketch.added([shape])
-    return Change(after, Selection.of(*keys), f"{kind_and_name(shape)} drawn")
+    return Change(after, Selection.of(*keys), f"{after.display_name(keys[0])} drawn")
 
 
 def polygon_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Put a polygon down; it may cross itself, which `problems` will say."""
+    """Put a polygon down; it may cross itself, which `validation` will say."""
     return drawn(sketch, env.PolygonObstacle(_outline(points, "a polygon")))
 
 
-def rectangle_drawn(sketch: Sketch, a: Point, b: Point) -> Change:
-    """Put the rectangle with two opposite corners down."""
-    low, high = ring_near(np.array([np.minimum(a, b), np.maximum(a, b)]))
+def rectangle_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
+    low, high = ring_near(np.sort(np.array(points, dtype=float), axis=0))  # of two opposite corners
     if min(high[0] - low[0], high[1] - low[1]) < SHORTEST:
         raise MapError("a rectangle needs a width and a height: drag from corner to corner")
     return replace(drawn(sketch, env.PolygonObstacle(rectangle(low, high))), words="rectangle drawn")
 
 
 def circle_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Put a circle down."""
     return drawn(sketch, env.CircleObstacle(point_near(center), _radius(radius, "a circle")))
 
 
 def wall_drawn(sketch: Sketch, points: Sequence[Point], width: float) -> Change:
-    """Put a wall down."""
-    line = distinct(ring_near(np.array(points, dtype=float).reshape(-1, 2)), closed=False)
+    line = distinct(ring_near(points), closed=False)
     if len(line) < 2 or shapely.LineString(line).length < SHORTEST:
         raise MapError("a wall needs two points that are apart")
-    if not SMALLEST <= width <= LARGEST:
-        raise MapError(f"a wall's width is at least {1000 * SMALLEST:g} mm")
+    require(SMALLEST <= width <= LARGEST, f"a wall's width is at least {1000 * SMALLEST:g} mm")
     return drawn(sketch, env.WallObstacle(line, tenths(width)))
 
 
 def boundary_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Draw the boundary, in place of the one that there was."""
     words = "boundary drawn" if sketch.boundary is None else "boundary drawn anew"
-    after = replace(sketch, boundary=_outline(points, "a boundary"))
-    return Change(after, Selection(boundary=True), words)
+    return Change(replace(sketch, boundary=_outline(points, "a boundary")), Selection(boundary=True), words)
 
 
 def disc_start_drawn(sketch: Sketch, center: Point, radius: float) -> Change:
-    """Add a start that is a disc."""
-    return start_added(sketch, env.DiscStart(point_near(center), _radius(radius, "a start")))
+    return _start_added(sketch, env.DiscStart(point_near(center), _radius(radius, "a start")))
 
 
 def points_start_drawn(sketch: Sketch, points: Sequence[Point]) -> Change:
-    """Add a start of given places."""
-    places = tuple(dict.fromkeys(ring_near(np.array(points, dtype=float).reshape(-1, 2))))
-    if not places:
-        raise MapError("a start needs a place for a robot at least")
-    return start_added(sketch, env.PointsStart(places))
+    places = tuple(dict.fromkeys(ring_near(points)))
+    require(places, "a start needs a place for a robot at least")
+    return _start_added(sketch, env.PointsStart(places))
 
 
 def anywhere_added(sketch: Sketch) -> Change:
-    """Add a start anywhere in the free space."""
-    return start_added(sketch, env.UniformStart())
+    return _start_added(sketch, env.UniformStart())
 
 
-def start_added(sketch: Sketch, spec: StartSpec) -> Change:
-    """Add a start with a free name."""
+def _start_added(sketch: Sketch, spec: StartSpec) -> Change:
     name = free_name(sketch, "start")
-    return Change(sketch.with_start(name, spec), Selection.of(name), f"start “{name}” added")
+    return Change(sketch.with_things({name: spec}), Selection.of(name), f"start “{name}” added")
+
+
+def added(
+    sketch: Sketch, shapes: Iterable[tuple[Obstacle, str]], starts: Iterable[tuple[str, StartSpec]]
+) -> tuple[Sketch, Selection]:
+    """Return the sketch with more obstacles, with notes, and starts, under free names; and what they are."""
+    after, keys = sketch.added(shapes)
+    names = []
+    for name, spec in starts:
+        names.append(free_name(after, name or "start"))
+        after = after.with_things({names[-1]: spec})
+    return after, Selection.of(*keys, *names)
 
 
 def free_name(sketch: Sketch, name: str) -> str:
-    """Return a name for a start that no start has yet: this one, or with a number after it.
-
-    >>> free_name(Sketch(starts=(("start", env.UniformStart()),)), "start")
-    'start 2'
-    """
-    taken = {each for each, _ in sketch.starts}
-    stem = re.sub(r" \d+$", "", name)
-    count = 2
+    """Return a name for a start that no start has yet: this one, or with a number after it: "start 2"."""
+    taken, stem, count = dict(sketch.starts), re.sub(r" \d+$", "", name), 2
     while name in taken:
         name = f"{stem} {count}"
         count += 1
@@ -103,35 +97,35 @@ def free_name(sketch: Sketch, name: str) -> str:
 
 
 def label_of(name: str) -> str:
-    """Return a name as maps can have it."""
-    name = encodable(" ".join(name.split()))
-    if len(name) > _LONGEST_NAME:
-        raise MapError(f"a name has at most {_LONGEST_NAME} characters")
-    if any(ord(char) < 32 or ord(char) == 127 for char in name):
-        raise MapError("a name is text on one line")
+    name = _encodable(" ".join(name.split()))
+    require(len(name) <= LONGEST_LABEL, f"a name has at most {LONGEST_LABEL} characters")
+    require(all(ord(char) >= 32 and ord(char) != 127 for char in name), "a name is text on one line")
     return name
 
 
-def encodable(text: str) -> str:
+def text_of(text: str, what: str) -> str:
+    require(len(text) <= _LONGEST_TEXT, f"{what} has at most {_LONGEST_TEXT} characters")
+    return _encodable(text.strip())
+
+
+def _encodable(text: str) -> str:
     """Return text without halves of characters, which no file could hold."""
     return text.encode("utf-8", "ignore").decode("utf-8")
 
 
 def _outline(points: Sequence[Point], what: str) -> Ring:
-    ring = distinct(ring_near(np.array(points, dtype=float).reshape(-1, 2)))
+    ring = distinct(ring_near(points))
     if len(ring) < 3 or shapely.MultiPoint(ring).convex_hull.area < SHORTEST**2:
         raise MapError(f"{what} needs three corners that enclose something")
     return ring
 
 
 def _radius(radius: float, what: str) -> float:
-    if not SHORTEST <= radius <= LARGEST:
-        raise MapError(f"{what} needs a radius: drag from its middle to its rim")
+    require(SHORTEST <= radius <= LARGEST, f"{what} needs a radius: drag from its middle to its rim")
     return tenths(radius)
 
 
 def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
-    """Return the wall within `reach` metres of a point, the topmost."""
     keys = obstacles_at(sketch, point, reach)
     return next((key for key in keys if isinstance(sketch.item(key).shape, env.WallObstacle)), None)
 
@@ -139,21 +133,17 @@ def wall_at(sketch: Sketch, point: Point, reach: float) -> int | None:
 def door_at(sketch: Sketch, key: int, point: Point, width: float) -> tuple[Point, Point]:
     """Return both sides of a door whose middle is as near to a point as the wall allows."""
     line = _line(sketch, key)
-    a, b = map(line.interpolate, _span(line, point, min(width, line.length)))
-    return (float(a.x), float(a.y)), (float(b.x), float(b.y))
+    a, b = _span(line, point, min(width, line.length))
+    return _along(line, a), _along(line, b)
 
 
 def on_wall(sketch: Sketch, key: int, point: Point) -> Point:
-    """Return the place on a wall's line that is nearest to a point."""
     line = _line(sketch, key)
-    place = line.interpolate(line.project(shapely.Point(point)))
-    return float(place.x), float(place.y)
+    return _along(line, line.project(shapely.Point(point)))
 
 
 def door_width(width: float) -> float:
-    """Return the width of a door, m; MapError where it is none."""
-    if not SHORTEST <= width <= LARGEST:
-        raise MapError(f"a door's width is at least {100 * SHORTEST:g} cm")
+    require(SHORTEST <= width <= LARGEST, f"a door's width is at least {100 * SHORTEST:g} cm")
     return width
 
 
@@ -161,7 +151,7 @@ def door_opened(sketch: Sketch, key: int, point: Point, width: float) -> Change:
     """Open a door of a width, m, its middle as near to a point as the wall allows."""
     line = _line(sketch, key)
     if door_width(width) > line.length - SMALLEST:
-        raise MapError(f"the {display_name(sketch, key)} is not longer than a door of {width:g} m")
+        raise MapError(f"the {sketch.display_name(key)} is not longer than a door of {width:g} m")
     return _opened(sketch, key, *_span(line, point, width))
 
 
@@ -173,28 +163,32 @@ def wall_opened(sketch: Sketch, key: int, a: Point, b: Point) -> Change:
     return _opened(sketch, key, begin, end)
 
 
-def _span(line: LineString, point: Point, width: float) -> tuple[float, float]:
-    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
-    return middle - width / 2, middle + width / 2
-
-
 def _opened(sketch: Sketch, key: int, begin: float, end: float) -> Change:
     """Take what lies between two lengths along a wall away; the pieces keep its name and note."""
     line, wall = _line(sketch, key), sketch.item(key).shape
     assert isinstance(wall, env.WallObstacle)
-    pieces = []
-    for low, high in ((0.0, begin), (end, line.length)):
-        if high - low >= SMALLEST:
-            points = tuple(map(rounded, substring(line, low, high).coords))
-            pieces.append(replace(wall, points=points))
-    if not pieces:
-        raise MapError(f"nothing would be left of the {display_name(sketch, key)}")
-    words = f"door of {end - begin:.3g} m opened in {display_name(sketch, key)}"
+    pieces = [
+        replace(wall, points=tuple(map(rounded, substring(line, low, high).coords)))
+        for low, high in ((0.0, begin), (end, line.length))
+        if high - low >= SMALLEST
+    ]
+    require(pieces, f"nothing would be left of the {sketch.display_name(key)}")
+    words = f"door of {end - begin:.3g} m opened in {sketch.display_name(key)}"
     return replace_obstacles(sketch, {key: pieces}, words)
 
 
-def _line(sketch: Sketch, key: int) -> LineString:
+def _line(sketch: Sketch, key: int) -> shapely.LineString:
     wall = sketch.item(key).shape
     if not isinstance(wall, env.WallObstacle) or len(set(wall.points)) < 2:
         raise MapError("doors are opened in walls")
-    return LineString(wall.points)
+    return shapely.LineString(wall.points)
+
+
+def _span(line: shapely.LineString, point: Point, width: float) -> tuple[float, float]:
+    middle = min(max(line.project(shapely.Point(point)), width / 2), line.length - width / 2)
+    return middle - width / 2, middle + width / 2
+
+
+def _along(line: shapely.LineString, length: float) -> Point:
+    ((x, y),) = line.interpolate(length).coords
+    return x, y

@@ -2,180 +2,136 @@
 
 from dataclasses import replace
 from itertools import count
+from typing import Any
 
-from robocov.environment import CircleObstacle, DiscStart, Obstacle, PolygonObstacle, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, PolygonObstacle, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.mapfile.models import LARGEST, SMALLEST
 from robocov_app.editor.edits import vertices
-from robocov_app.editor.edits.create import encodable, label_of
+from robocov_app.editor.edits.create import label_of, text_of
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.geometry import outlines, tenths
-from robocov_app.editor.model.selection import Change, Selection, display_name, replace_obstacles
+from robocov_app.editor.model.selection import Change, Selection, replace_obstacles
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
-
-_LONGEST_TEXT = 10_000
 
 
 def deleted(sketch: Sketch, selection: Selection) -> Change:
     """Delete what is selected; of single vertices, what `vertices.deleted` deletes."""
-    if not selection:
-        raise MapError("select something first")
-    words = f"{selection.words(sketch)} deleted"
-    after = sketch.without(selection.items)
-    kept = tuple(pair for pair in sketch.starts if pair[0] not in selection.starts)
-    after = replace(after, starts=kept, boundary=None if selection.boundary else sketch.boundary)
+    require(selection, "select something first")
+    after = sketch.without(selection.items | selection.starts)
+    after = replace(after, boundary=None if selection.boundary else sketch.boundary)
     others = Selection(vertices=selection.vertices).within(after)
-    return Change(vertices.deleted(after, others).sketch if others else after, Selection(), words)
+    after = vertices.deleted(after, others).sketch if others else after
+    return Change(after, Selection(), f"{selection.words(sketch)} deleted")
 
 
 def renamed(sketch: Sketch, owner: Owner, name: str) -> Change:
     """Name an obstacle or a start; an empty name takes an obstacle's name away."""
     name = label_of(name)
-    before = display_name(sketch, owner)
-    if owner == BOUNDARY:
-        raise MapError("the boundary has no name; the map has one")
+    words = f"{sketch.display_name(owner)} renamed to “{name}”"
+    require(owner != BOUNDARY, "the boundary has no name; the map has one")
     if isinstance(owner, str):
-        if not name:
-            raise MapError("a start needs a name")
-        if name != owner and name in dict(sketch.starts):
-            raise MapError(f"there is a start “{name}” already")
+        require(name, "a start needs a name")
+        require(name == owner or name not in dict(sketch.starts), f"there is a start “{name}” already")
         starts = tuple((name if each == owner else each, spec) for each, spec in sketch.starts)
-        return Change(replace(sketch, starts=starts), Selection.of(name), f"{before} renamed to “{name}”")
-    shape = replace(sketch.item(owner).shape, name=name or None)
-    words = f"{before} renamed to “{name}”" if name else f"{before}: name taken away"
-    return Change(sketch.with_shapes({owner: shape}), Selection.of(owner), words)
+        return Change(replace(sketch, starts=starts), Selection.of(name), words)
+    words = words if name else f"{sketch.display_name(owner)}: name taken away"
+    after = sketch.with_things({owner: replace(sketch.item(owner).shape, name=name or None)})
+    return Change(after, Selection.of(owner), words)
 
 
 def noted(sketch: Sketch, selection: Selection, note: str) -> Change:
-    """Write a note to the selected obstacles; an empty one takes it away."""
-    if not selection.items:
-        raise MapError("select obstacles first: notes are written to them")
-    if len(note) > _LONGEST_TEXT:
-        raise MapError(f"a note has at most {_LONGEST_TEXT} characters")
-    note = encodable(note.strip())
-    what = f"note on {Selection(items=selection.items).words(sketch)}"
-    return _marked(sketch, selection, what if note else f"{what} taken away", note=note)
+    require(selection.items, "select obstacles first: notes are written to them")
+    note = text_of(note, "a note")
+    words = f"note on {Selection(items=selection.items).words(sketch)}{'' if note else ' taken away'}"
+    return replace(_marked(sketch, selection, "", note=note), words=words)
 
 
 def grouped(sketch: Sketch, selection: Selection, name: str = "") -> Change:
     """Put the selected obstacles into a group, a new one without a name: a click selects all of it."""
-    if len(selection.items) < 2:
-        raise MapError("select two or more obstacles to group")
+    require(len(selection.items) >= 2, "select two or more obstacles to group")
     taken = {item.group for item in sketch.obstacles}
     name = label_of(name) or next(each for k in count(1) if (each := f"group {k}") not in taken)
-    words = f"{Selection(items=selection.items).words(sketch)} grouped as “{name}”"
-    return _marked(sketch, selection, words, group=name)
+    return _marked(sketch, selection, f"grouped as “{name}”", group=name)
 
 
 def ungrouped(sketch: Sketch, selection: Selection) -> Change:
-    """Take the selected obstacles out of their groups."""
     keys = [key for key in selection.items if sketch.item(key).group]
-    if not keys:
-        raise MapError("select obstacles that are in a group")
-    return _marked(sketch, Selection.of(*keys), f"{Selection.of(*keys).words(sketch)} ungrouped", group="")
+    require(keys, "select obstacles that are in a group")
+    return _marked(sketch, Selection.of(*keys), "ungrouped", group="")
 
 
-def locked(sketch: Sketch, selection: Selection, on: bool = True) -> Change:
-    """Lock obstacles, so that the mouse cannot take them, or unlock them."""
-    words = f"{Selection(items=selection.items).words(sketch)} {'locked' if on else 'unlocked'}"
-    return _marked(sketch, selection, words, locked=on)
+def locked(sketch: Sketch, selection: Selection) -> Change:
+    return _marked(sketch, selection, "locked", locked=True)
 
 
-def hidden(sketch: Sketch, selection: Selection, on: bool = True) -> Change:
-    """Hide obstacles in the editor, or show them again; robots meet them all the same."""
-    words = f"{Selection(items=selection.items).words(sketch)} {'hidden' if on else 'shown'}"
-    return _marked(sketch, selection, words, hidden=on)
+def hidden(sketch: Sketch, selection: Selection) -> Change:
+    """Hide obstacles in the editor; robots meet them all the same."""
+    return _marked(sketch, selection, "hidden", hidden=True)
 
 
 def released(sketch: Sketch) -> Change:
     """Unlock and show all obstacles; those that were locked or hidden are selected then."""
-    keys = [item.key for item in sketch.obstacles if item.locked or item.hidden]
-    if not keys:
-        raise MapError("nothing is locked or hidden")
-    words = f"{Selection.of(*keys).words(sketch)} unlocked and shown"
-    return _marked(sketch, Selection.of(*keys), words, locked=False, hidden=False)
+    keys = [item.key for item in sketch.obstacles if not item.takeable]
+    require(keys, "nothing is locked or hidden")
+    return _marked(sketch, Selection.of(*keys), "unlocked and shown", locked=False, hidden=False)
 
 
-def _marked(sketch: Sketch, selection: Selection, words: str, **marks: str | bool) -> Change:
-    if not selection.items:
-        raise MapError("select obstacles first")
-    items = tuple(
-        replace(item, **marks) if item.key in selection.items else item  # type: ignore[arg-type]
-        for item in sketch.obstacles
-    )
-    gone = selection.items if marks.get("locked") or marks.get("hidden") else frozenset()
-    left = replace(selection, items=selection.items - gone) if gone else selection
+def _marked(sketch: Sketch, selection: Selection, words: str, **marks: Any) -> Change:
+    require(selection.items, "select obstacles first")
+    chosen = selection.items
+    items = tuple(replace(item, **marks) if item.key in chosen else item for item in sketch.obstacles)
+    words = f"{Selection(items=selection.items).words(sketch)} {words}"
+    left = replace(selection, items=frozenset()) if True in marks.values() else selection
     return Change(replace(sketch, obstacles=items), left, words)
 
 
 def titled(sketch: Sketch, name: str | None = None, description: str | None = None) -> Change:
-    """Change the map's name, or its description."""
     after, words = sketch, "map described"
     if name is not None:
         name = label_of(name)
-        if not name:
-            raise MapError("a map needs a name")
+        require(name, "a map needs a name")
         after, words = replace(after, name=name), f"map named “{name}”"
     if description is not None:
-        if len(description) > _LONGEST_TEXT:
-            raise MapError(f"a description has at most {_LONGEST_TEXT} characters")
-        after = replace(after, description=encodable(description.strip()))
+        after = replace(after, description=text_of(description, "a description"))
     return Change(after, Selection(), words)
 
 
 def widened(sketch: Sketch, selection: Selection, width: float) -> Change:
-    """Make the selected walls so many metres wide."""
-    if not SMALLEST <= width <= LARGEST:
-        raise MapError(f"a width of at least {1000 * SMALLEST:g} mm was wanted")
-    chosen = {key: sketch.item(key).shape for key in selection.items}
-    walls = {key: shape for key, shape in chosen.items() if isinstance(shape, WallObstacle)}
-    if not walls:
-        raise MapError("select walls first")
-    words = f"{Selection.of(*walls).words(sketch)} made {tenths(width):g} m wide"
-    shapes = {key: replace(wall, width=tenths(width)) for key, wall in walls.items()}
-    return Change(sketch.with_shapes(shapes), selection, words)
+    """Give the selected walls another width, m."""
+    return _sized(sketch, selection, WallObstacle, "width", width, "select walls first", "made {:g} m wide")
 
 
 def sized(sketch: Sketch, selection: Selection, radius: float) -> Change:
-    """Give the selected circles and discs that radius, m."""
-    if not SMALLEST <= radius <= LARGEST:
-        raise MapError(f"a radius of at least {1000 * SMALLEST:g} mm was wanted")
-    radius = tenths(radius)
-    shapes: dict[int, Obstacle] = {}
-    for key in selection.items:
-        shape = sketch.item(key).shape
-        if isinstance(shape, CircleObstacle):
-            shapes[key] = replace(shape, radius=radius)
-    after, discs = sketch.with_shapes(shapes), []
-    for name in selection.starts:
-        spec = sketch.start(name)
-        if isinstance(spec, DiscStart):
-            discs.append(name)
-            after = after.with_start(name, replace(spec, radius=radius))
-    if not shapes and not discs:
-        raise MapError("select circles first, or starts that are discs")
-    what = Selection.of(*shapes, *discs).words(sketch)
-    return Change(after, selection, f"{what} given a radius of {radius:g} m")
+    """Give the selected circles and discs another radius, m."""
+    missing, kinds = "select circles first, or starts that are discs", (CircleObstacle, DiscStart)
+    return _sized(sketch, selection, kinds, "radius", radius, missing, "given a radius of {:g} m")
+
+
+def _sized(
+    sketch: Sketch, selection: Selection, kinds: Any, name: str, size: float, missing: str, words: str
+) -> Change:
+    require(SMALLEST <= size <= LARGEST, f"a {name} of at least {1000 * SMALLEST:g} mm was wanted")
+    things: dict[Owner, Any] = {owner: sketch.thing(owner) for owner in selection.owners}
+    sized = {owner: thing for owner, thing in things.items() if isinstance(thing, kinds)}
+    require(sized, missing)
+    after = sketch.with_things({o: replace(thing, **{name: tenths(size)}) for o, thing in sized.items()})
+    return Change(after, selection, f"{Selection.of(*sized).words(sketch)} {words.format(tenths(size))}")
 
 
 def raised(sketch: Sketch, selection: Selection, where: str) -> Change:
-    """Change the order of the selected obstacles: to the "top" or to the "bottom"."""
-    if not selection.items:
-        raise MapError("select obstacles first")
-    chosen = tuple(item for item in sketch.obstacles if item.key in selection.items)
-    rest = tuple(item for item in sketch.obstacles if item.key not in selection.items)
-    orders = {"top": (rest + chosen, "brought to the top"), "bottom": (chosen + rest, "sent to the bottom")}
-    if where not in orders:
-        raise MapError("top or bottom was wanted")
-    order, way = orders[where]
+    require(selection.items, "select obstacles first")
+    require(where in ("top", "bottom"), "top or bottom was wanted")
+    upper = selection.items if where == "top" else sketch.places.keys() - selection.items
+    order = tuple(sorted(sketch.obstacles, key=lambda item: item.key in upper))
+    way = "brought to the top" if where == "top" else "sent to the bottom"
     words = f"{Selection(items=selection.items).words(sketch)} {way}"
     return Change(replace(sketch, obstacles=order), selection, words)
 
 
 def start_first(sketch: Sketch, name: str) -> Change:
-    """Make a start the map's default: the first."""
-    if name not in dict(sketch.starts):
-        raise MapError(f"there is no start “{one_line(name)}”")
+    require(name in dict(sketch.starts), f"there is no start “{one_line(name)}”")
     starts = tuple(sorted(sketch.starts, key=lambda pair: pair[0] != name))
     words = f"start “{one_line(name)}” made the default"
     return Change(replace(sketch, starts=starts), Selection.of(name), words)
@@ -183,18 +139,14 @@ def start_first(sketch: Sketch, name: str) -> Change:
 
 def made_polygons(sketch: Sketch, selection: Selection) -> Change:
     """Turn the selected circles and walls into polygons, whose vertices can be edited one by one."""
-    chosen = [key for key in selection.items if not isinstance(sketch.item(key).shape, PolygonObstacle)]
-    if not chosen:
-        raise MapError("select circles or walls first")
+    chosen = [item for item in selection.items_in(sketch) if not isinstance(item.shape, PolygonObstacle)]
+    require(chosen, "select circles or walls first")
     shapes = {}
-    for key in chosen:
-        item = sketch.item(key)
+    for item in chosen:
         polygons = outlines(item.geometry, item.shape.name)
-        if not polygons:
-            raise MapError(f"the {display_name(sketch, key)} covers nothing: it cannot become a polygon")
-        shapes[key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
-    words = f"{Selection.of(*chosen).words(sketch)} turned into polygons"
-    change = replace_obstacles(sketch, shapes, words)
+        require(polygons, f"the {sketch.display_name(item.key)} covers nothing: it cannot become a polygon")
+        shapes[item.key] = [replace(polygon, path=item.shape.path) for polygon in polygons]
+    change = replace_obstacles(sketch, shapes, f"{Selection.of(*shapes).words(sketch)} turned into polygons")
     return replace(change, selection=change.selection.plus(selection.without_vertices()))
 
 
@@ -208,7 +160,6 @@ def made_boundary(sketch: Sketch, selection: Selection) -> Change:
 
 
 def underlaid(sketch: Sketch, background: Background | None) -> Change:
-    """Put a picture under the map, change it, or take it away."""
     words = "picture laid under" if sketch.background is None else "picture changed"
     words = "picture taken away" if background is None else words
     return Change(replace(sketch, background=background), Selection(), words)

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Final, Literal, TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 import shapely
 
 from robocov import environment as env
-from robocov.arrays import Array
-from robocov.density import Density, Gaussians, WeightedPolygons
-from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov.density import Gaussians, WeightedPolygons
+from robocov.environment import Point, Ring
 from robocov.errors import MapError
 from robocov.mapfile.models import LARGEST, SMALLEST
-from robocov_app.editor.edits.create import free_name
+from robocov_app.editor.edits.create import added
 from robocov_app.editor.edits.vertices import with_places
+from robocov_app.editor.model import geometry, require
 from robocov_app.editor.model.background import turned
-from robocov_app.editor.model.geometry import angle_to_level, cos_sin, ring_near, rounded, tenths
-from robocov_app.editor.model.selection import Change, Selection, place_of, ring_points
+from robocov_app.editor.model.geometry import Box, box_around, middle_of, tenths
+from robocov_app.editor.model.selection import Change, Selection, place_of
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 
 Side: TypeAlias = Literal["left", "centre", "right", "top", "middle", "bottom"]
 Axis: TypeAlias = Literal["x", "y"]
-Box: TypeAlias = tuple[float, float, float, float]  # smallest x, smallest y, largest x, largest y, m
 SIDES: Final = ("left", "centre", "right", "top", "middle", "bottom")
 """Left, centre and right move along x; top, middle and bottom along y."""
 
@@ -38,11 +38,7 @@ _ALIKE = 1e-12  # relative difference of what is the same but for rounding
 
 @dataclass(frozen=True)
 class Affine:
-    """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0).
-
-    >>> Affine.turn(90.0, about=(1.0, 0.0)).point((2.0, 0.0))
-    (1.0, 1.0)
-    """
+    """The map that takes (x, y) to (xx x + xy y + x0, yx x + yy y + y0); rings to tenths of a millimetre."""
 
     xx: float = 1.0
     xy: float = 0.0
@@ -53,19 +49,21 @@ class Affine:
 
     @classmethod
     def shift(cls, dx: float, dy: float) -> Affine:
-        """Return the map that moves by (dx, dy) m."""
         return cls(x0=dx, y0=dy)
 
     @classmethod
     def turn(cls, degrees: float, about: Point) -> Affine:
-        """Return the map that turns counter-clockwise about a point, exactly at quarters of a turn."""
-        cos, sin = cos_sin(degrees)
+        """Return the counter-clockwise rotation about a point, exact at quarters of a turn."""
+        cos, sin = geometry.cos_sin(degrees)
         return cls(cos, -sin, sin, cos)._about(about)
 
     @classmethod
     def stretch(cls, fx: float, fy: float, about: Point) -> Affine:
-        """Return the map that scales along x and y about a point."""
         return cls(fx, 0.0, 0.0, fy)._about(about)
+
+    def _about(self, point: Point) -> Affine:
+        x, y = point
+        return replace(self, x0=x - self.xx * x - self.xy * y, y0=y - self.yx * x - self.yy * y)
 
     @property
     def factor(self) -> float | None:
@@ -76,105 +74,84 @@ class Affine:
             return None
         return 1.0 if abs(a - 1.0) <= _ALIKE else a
 
-    def points(self, points: Array) -> Array:
-        """Return where (n, 2) points go."""
-        x, y = points[:, 0], points[:, 1]
-        return np.column_stack([self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0])
+    def ring(self, ring: Sequence[Point]) -> Ring:
+        x, y = geometry.as_array(ring).T
+        to = [self.xx * x + self.xy * y + self.x0, self.yx * x + self.yy * y + self.y0]
+        return geometry.ring_near(np.column_stack(to))
 
-    def ring(self, ring: Iterable[Point]) -> Ring:
-        """Return where points go, to the tenth of a millimetre; MapError where that is beyond all maps."""
-        return ring_near(self.points(np.array(list(ring), dtype=float).reshape(-1, 2)))
+    def thing(self, thing: Any) -> Any:
+        """Return where an obstacle, its path, a start, a density or one of its features goes, field by field.
 
-    def point(self, point: Point) -> Point:
-        """Return where a point goes, to the tenth of a millimetre."""
-        return self.ring([point])[0]
-
-    def shape(self, shape: Obstacle) -> Obstacle:
-        """Return where an obstacle goes; stretched, circles become polygons and walls keep their width."""
+        Stretched, circles become polygons, and walls keep their width; MapError for starts that are discs.
+        """
         factor = self.factor
-        path = None if shape.path is None else replace(shape.path, points=self.ring(shape.path.points))
-        if isinstance(shape, env.PolygonObstacle):
-            holes = tuple(self.ring(hole) for hole in shape.holes)
-            return replace(shape, vertices=self.ring(shape.vertices), holes=holes, path=path)
-        if isinstance(shape, env.WallObstacle):
-            width = _times(shape.width, factor or 1.0)
-            return replace(shape, points=self.ring(shape.points), width=width, path=path)
-        if factor is None:
-            return env.PolygonObstacle(self.ring(shape.polygon.exterior.coords[:-1]), (), shape.name, path)
-        return replace(shape, center=self.point(shape.center), radius=_times(shape.radius, factor), path=path)
-
-    def start(self, spec: StartSpec) -> StartSpec:
-        """Return where a start goes; one in the whole free space stays, and no disc becomes an ellipse."""
-        if isinstance(spec, env.PointsStart):
-            return env.PointsStart(self.ring(spec.positions))
-        if isinstance(spec, env.DiscStart):
-            factor = self.factor
-            if factor is None:
-                raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
-            return env.DiscStart(self.point(spec.center), _times(spec.radius, factor))
-        return spec
-
-    def _about(self, point: Point) -> Affine:
-        x, y = point
-        x0, y0 = x - self.xx * x - self.xy * y + self.x0, y - self.yx * x - self.yy * y + self.y0
-        return replace(self, x0=x0, y0=y0)
-
-
-def _times(length: float, factor: float) -> float:
-    return length if factor == 1.0 else tenths(length * factor)
+        if factor is None and isinstance(thing, env.DiscStart):
+            raise MapError("a start that is a disc stays one: scale it by the same factor both ways")
+        if factor is None and isinstance(thing, env.CircleObstacle):
+            thing = env.PolygonObstacle(thing.polygon.exterior.coords[:-1], (), thing.name, thing.path)
+        found: dict[str, Any] = {}
+        for name, value in ((field.name, getattr(thing, field.name)) for field in fields(thing)):
+            if name in ("vertices", "points", "positions"):
+                found[name] = self.ring(value)
+            elif name == "holes":
+                found[name] = tuple(map(self.ring, value))
+            elif name == "center":
+                (found[name],) = self.ring([value])
+            elif name == "path" and value is not None:
+                found[name] = self.thing(value)
+            elif name in ("peaks", "areas"):
+                found[name] = tuple(map(self.thing, value))
+            elif name == "covariance" and value is not None:
+                matrix = np.array([[self.xx, self.xy], [self.yx, self.yy]])
+                (p, q), (_, r) = (matrix @ np.array(value) @ matrix.T).tolist()
+                found[name] = ((p, q), (q, r))
+            elif name in ("width", "radius") and factor not in (None, 1.0):
+                found[name] = tenths(value * factor)
+        return replace(thing, **found)
 
 
 def moved(sketch: Sketch, selection: Selection, dx: float, dy: float) -> Change:
-    """Move what is selected by (dx, dy) m; single vertices too."""
     return _change(sketch, selection, Affine.shift(dx, dy), "moved")
 
 
 def rotated(sketch: Sketch, selection: Selection, degrees: float, about: Point | None = None) -> Change:
     """Turn what is selected counter-clockwise, by default about the middle of its bounding box."""
-    if not math.isfinite(degrees):
-        raise MapError("an angle in degrees was wanted")
-    affine = Affine.turn(degrees, _middle(sketch, selection) if about is None else about)
-    return _change(sketch, selection, affine, "turned")
+    require(math.isfinite(degrees), "an angle in degrees was wanted")
+    return _change(sketch, selection, Affine.turn(degrees, about or _middle(sketch, selection)), "turned")
 
 
 def scaled(
     sketch: Sketch, selection: Selection, fx: float, fy: float | None = None, about: Point | None = None
 ) -> Change:
-    """Scale by fx and fy about the middle or a point, see `Affine.shape`; factors below 0 mirror."""
+    """Scale by fx and fy about the middle or a point, see `Affine.thing`; factors below 0 mirror."""
     fy = fx if fy is None else fy
     if not all(math.isfinite(f) and SMALLEST / LARGEST <= abs(f) <= LARGEST / SMALLEST for f in (fx, fy)):
         raise MapError("a factor that is not 0 was wanted")
-    affine = Affine.stretch(fx, fy, _middle(sketch, selection) if about is None else about)
-    return _change(sketch, selection, affine, "scaled")
+    return _change(sketch, selection, Affine.stretch(fx, fy, about or _middle(sketch, selection)), "scaled")
 
 
 def resized(sketch: Sketch, selection: Selection, width: float | None, height: float | None) -> Change:
     """Scale so that the bounding box has a width and height, m (None: in proportion), lower left fixed."""
-    bounds = _bounds(sketch, selection)
-    now = bounds[2] - bounds[0], bounds[3] - bounds[1]
-    for wanted, there, name in ((width, now[0], "width"), (height, now[1], "height")):
+    low_x, low_y, high_x, high_y = _bounds(sketch, selection)
+    wide, high = high_x - low_x, high_y - low_y
+    for wanted, there, name in ((width, wide, "width"), (height, high, "height")):
         if wanted is not None and not SMALLEST <= wanted <= LARGEST:
             raise MapError(f"a {name} from {1000 * SMALLEST:g} mm to {LARGEST / 1000:g} km was wanted")
-        if wanted is not None and there < SMALLEST:
-            raise MapError(f"it has no {name} that could be scaled")
-    fixed = bounds[0], bounds[1]
-    if width is None or height is None:
-        if width is None and height is None:
-            raise MapError("a width or a height was wanted")
-        factor = width / now[0] if width is not None else (height or 0.0) / now[1]
-        return _change(sketch, selection, Affine.stretch(factor, factor, fixed), "resized")
-
+        require(wanted is None or there >= SMALLEST, f"it has no {name} that could be scaled")
+    require(width is not None or height is not None, "a width or a height was wanted")
+    fx, fy = (width or 0.0) / max(wide, SMALLEST), (height or 0.0) / max(high, SMALLEST)
     # walls keep their width, so that the box does not quite grow by the factor: go nearer step by step
-    fx, fy = width / now[0], height / now[1]
     for _ in range(20):
-        change = _change(sketch, selection, Affine.stretch(fx, fy, fixed), "resized")
+        change = _change(sketch, selection, Affine.stretch(fx or fy, fy or fx, (low_x, low_y)), "resized")
+        if width is None or height is None:
+            return change
         box = _bounds(change.sketch, change.selection)
         off = width - (box[2] - box[0]), height - (box[3] - box[1])
         if max(map(abs, off)) <= 2e-4:
             # what is put at its corner is there to the tenth of a millimetre
-            shift = Affine.shift(bounds[0] - box[0], bounds[1] - box[1])
+            shift = Affine.shift(low_x - box[0], low_y - box[1])
             return replace(change, sketch=_placed(change.sketch, change.selection, shift))
-        fx, fy = max(fx + off[0] / now[0], 1e-9), max(fy + off[1] / now[1], 1e-9)
+        fx, fy = max(fx + off[0] / wide, 1e-9), max(fy + off[1] / high, 1e-9)
     raise MapError("it cannot get that size: walls keep their width when width and height change apart")
 
 
@@ -186,133 +163,96 @@ def placed(sketch: Sketch, selection: Selection, x: float | None, y: float | Non
 
 def mirrored(sketch: Sketch, selection: Selection, axis: str) -> Change:
     """Mirror what is selected about the middle of its box: axis "x" swaps left and right, "y" up and down."""
-    x, y = _middle(sketch, selection)
-    ways = {"x": Affine(xx=-1.0, x0=2.0 * x), "y": Affine(yy=-1.0, y0=2.0 * y)}
-    if axis not in ways:
-        raise MapError("an axis x or y was wanted")
-    return _change(sketch, selection, ways[axis], "mirrored")
+    require(axis in ("x", "y"), "an axis x or y was wanted")
+    factors = (-1.0, 1.0) if axis == "x" else (1.0, -1.0)
+    return _change(sketch, selection, Affine.stretch(*factors, _middle(sketch, selection)), "mirrored")
 
 
 def duplicated(sketch: Sketch, selection: Selection, dx: float = 0.0, dy: float = 0.0) -> Change:
-    """Copy the selected obstacles and starts, the copies moved by (dx, dy) m; they are selected then."""
     whole = Selection(items=selection.items, starts=selection.starts).within(sketch)
-    if not whole:
-        raise MapError("select obstacles or starts to copy")
-    after, copies = _copied(sketch, whole, Affine.shift(dx, dy))
-    return Change(after, copies, f"{whole.words(sketch)} duplicated")
+    require(whole, "select obstacles or starts to copy")
+    return Change(*_copied(sketch, whole, Affine.shift(dx, dy)), f"{whole.words(sketch)} duplicated")
 
 
 def arrayed(sketch: Sketch, selection: Selection, columns: int, rows: int, dx: float, dy: float) -> Change:
     """Copy the selected obstacles into columns and rows, (dx, dy) m apart, the originals in a corner."""
     whole = Selection(items=selection.items)
-    if not whole:
-        raise MapError("select obstacles to copy")
-    if columns < 1 or rows < 1 or columns * rows < 2:
-        raise MapError("two columns or rows at least were wanted")
+    require(whole, "select obstacles to copy")
+    require(columns >= 1 and rows >= 1 and columns * rows >= 2, "two columns or rows at least were wanted")
     if columns * rows * len(whole.items) > _MOST_COPIES:
         raise MapError(f"that makes more than {_MOST_COPIES} obstacles")
     after, everything = sketch, whole
-    for row in range(rows):
-        for column in range(columns):
-            if row or column:
-                after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
-                everything = everything.plus(copies)
+    for row, column in list(product(range(rows), range(columns)))[1:]:
+        after, copies = _copied(after, whole, Affine.shift(column * dx, row * dy))
+        everything = everything.plus(copies)
     return Change(after, everything, f"{whole.words(sketch)} copied into {columns} × {rows}")
 
 
 def aligned(sketch: Sketch, selection: Selection, side: Side) -> Change:
     """Align selected obstacles and starts, or vertices, at a side of their box, or of a selected boundary."""
-    if side not in SIDES:
-        raise MapError(f"one of {', '.join(SIDES)} was wanted")
+    require(side in SIDES, f"one of {', '.join(SIDES)} was wanted")
     words = {"centre": "by their centres", "middle": "by their middles"}.get(side, f"at the {side}")
     if selection.vertices and not selection.owners:
         places = {vertex: place_of(sketch, vertex) for vertex in selection.vertices}
-        if len(places) < 2:
-            raise MapError("select two or more vertices to align")
-        level = _level(_around((*place, *place) for place in places.values()), side)
+        require(len(places) >= 2, "select two or more vertices to align")
+        level = _level(box_around((*place, *place) for place in places.values()), side)
         new = {vertex: (level, y) if side in _ALONG_X else (x, level) for vertex, (x, y) in places.items()}
         return Change(with_places(sketch, new), selection, f"{selection.words(sketch)} aligned {words}")
     boxes = _boxes(sketch, selection)
-    if selection.boundary:
-        frame = box_of(sketch, BOUNDARY)
-        if frame is None:
-            raise MapError("there is no boundary to align with")
-        if not boxes:
-            raise MapError("select obstacles or starts to align")
-    else:
-        if len(boxes) < 2:
-            raise MapError("select two or more obstacles or starts to align")
-        frame = _around(boxes.values())
+    frame = box_of(sketch, BOUNDARY) if selection.boundary else None
+    require(frame is not None or not selection.boundary, "there is no boundary to align with")
+    if len(boxes) < (1 if frame else 2):
+        raise MapError(f"select {'' if frame else 'two or more '}obstacles or starts to align")
+    frame = frame or box_around(boxes.values())
     off = {owner: _level(frame, side) - _level(box, side) for owner, box in boxes.items()}
-    by = {owner: (d, 0.0) if side in _ALONG_X else (0.0, d) for owner, d in off.items()}
-    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
+    after = _each_moved(sketch, off, along_x=side in _ALONG_X)
+    return Change(after, selection, f"{Selection.of(*boxes).words(sketch)} aligned {words}")
 
 
 def distributed(sketch: Sketch, selection: Selection, axis: Axis) -> Change:
     """Spread three or more selected things, with equal gaps between their boxes; first and last stay."""
-    if axis not in ("x", "y"):
-        raise MapError("an axis x or y was wanted")
-    a = ("x", "y").index(axis)
+    require(axis in ("x", "y"), "an axis x or y was wanted")
+    a = "xy".index(axis)
     boxes = sorted(_boxes(sketch, selection).items(), key=lambda pair: (pair[1][a], pair[1][a + 2]))
-    if len(boxes) < 3:
-        raise MapError("select three or more obstacles or starts to distribute")
-    room = boxes[-1][1][a + 2] - boxes[0][1][a]
-    gap = (room - sum(box[a + 2] - box[a] for _, box in boxes)) / (len(boxes) - 1)
-    by: dict[Owner, Point] = {}
-    low = boxes[0][1][a]
-    for owner, box in boxes:
-        by[owner] = (low - box[a], 0.0) if a == 0 else (0.0, low - box[a])
-        low += box[a + 2] - box[a] + gap
-    return Change(_each_moved(sketch, by), selection, f"{Selection.of(*by).words(sketch)} distributed")
+    require(len(boxes) >= 3, "select three or more obstacles or starts to distribute")
+    low, sizes = boxes[0][1][a], [box[a + 2] - box[a] for _, box in boxes]
+    gap = (boxes[-1][1][a + 2] - low - sum(sizes)) / (len(boxes) - 1)
+    off: dict[Owner, float] = {}
+    for (owner, box), size in zip(boxes, sizes, strict=True):
+        off[owner] = low - box[a]
+        low += size + gap
+    after = _each_moved(sketch, off, along_x=axis == "x")
+    return Change(after, selection, f"{Selection.of(*off).words(sketch)} distributed")
 
 
 def levelled(sketch: Sketch, a: Point, b: Point) -> Change:
     """Turn map, picture and density about `a`: the line to `b` becomes level or upright."""
-    if math.dist(a, b) < SMALLEST:
-        raise MapError("two points that are apart were wanted")
-    degrees = angle_to_level(a, b)
+    require(math.dist(a, b) >= SMALLEST, "two points that are apart were wanted")
+    degrees = geometry.angle_to_level(a, b)
     affine = Affine.turn(degrees, a)
-    everything = Selection.of(BOUNDARY, *sketch.places, *dict(sketch.starts)).within(sketch)
+    everything = Selection.of(*sketch.owners).within(sketch)
     picture = None if sketch.background is None else turned(sketch.background, degrees, a)
-    after = replace(_placed(sketch, everything, affine), background=picture)
-    after = replace(after, density=_turned_density(sketch.density, affine))
+    density = sketch.density
+    if isinstance(density, Gaussians | WeightedPolygons):
+        density = affine.thing(density)
+    elif density is not None and not density.uniform:
+        what = f"a density that is a {density.kind} cannot be turned"
+        raise MapError(f"{what}: “density none” takes it away first")
+    after = replace(_placed(sketch, everything, affine), background=picture, density=density)
     return Change(after, Selection(), f"map turned by {degrees:.2f}°")
 
 
-def _turned_density(density: Density | None, affine: Affine) -> Density | None:
-    if isinstance(density, Gaussians):
-        matrix = np.array([[affine.xx, affine.xy], [affine.yx, affine.yy]])
-        peaks = []
-        for peak in density.peaks:
-            if peak.covariance is not None:
-                (p, q), (_, r) = (matrix @ np.array(peak.covariance) @ matrix.T).tolist()
-                peak = replace(peak, covariance=((p, q), (q, r)))
-            peaks.append(replace(peak, center=affine.point(peak.center)))
-        return replace(density, peaks=tuple(peaks))
-    if isinstance(density, WeightedPolygons):
-        areas = tuple(
-            replace(area, vertices=affine.ring(area.vertices), holes=tuple(map(affine.ring, area.holes)))
-            for area in density.areas
-        )
-        return replace(density, areas=areas)
-    if density is None or density.uniform:
-        return density
-    raise MapError(f"a density that is a {density.kind} cannot be turned: “density none” takes it away first")
-
-
 def box_of(sketch: Sketch, owner: Owner) -> Box | None:
-    """Return the bounding box of something; None where it is nowhere."""
-    if isinstance(owner, int) and owner != BOUNDARY:
-        item = sketch.item(owner)
-        # a typed size is that of the circle, not of the polygon that stands for it
-        if not isinstance(item.shape, env.CircleObstacle):
-            return None if item.geometry.is_empty else item.geometry.bounds
-    points = [point for ring in ring_points(sketch, owner) for point in ring]
-    return _around((*point, *point) for point in points) if points else None
+    # a typed size is that of a circle, not of the polygon that stands for it
+    round_one = isinstance(sketch.thing(owner), env.CircleObstacle)
+    if isinstance(owner, int) and owner != BOUNDARY and not round_one:
+        covered = sketch.item(owner).geometry
+        return None if covered.is_empty else covered.bounds
+    points = [point for ring in sketch.ring_points(owner) for point in ring]
+    return box_around((*point, *point) for point in points) if points else None
 
 
 def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
-    """Return the bounding box of what is selected; None of nothing."""
     owners = selection.owners
     boxes = []
     if len(owners) > _MANY:  # all at once
@@ -322,60 +262,48 @@ def bounds_of(sketch: Sketch, selection: Selection) -> Box | None:
         owners = owners - frozenset(sharp)
     boxes += [box for owner in owners if (box := box_of(sketch, owner)) is not None]
     boxes += [(*place, *place) for place in (place_of(sketch, vertex) for vertex in selection.vertices)]
-    return _around(boxes) if boxes else None
-
-
-def _around(boxes: Iterable[Box]) -> Box:
-    low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
-    return min(low_x), min(low_y), max(high_x), max(high_y)
+    return box_around(boxes) if boxes else None
 
 
 def _boxes(sketch: Sketch, selection: Selection) -> dict[Owner, Box]:
-    owners: list[Owner] = [item.key for item in sketch.obstacles if item.key in selection.items]
-    owners += [name for name, _ in sketch.starts if name in selection.starts]
-    return {owner: box for owner in owners if (box := box_of(sketch, owner)) is not None}
+    things = selection.items | selection.starts
+    boxes = {owner: box_of(sketch, owner) for owner in sketch.owners if owner in things}
+    return {owner: box for owner, box in boxes.items() if box is not None}
 
 
 def _level(box: Box, side: Side) -> float:
     a = 0 if side in _ALONG_X else 1
     if side in ("centre", "middle"):
-        return (box[a] + box[a + 2]) / 2
+        return middle_of(box)[a]
     return box[a] if side in ("left", "bottom") else box[a + 2]
 
 
 def _copied(sketch: Sketch, whole: Selection, affine: Affine) -> tuple[Sketch, Selection]:
     """Return the sketch with copies of whole obstacles and starts at other places, and what they are."""
-    shapes = [(affine.shape(item.shape), item.note) for item in sketch.obstacles if item.key in whole.items]
-    after, keys = sketch.added(shapes)
-    names = []
-    for name, spec in sketch.starts:
-        if name in whole.starts:
-            names.append(free_name(after, name))
-            after = after.with_start(names[-1], affine.start(spec))
-    return after, Selection.of(*keys, *names)
+    shapes = [(affine.thing(item.shape), item.note) for item in whole.items_in(sketch)]
+    return added(sketch, shapes, [(n, affine.thing(spec)) for n, spec in sketch.starts if n in whole.starts])
 
 
-def _each_moved(sketch: Sketch, by: Mapping[Owner, Point]) -> Sketch:
-    for owner, (dx, dy) in by.items():
-        if dx or dy:
-            sketch = _placed(sketch, Selection.of(owner), Affine.shift(dx, dy))
+def _each_moved(sketch: Sketch, by: Mapping[Owner, float], *, along_x: bool) -> Sketch:
+    for owner, off in by.items():
+        if off:
+            shift = Affine.shift(off, 0.0) if along_x else Affine.shift(0.0, off)
+            sketch = _placed(sketch, Selection.of(owner), shift)
     return sketch
 
 
 def _change(sketch: Sketch, selection: Selection, affine: Affine, words: str) -> Change:
     selection = selection.within(sketch)  # an undo in the middle of a drag may have taken things away
-    if not selection:
-        raise MapError("select something first")
+    require(selection, "select something first")
     return Change(_placed(sketch, selection, affine), selection, f"{selection.words(sketch)} {words}")
 
 
 def _placed(sketch: Sketch, selection: Selection, affine: Affine) -> Sketch:
     owners = selection.owners
     single = [vertex for vertex in selection.vertices if vertex.of not in owners]
-    places = {vertex: affine.point(place_of(sketch, vertex)) for vertex in single}
-    sketch = sketch.with_shapes({key: affine.shape(sketch.item(key).shape) for key in selection.items})
-    for name in selection.starts:
-        sketch = sketch.with_start(name, affine.start(sketch.start(name)))
+    places = dict(zip(single, affine.ring([place_of(sketch, vertex) for vertex in single]), strict=True))
+    things = selection.items | selection.starts
+    sketch = sketch.with_things({owner: affine.thing(sketch.thing(owner)) for owner in things})
     if selection.boundary and sketch.boundary is not None:
         sketch = replace(sketch, boundary=affine.ring(sketch.boundary))
     return with_places(sketch, places) if places else sketch
@@ -389,5 +317,4 @@ def _bounds(sketch: Sketch, selection: Selection) -> Box:
 
 
 def _middle(sketch: Sketch, selection: Selection) -> Point:
-    bounds = _bounds(sketch, selection)
-    return rounded(((bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2))
+    return geometry.rounded(middle_of(_bounds(sketch, selection)))

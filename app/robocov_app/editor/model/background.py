@@ -6,13 +6,14 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from itertools import count
-from typing import Annotated, Any, ClassVar
+from itertools import count, islice
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from robocov.environment import Point
 from robocov.errors import MapError
+from robocov_app.editor.model import require
 from robocov_app.editor.model.geometry import angle_to_level, cos_sin
 
 MOST_PIXELS = 64_000_000  # pixels of the largest picture that is taken
@@ -24,8 +25,7 @@ class Background:
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    # the file, as it stands in the map: relative to the map's folder, or absolute
-    path: Annotated[str, Field(min_length=1)]
+    path: Annotated[str, Field(min_length=1)]  # as in the map: relative to its folder, or absolute
     pixels: tuple[Annotated[int, Field(gt=0)], Annotated[int, Field(gt=0)]]  # (width, height)
     scale: Annotated[float, Field(gt=0.0)] = 0.01  # m; side of a pixel
     corner: tuple[float, float] = (0.0, 0.0)  # m; where the picture's lower left corner lies
@@ -34,7 +34,6 @@ class Background:
     shown: bool = True
 
     def place_of(self, pixel: Point) -> Point:
-        """Return where a pixel lies on the map, m."""
         x, y = pixel[0] * self.scale, (self.pixels[1] - pixel[1]) * self.scale
         cos, sin = cos_sin(self.turn)
         return self.corner[0] + cos * x - sin * y, self.corner[1] + sin * x + cos * y
@@ -47,7 +46,6 @@ class Background:
         return left, right, self.place_of((width, 0)), self.place_of((0, 0))
 
     def document(self) -> dict[str, Any]:
-        """Return it as it stands in a map."""
         held = asdict(self) | {"pixels": list(self.pixels), "corner": [_short(each) for each in self.corner]}
         return held | {name: _short(held[name]) for name in ("scale", "turn", "opacity")}
 
@@ -68,31 +66,27 @@ _ADAPTER = TypeAdapter(Background)
 
 def picture_laid(path: str, pixels: tuple[int, int], width: float = 20.0) -> Background:
     """Return a picture just taken, so many metres wide, its lower left corner in the origin."""
-    if min(pixels) < 1 or pixels[0] * pixels[1] > MOST_PIXELS:
-        raise MapError(
-            f"the picture has {pixels[0]} x {pixels[1]} pixels: "
-            f"1 to {MOST_PIXELS // 1_000_000} million pixels were wanted"
-        )
+    if min(pixels) < 1 or math.prod(pixels) > MOST_PIXELS:
+        wanted = f"1 to {MOST_PIXELS // 1_000_000} million pixels were wanted"
+        raise MapError(f"the picture has {pixels[0]} x {pixels[1]} pixels: {wanted}")
     return Background(path, pixels, width / pixels[0])
 
 
 def to_scale(background: Background, a: Point, b: Point, metres: float) -> Background:
     """Return the picture scaled so that two places on it, m, come to be so many metres apart; `a` stays."""
-    apart = math.dist(a, b)
-    if not (math.isfinite(metres) and metres > 0.0):
-        raise MapError("the length between the two points must be above 0 m")
-    _require_apart(background, apart)
-    factor = metres / apart
+    require(0.0 < metres < math.inf, "the length between the two points must be above 0 m")
+    _require_apart(background, a, b)
+    factor = metres / math.dist(a, b)
     if not 1e-6 <= background.scale * factor <= 1e3:
         raise MapError(f"a pixel would be {background.scale * factor:.3g} m wide: is {metres:g} m right?")
-    corner = background.corner
-    moved = a[0] + factor * (corner[0] - a[0]), a[1] + factor * (corner[1] - a[1])
+    x, y = background.corner
+    moved = a[0] + factor * (x - a[0]), a[1] + factor * (y - a[1])
     return replace(background, scale=background.scale * factor, corner=moved)
 
 
 def levelled(background: Background, a: Point, b: Point) -> Background:
     """Return the picture turned about `a` so that the line to `b` becomes level or upright."""
-    _require_apart(background, math.dist(a, b))
+    _require_apart(background, a, b)
     return turned(background, angle_to_level(a, b), a)
 
 
@@ -104,9 +98,8 @@ def turned(background: Background, degrees: float, about: Point) -> Background:
     return replace(background, corner=corner, turn=math.remainder(background.turn + degrees, 360.0))
 
 
-def _require_apart(background: Background, apart: float) -> None:
-    if apart < 2 * background.scale:
-        raise MapError("click two points of the picture that are farther apart")
+def _require_apart(background: Background, a: Point, b: Point) -> None:
+    require(math.dist(a, b) >= 2 * background.scale, "click two points of the picture that are farther apart")
 
 
 def _short(value: float) -> int | float:
@@ -119,25 +112,20 @@ MARKS = {"note": str, "group": str, "locked": bool, "hidden": bool}
 _HOME = "editor"  # the editor's free key, unless that holds something of somebody else
 _LISTS = {"notes": ("note",), "outline": ("group", "locked", "hidden")}
 _OURS = {*_LISTS, "background"}
+_Keys: TypeAlias = Mapping[str, Any]
+_Marks: TypeAlias = dict[int, dict[str, Any]]  # by the place of their obstacle
+_Names: TypeAlias = Sequence[str | None]  # of the obstacles
 _LOST = "notes of obstacles that are gone"
 
 
-def annotated(
-    extra: Mapping[str, Any],
-    marks: Mapping[int, Mapping[str, Any]],
-    names: Sequence[str | None],
-    background: Background | None,
-) -> dict[str, Any]:
+def annotated(extra: _Keys, marks: _Marks, names: _Names, background: Background | None) -> dict[str, Any]:
     """Return the free keys of a map, `extra`, with the editor's; marks come by the place of an obstacle."""
     ours: dict[str, Any] = {}
     for key, kept in _LISTS.items():
-        entries = []
         for k in sorted(marks):
             of = {"obstacle": k} if names[k] is None else {"obstacle": k, "name": names[k]}
-            held = {name: marks[k][name] for name in kept if name in marks[k]}
-            entries += [{**of, **held}] if held else []
-        if entries:
-            ours[key] = entries
+            if held := {name: marks[k][name] for name in kept if name in marks[k]}:
+                ours.setdefault(key, []).append({**of, **held})
     if background is not None:
         ours["background"] = background.document()
     if not ours:
@@ -146,19 +134,17 @@ def annotated(
     return {**extra, home: {**extra.get(home, {}), **ours}}
 
 
-def taken_apart(
-    extra: Mapping[str, Any], names: Sequence[str | None]
-) -> tuple[dict[int, dict[str, Any]], Background | None, dict[str, Any]]:
+def taken_apart(extra: _Keys, names: _Names) -> tuple[_Marks, Background | None, dict[str, Any]]:
     """Return marks by the place of their obstacle, the picture, and the free keys of everybody else."""
-    for home, _ in zip(_homes(), range(len(extra) + 1), strict=False):
+    for home in islice(_homes(), len(extra) + 1):
         held = extra.get(home)
         if not isinstance(held, dict) or _is_free(held):
             continue
-        background = Background.of_document(held["background"]) if "background" in held else None
+        background = Background.of_document(held.get("background"))
         sound = all(_are_entries(held.get(key, []), kept) for key, kept in _LISTS.items())
         if not sound or ("background" in held and background is None):
             continue
-        marks: dict[int, dict[str, Any]] = {}
+        marks: _Marks = {}
         rest = {key: value for key, value in held.items() if key not in _OURS}
         for key, kept in _LISTS.items():
             taken = set()
@@ -169,15 +155,14 @@ def taken_apart(
                     marks.setdefault(k, {}).update((name, entry[name]) for name in kept if name in entry)
                 elif key == "notes":
                     rest[_LOST] = [*rest.get(_LOST, []), entry]
-        others = {key: value for key, value in extra.items() if key != home}
-        return marks, background, {**extra, home: rest} if rest else others
+        others = {**extra, home: rest}
+        return marks, background, {key: value for key, value in others.items() if key != home or rest}
     return {}, None, dict(extra)
 
 
 def _homes() -> Iterator[str]:
     yield _HOME
-    for k in count(2):
-        yield f"{_HOME} {k}"
+    yield from (f"{_HOME} {k}" for k in count(2))
 
 
 def _is_free(held: object) -> bool:
@@ -196,12 +181,10 @@ def _are_entries(entries: object, kept: tuple[str, ...]) -> bool:
     )
 
 
-def _obstacle_of(entry: Mapping[str, Any], names: Sequence[str | None]) -> int | None:
-    """Return the place of the obstacle that an entry is about; None if it is gone."""
-    k, name = int(entry["obstacle"]), entry.get("name")
-    if 0 <= k < len(names) and names[k] == name:
-        return k
-    if name is not None and names.count(name) == 1:
+def _obstacle_of(entry: _Keys, names: _Names) -> int | None:
+    k, name = entry["obstacle"], entry.get("name")
+    there = 0 <= k < len(names)
+    if not (there and names[k] == name) and name is not None and names.count(name) == 1:
         return names.index(name)
     # it may have got a name, or lost it
-    return k if 0 <= k < len(names) and (name is None or names[k] is None) else None
+    return k if there and (name is None or names[k] in (None, name)) else None

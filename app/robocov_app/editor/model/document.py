@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from hashlib import sha256
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -24,8 +25,7 @@ from robocov_app.toolkit.autosave import Autosaver
 
 @dataclass
 class _Step:
-    before: Sketch
-    selected_before: Selection
+    before: Change  # with the words of `after`, as undoing says them
     after: Change
     drag: Hashable | None
 
@@ -43,57 +43,53 @@ class History:
 
     def do(self, change: Change, *, drag: Hashable | None = None) -> bool:
         """Take a change, merged with the last of the same `drag`; return whether it changed anything."""
-        before, selected = self.sketch, self.selection
-        last = self._done[-1] if self._done else None
-        merges = drag is not None and not self._broken and last is not None and last.drag == drag
-        self._broken = False
-        self.selection = change.selection
-        if change.sketch == before:
+        before, done = Change(self.sketch, self.selection, change.words), self._done
+        merges = drag is not None and not self._broken and bool(done) and done[-1].drag == drag
+        self._broken, self.selection = False, change.selection
+        if change.sketch == self.sketch:
             return False
-        if merges and last is not None:
-            self._done.pop()
-            before, selected = last.before, last.selected_before
-        self.sketch = change.sketch
-        self._undone = []
-        if change.sketch != before:
-            self._done.append(_Step(before, selected, change, drag))
+        if merges:
+            before = replace(done.pop().before, words=change.words)
+        self.sketch, self._undone = change.sketch, []
+        if change.sketch != before.sketch:
+            done.append(_Step(before, change, drag))
         return True
 
     def undo(self) -> Change | None:
         """Take the newest change back; return what was there before, in the words of what was taken back."""
         if not self._done:
             return None
-        step = self._done.pop()
-        self._undone.append(step)
-        return self._now(Change(step.before, step.selected_before, step.after.words))
+        self._undone.append(self._done.pop())
+        return self._go_to(self._undone[-1].before)
 
     def redo(self) -> Change | None:
-        """Do again what was undone last; None if there is nothing."""
         if not self._undone:
             return None
-        step = self._undone.pop()
-        self._done.append(step)
-        return self._now(step.after)
+        self._done.append(self._undone.pop())
+        return self._go_to(self._done[-1].after)
+
+    def _go_to(self, state: Change) -> Change:
+        self.sketch, self.selection = state.sketch, state.selection
+        self._broken = True
+        return state
 
     def replace_all(self, change: Callable[[Sketch], Sketch]) -> None:
         """Change the sketch as it is and at every step, without a step of its own."""
         steps = [*self._done, *self._undone]
-        sketches = [self.sketch, *(step.before for step in steps), *(step.after.sketch for step in steps)]
+        sketches = [self.sketch, *(state.sketch for step in steps for state in (step.before, step.after))]
         # the same sketch stays the same in all steps
-        new = {id(sketch): change(sketch) for sketch in {id(each): each for each in sketches}.values()}
+        new = {id(sketch): change(sketch) for sketch in sketches}
         for step in steps:
-            step.before = new[id(step.before)]
+            step.before = replace(step.before, sketch=new[id(step.before.sketch)])
             step.after = replace(step.after, sketch=new[id(step.after.sketch)])
         self.sketch = new[id(self.sketch)]
 
     @property
     def past(self) -> tuple[str, ...]:
-        """Undoable changes in words, the newest first."""
         return tuple(step.after.words for step in reversed(self._done))
 
     @property
     def future(self) -> tuple[str, ...]:
-        """Redoable changes in words, the next first."""
         return tuple(step.after.words for step in reversed(self._undone))
 
     def break_drag(self) -> None:
@@ -101,7 +97,6 @@ class History:
         self._broken = True
 
     def mark_saved(self) -> None:
-        """Remember that a file holds what is there now."""
         self._saved = self.sketch
         self._broken = True
 
@@ -113,11 +108,6 @@ class History:
     def unsaved(self) -> bool:
         """Whether something would be lost; undoing back to what was saved makes it false again."""
         return self._saved is not self.sketch and self._saved != self.sketch
-
-    def _now(self, change: Change) -> Change:
-        self.sketch, self.selection = change.sketch, change.selection
-        self._broken = True
-        return change
 
 
 KIND = "robocov-draft"
@@ -135,7 +125,6 @@ class Autosave:
     disk: OnDisk | None  # what the file was like when it was read or written last
 
     def sketch(self) -> Sketch:
-        """Return the map; MapError when it cannot be read any more."""
         return sketch_of(autosave.read_record(self.folder, KIND).content.get("sketch"), str(self.folder))
 
     def words(self, now: datetime | None = None) -> str:
@@ -149,18 +138,15 @@ class Autosave:
 
 
 def content(sketch: Sketch, disk: OnDisk | None) -> dict[str, Any]:
-    """Return what is kept of a map."""
     file = disk and {"digest": disk.digest, "stamp": list(disk.stamp)}
     return {"disk": file, "sketch": draft_document(sketch)}
 
 
 def recoverable(folder: Path | None) -> tuple[Autosave, ...]:
-    """Return the maps that editors left behind which live no more, the newest first."""
     return autosave.recoverable(folder, KIND, _autosave)
 
 
 def opened_elsewhere(folder: Path | None, path: Path) -> bool:
-    """Return whether another editor has this file open."""
     return autosave.opened_elsewhere(folder, KIND, path)
 
 
@@ -173,9 +159,11 @@ def _autosave(record: autosave.Record) -> Autosave | None:
     with suppress(MapError):
         if path is not None and read_bytes(path) == sketch_text(sketch).encode():
             return None
+    known = None
     try:
-        size, changed = disk["stamp"] if disk is not None else (0, 0)
-        known = OnDisk(path, str(disk["digest"]), (int(size), int(changed))) if disk and path else None
+        if disk is not None and path is not None:
+            size, changed = map(int, disk["stamp"])
+            known = OnDisk(path, str(disk["digest"]), (size, changed))
     except (TypeError, ValueError, KeyError) as error:
         raise MapError(f"{record.folder}: is no whole {KIND}: {error}") from None
     return Autosave(record.folder, path, sketch.name, record.when, len(sketch.obstacles), known)
@@ -196,55 +184,50 @@ class OnDisk:
     digest: str  # SHA-256 of its content
     stamp: tuple[int, int]  # (size, time of change in ns); what can be asked of the file quickly
 
+    @classmethod
+    def of(cls, path: Path, content: bytes, stamp: tuple[int, int] | None) -> OnDisk:
+        return cls(path, sha256(content).hexdigest(), stamp or (-1, 0))
+
 
 def read_sketch(path: Path) -> tuple[Sketch, OnDisk]:
-    """Return the sketch in a map file, which may be a draft, and what the file was like."""
     path = path.absolute()
     # the stamp of before: what changes while it is read is noticed at the next look
     stamp = _stamp(path)
     content = read_bytes(path)
-    return parse_sketch(content, str(path), path.parent), OnDisk(path, _digest(content), stamp or (-1, 0))
+    return parse_sketch(content, str(path), path.parent), OnDisk.of(path, content, stamp)
 
 
 def write_sketch(sketch: Sketch, path: Path, before: OnDisk | None = None, *, over: bool = False) -> OnDisk:
     """Write a file whole or not at all; ChangedError, unless `over`, when it is not as it was `before`."""
-    path = path.absolute()
-    text = sketch_text(sketch).encode()
+    path, text = path.absolute(), sketch_text(sketch).encode()
     writable(path)
-    if not over and (before is None or before.path != path) and _stamp(path) is not None:
+    ours = before if before is not None and before.path == path else None
+    if not over and ours is None and _stamp(path) is not None:
         raise ChangedError(f"{one_line(path)}: there is such a file already")
-    if not over and before is not None and before.path == path and state_of(before) == "changed":
+    if not over and ours is not None and state_of(ours) == "changed":
         what = "has been changed by something else since it was opened or saved here"
         raise ChangedError(f"{one_line(path)}: {what}")
     with written(path) as part:
         part.write_bytes(text)
-    return OnDisk(path, _digest(text), _stamp(path) or (-1, 0))
+    return OnDisk.of(path, text, _stamp(path))
 
 
 def state_of(before: OnDisk) -> State:
     """Return whether a file is still as it was, quickly; one that was merely touched is the same."""
     stamp = _stamp(before.path)
-    if stamp is None:
-        return "gone"
-    if stamp == before.stamp:
-        return "same"
+    if stamp in (None, before.stamp):
+        return "same" if stamp else "gone"
     try:
         content = read_bytes(before.path)
     except MapError:
         return "changed" if _stamp(before.path) else "gone"
-    return "same" if _digest(content) == before.digest else "changed"
+    return "same" if sha256(content).hexdigest() == before.digest else "changed"
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
-        status = path.stat()
-    except (OSError, ValueError):
-        return None
-    return status.st_size, status.st_mtime_ns
-
-
-def _digest(content: bytes) -> str:
-    return sha256(content).hexdigest()
+    with suppress(OSError, ValueError):
+        return (status := path.stat()).st_size, status.st_mtime_ns
+    return None
 
 
 FIRST_SHEET = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))  # the boundary of a new map, m
@@ -268,12 +251,12 @@ class Document:
         stem: str = "",
     ) -> None:
         self.history = History(sketch, saved=saved)
-        self.path, self.disk, self.stem = path, disk, stem
+        self.path, self.disk, self.stem = path, disk, stem  # stem: of a map without a file
         self.state: State = "same"
+        self._looked, self._over = 0.0, False
         self._autosaver = Autosaver(drafts, KIND, path, resumed)
+        self.flush, self.close = self._autosaver.flush, self._autosaver.close
         self._kept: Sketch | None = sketch if saved else None
-        self._looked = 0.0
-        self._over = False
         self.keep()
 
     @classmethod
@@ -290,42 +273,32 @@ class Document:
         return cls(sketch, drafts, path.resolve(), disk)
 
     @classmethod
-    def recovered(cls, autosave: Autosave, drafts: Path | None) -> Document:
-        """Return work that was left behind, unsaved still."""
-        sketch = autosave.sketch()
-        return cls(sketch, drafts, autosave.path, autosave.disk, resumed=autosave.folder, saved=False)
+    def recovered(cls, kept: Autosave, drafts: Path | None) -> Document:
+        return cls(kept.sketch(), drafts, kept.path, kept.disk, resumed=kept.folder, saved=False)
 
     @property
     def unsaved(self) -> bool:
-        """Whether something would be lost."""
         return self.history.unsaved
 
     @property
     def title(self) -> str:
-        """Its file's name, or else its own."""
         return self.path.name if self.path is not None else self.stem or self.history.sketch.name
 
     def suggested(self, folder: Path) -> Path:
-        """Return where it would be saved."""
         if self.path is not None:
             return self.path
         stem = self.stem or "-".join(self.history.sketch.name.lower().split()) or "map"
         stem = "".join(char for char in stem if char.isalnum() or char in "-_.") or "map"
-        target, k = folder / f"{stem}{SUFFIX}", 1
-        while target.exists():
-            target, k = folder / f"{stem}-{k}{SUFFIX}", k + 1
-        return target
+        names = chain([stem], (f"{stem}-{k}" for k in count(1)))
+        return next(path for name in names if not (path := folder / f"{name}{SUFFIX}").exists())
 
     def spoils(self, path: Path) -> bool:
-        """Return whether saving there would replace a valid map by one that cannot run."""
-        try:
+        with suppress(MapError):
             load_map(_with_suffix(path))
-        except MapError:
-            return False
-        try:
-            self.history.sketch.environment()
-        except MapError:
-            return True
+            try:
+                self.history.sketch.environment()
+            except MapError:
+                return True
         return False
 
     def save(self, path: Path, *, over: bool = False) -> str:
@@ -338,24 +311,19 @@ class Document:
         self.disk = write_sketch(named, path, before, over=over or (self._over and path == self.path))
         if named is not self.history.sketch:
             self.history.replace_all(lambda sketch: sketch.named(path.stem))
-        self.path, self.state, self._over = path, "same", False
+        self.path = path
         self._settle()
         return f"saved: {path}"
 
     def keep(self) -> None:
-        """Keep aside what is not saved, if it is not what was kept last."""
-        sketch = self.history.sketch
-        if self._kept is sketch:
-            return
-        self._kept = sketch
-        if self.unsaved:
-            self._autosaver.keep(partial(content, sketch, self.disk))
-        else:
+        before, self._kept = self._kept, self.history.sketch
+        if before is not self._kept and self.unsaved:
+            self._autosaver.keep(partial(content, self._kept, self.disk))
+        elif before is not self._kept:
             self._autosaver.settle(self.path)
 
     @property
     def trouble(self) -> str:
-        """Why nothing is kept aside, in words; empty if it is."""
         return self._autosaver.trouble
 
     def look(self, now: float) -> State:
@@ -363,34 +331,24 @@ class Document:
         if self.disk is None or now - self._looked < _LOOKED_AGAIN:
             return "same"
         self._looked = now
-        state = state_of(self.disk)
-        news, self.state = state != self.state, state
-        if news and state != "same":
-            self.history.mark_unsaved()
-            return state
-        return "same"
+        before, self.state = self.state, state_of(self.disk)
+        if self.state in ("same", before):
+            return "same"
+        self.history.mark_unsaved()
+        return self.state
 
     def reload(self) -> None:
         """Take the document as its file is now; that is an edit, which can be undone."""
         assert self.path is not None
         sketch, self.disk = read_sketch(self.path)
-        self.state, self._over = "same", False
         self.history.do(Change(sketch, Selection(), "read again from the file"))
         self._settle()
 
     def keep_mine(self) -> None:
-        """Take no notice of what is on the disk: saving replaces it."""
         self._over = True
 
-    def flush(self) -> None:
-        """Wait until the autosave is on the disk."""
-        self._autosaver.flush()
-
-    def close(self, *, discard: bool) -> None:
-        """End; discard what was kept aside, or leave it to be offered at the next start."""
-        self._autosaver.close(discard=discard)
-
     def _settle(self) -> None:
+        self.state, self._over = "same", False
         self.history.mark_saved()
         self._kept = self.history.sketch
         self._autosaver.settle(self.path)
@@ -398,10 +356,9 @@ class Document:
 
 def is_bundled(path: Path) -> bool:
     """Return whether a file is one of the maps that come with robocov; what cannot be a file is none."""
-    try:
+    with suppress(OSError, ValueError, RuntimeError):
         return path.resolve() in {each.resolve() for each in bundled_maps().values()}
-    except (OSError, ValueError, RuntimeError):
-        return False
+    return False
 
 
 def _with_suffix(path: Path) -> Path:

@@ -1,17 +1,16 @@
 """Hit testing under the cursor and in a box; locked and hidden things are skipped."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
-from robocov.environment import DiscStart, Point, PointsStart, StartSpec
-from robocov_app.editor.model.geometry import nearest_on
-from robocov_app.editor.model.selection import Edge, Selection, Vertex, ring_points, rings_of
-from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov.arrays import Array, BoolArray
+from robocov.environment import DiscStart, Point, PointsStart
+from robocov_app.editor.model.geometry import as_array, nearest_on
+from robocov_app.editor.model.selection import Edge, Selection, points_of
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
 def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
@@ -27,21 +26,17 @@ def owners_at(sketch: Sketch, point: Point, reach: float) -> tuple[Owner, ...]:
                 discs.append(name)
         elif isinstance(spec, PointsStart) and any(math.dist(point, at) <= reach for at in spec.positions):
             found.append(name)
-    near = np.sort(sketch.tree.query(_box_round(point, reach)))[::-1]
-    near = near[[not (sketch.obstacles[k].locked or sketch.obstacles[k].hidden) for k in near]]
-    away = shapely.distance(sketch.geometries[near], shapely.Point(point))
-    keys = [sketch.obstacles[k].key for k in near.tolist()]
-    found += [key for key, distance in zip(keys, away.tolist(), strict=True) if distance == 0.0]
+    near = [item for item in reversed(_items_near(sketch, point, reach)) if item.takeable]
+    gaps = [(shapely.distance(item.geometry, shapely.Point(point)), item.key) for item in near]
+    found += [key for gap, key in gaps if gap == 0.0]
     found += discs
-    order = np.argsort(away, kind="stable").tolist()
-    found += [keys[k] for k in order if 0.0 < away[k] <= reach]
+    found += [key for gap, key in sorted(gaps, key=lambda each: each[0]) if 0.0 < gap <= reach]
     if sketch.boundary is not None and edge_at(sketch, point, reach, [BOUNDARY]) is not None:
         found.append(BOUNDARY)
     return tuple(found)
 
 
 def obstacles_at(sketch: Sketch, point: Point, reach: float) -> list[int]:
-    """Return the obstacles of `owners_at`, by their keys."""
     return [each for each in owners_at(sketch, point, reach) if isinstance(each, int) and each != BOUNDARY]
 
 
@@ -50,18 +45,14 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
     best, nearest = reach, None
     wanted = list(owners)
     if len(wanted) > 8:  # of many obstacles, only those that may have something within reach
-        near = {sketch.obstacles[k].key for k in sketch.tree.query(_box_round(point, reach)).tolist()}
+        near = {item.key for item in _items_near(sketch, point, reach)}
         wanted = [each for each in wanted if each in near or each not in sketch.places]
     for owner in wanted:
-        for ring, points, closed in rings_of(sketch, owner):
-            starts = np.array(points, dtype=float).reshape(-1, 2)
-            ends = np.roll(starts, -1, axis=0)
-            if not closed:
-                starts, ends = starts[:-1], ends[:-1]
-            if not len(starts):
+        for ring, points, closed in sketch.rings_of(owner):
+            starts, count = as_array(points), len(points) - (not closed)
+            if count <= 0:
                 continue
-            feet = nearest_on(starts, ends, np.array(point))
-            away = np.hypot(*(feet - point).T)
+            feet, away = nearest_on(starts[:count], np.roll(starts, -1, axis=0)[:count], point)
             k = int(away.argmin())
             if away[k] <= best and (nearest is None or away[k] < best):
                 best = float(away[k])
@@ -71,47 +62,37 @@ def edge_at(sketch: Sketch, point: Point, reach: float, owners: Iterable[Owner])
 
 def in_box(sketch: Sketch, a: Point, b: Point, *, touched: bool = False) -> Selection:
     """Return all that lies in a box, `touched`: or only touches it; the boundary counts only as a whole."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    box = shapely.box(*low, *high)
+    box = shapely.box(*np.minimum(a, b), *np.maximum(a, b))
     if touched:
         places = sketch.tree.query(box, predicate="intersects")
     else:
-        bounds = shapely.bounds(sketch.geometries).reshape(-1, 4)
-        places = np.flatnonzero((bounds[:, :2] >= low).all(axis=1) & (bounds[:, 2:] <= high).all(axis=1))
+        corners = _inside(shapely.bounds(sketch.geometries), a, b)
+        places = np.flatnonzero(corners.reshape(-1, 2).all(axis=1))
     items = [sketch.obstacles[k] for k in places.tolist()]
-    starts = [name for name, spec in sketch.starts if _start_in_box(spec, low, high, box, touched=touched)]
-    ring = np.array(sketch.boundary or (), dtype=float).reshape(-1, 2)
-    return Selection(
-        frozenset(item.key for item in items if not (item.locked or item.hidden)),
-        starts=frozenset(starts),
-        boundary=bool(len(ring) and (ring >= low).all() and (ring <= high).all()),
-    )
+    starts = []
+    for name, spec in sketch.starts:
+        inside = _inside([at for _, at in points_of(sketch, name)], a, b)
+        caught = inside.any() if touched else inside.size and inside.all()
+        if touched and isinstance(spec, DiscStart):
+            caught = shapely.distance(box, shapely.Point(spec.center)) <= spec.radius
+        starts += [name] if caught else []
+    ring = _inside(sketch.boundary or (), a, b)
+    keys = frozenset(item.key for item in items if item.takeable)
+    return Selection(keys, starts=frozenset(starts), boundary=bool(ring.size and ring.all()))
 
 
 def vertices_in_box(sketch: Sketch, a: Point, b: Point, owners: Iterable[Owner]) -> Selection:
-    """Return the vertices of some things that lie in the box with two opposite corners, m."""
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    found = []
-    for owner in owners:
-        for ring, points in enumerate(ring_points(sketch, owner)):
-            at = np.array(points, dtype=float).reshape(-1, 2)
-            inside = (at >= low).all(axis=1) & (at <= high).all(axis=1)
-            found += [Vertex(owner, ring, k) for k in np.flatnonzero(inside).tolist()]
-    return Selection(vertices=frozenset(found))
+    pairs = [pair for owner in owners for pair in points_of(sketch, owner)]
+    inside = np.flatnonzero(_inside([at for _, at in pairs], a, b)).tolist()
+    return Selection(vertices=frozenset(pairs[k][0] for k in inside))
 
 
-def _start_in_box(spec: StartSpec, low: Array, high: Array, box: BaseGeometry, *, touched: bool) -> bool:
-    if isinstance(spec, DiscStart):
-        if touched:
-            return bool(shapely.distance(box, shapely.Point(spec.center)) <= spec.radius)
-        center = np.array(spec.center)
-        return bool((center - spec.radius >= low).all() and (center + spec.radius <= high).all())
-    if isinstance(spec, PointsStart) and spec.positions:
-        inside = ((np.array(spec.positions) >= low) & (np.array(spec.positions) <= high)).all(axis=1)
-        return bool(inside.any() if touched else inside.all())
-    return False
+def _inside(points: Sequence[Point] | Array, a: Point, b: Point) -> BoolArray:
+    at = as_array(points)
+    return np.asarray(((at >= np.minimum(a, b)) & (at <= np.maximum(a, b))).all(axis=1))
 
 
-def _box_round(point: Point, reach: float) -> BaseGeometry:
+def _items_near(sketch: Sketch, point: Point, reach: float) -> list[Item]:
     x, y = point
-    return shapely.box(x - reach, y - reach, x + reach, y + reach)
+    near = sketch.tree.query(shapely.box(x - reach, y - reach, x + reach, y + reach))
+    return [sketch.obstacles[k] for k in sorted(near.tolist())]

@@ -1,17 +1,18 @@
 """Measurements of a sketch: free area, parts, narrowest gap, and where robots cannot pass."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from shapely import LineString, MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array, IntArray
-from robocov.environment import SAGITTA, Gap, gaps_narrower, narrowest_gap
+from robocov.environment import SAGITTA, Gap, Point, gaps_narrower, narrowest_gap
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.selection import rings_of
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Sketch
+from robocov_app.editor.model.geometry import middle_of
+from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.editor.model.validation import Problem, examined, place_words
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
@@ -26,12 +27,9 @@ class Measurement:
 
     free_area: float  # m²
     components: tuple[float, ...]  # m²; areas of the connected parts of the free space, the largest first
-    # m²; areas that a robot can sweep without passing a gap that is too narrow, the largest first: more than
-    # one means that some places are out of reach from others
-    reached: tuple[float, ...]
+    reached: tuple[float, ...]  # m²; areas that a robot can sweep, each out of reach from the others, too
     gap: Gap | None  # the narrowest passage; None where there is none
-    # free space that keeps such robots out: at passages that are too narrow, the largest disc that passes;
-    # all that no robot touches from anywhere, but for corners that are merely too sharp for a disc
+    # at passages that are too narrow, the largest disc that passes; and what no robot touches, as `reach_of`
     impassable: MultiPolygon
     sealed: MultiPolygon  # free space where robots fit, but that is cut off from the largest part for them
     vertices: int  # of boundary, walls, polygons and their holes
@@ -43,26 +41,24 @@ def measure(sketch: Sketch, radius: float = DEFAULT_RADIUS) -> Measurement:
     """Measure a sketch for robots of a radius, m; a broken one as far as its free space can be made out."""
     found, free = examined(sketch, radius)
     narrow = gaps_narrower(free, 2.0 * radius - _EXACTLY)
-    gap = narrow[0] if narrow else narrowest_gap(free)
     reached, untouched = reach_of(free, radius)
     discs = [shapely.Point(_middle(gap)).buffer(gap.width / 2) for gap in narrow]
-    impassable = shapely.union_all([*discs, untouched]) & free
-    marks = _polygons(impassable)
-    owners = [BOUNDARY, *(item.key for item in sketch.obstacles)]
+    marks = _polygons(shapely.union_all([*discs, untouched]) & free)
+    sealed = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
     return Measurement(
         free_area=float(free.area),
         components=tuple(float(part.area) for part in free.geoms),
         reached=tuple(float(part.area) for part in reached),
-        gap=gap,
+        gap=narrow[0] if narrow else narrowest_gap(free),
         impassable=MultiPolygon(marks),
-        sealed=MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)]),
-        vertices=sum(len(points) for owner in owners for _, points, _ in rings_of(sketch, owner)),
-        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, free, radius)),
+        sealed=sealed,
+        vertices=sum(len(ring) for owner in sketch.owners for _, ring, _ in sketch.rings_of(owner)),
+        problems=(*found, *_too_narrow(narrow, marks, radius), *_cut_off(reached, sealed, free, radius)),
         radius=radius,
     )
 
 
-def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[BaseGeometry, ...], MultiPolygon]:
+def reach_of(free: MultiPolygon, radius: float) -> tuple[tuple[shapely.Geometry, ...], MultiPolygon]:
     """Return what a robot sweeps from anywhere in each part that it can drive in, and what it never touches.
 
     Swept parts, the largest first, are the connected pieces of the free space's opening by the robot's disc.
@@ -97,8 +93,7 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     points, ring_of = shapely.get_coordinates(rings, return_index=True)
     is_edge = ring_of[1:] == ring_of[:-1]
     ring = ring_of[1:][is_edge]
-    middles = ((points[1:] + points[:-1]) / 2)[is_edge]
-    off = ~shapely.dwithin(walls, shapely.points(middles), _TOUCHING)
+    off = ~shapely.dwithin(walls, shapely.points(((points[1:] + points[:-1]) / 2)[is_edge]), _TOUCHING)
     first = np.searchsorted(ring, np.arange(len(rings)))
     before = np.arange(len(ring)) - 1
     before[first] = np.append(first[1:], len(ring)) - 1
@@ -109,56 +104,42 @@ def _arcs(parts: Array, free: MultiPolygon) -> IntArray:
     return counts
 
 
-def _middle(gap: Gap) -> tuple[float, float]:
-    (ax, ay), (bx, by) = gap.between
-    return (ax + bx) / 2, (ay + by) / 2
+def _middle(gap: Gap) -> Point:
+    return middle_of((*gap.between[0], *gap.between[1]))
 
 
 def _too_narrow(narrow: tuple[Gap, ...], marks: list[Polygon], radius: float) -> list[Problem]:
     """Warn of each passage that is too narrow: of several gaps in one marked place, of the narrowest."""
     found: dict[int, Problem] = {}
-    tree = shapely.STRtree(marks)
+    tree, narrows = shapely.STRtree(marks), f"too narrow for robots of radius {radius:g} m"
     for gap in narrow:
+        words = f"the gap at {place_words(*_middle(gap))} is {gap.width:.3g} m wide: {narrows}"
         mark = int(tree.nearest(shapely.Point(_middle(gap))))
-        if mark not in found:
-            at = place_words(*_middle(gap))
-            words = f"the gap at {at} is {gap.width:.3g} m wide: too narrow for robots of radius {radius:g} m"
-            found[mark] = Problem(words, LineString(gap.between), None, False, "narrow")
+        found.setdefault(mark, Problem(words, LineString(gap.between), None, False, "narrow"))
     problems = list(found.values())
-    more = problems[_MOST_GAPS:]
-    if more:
-        words = f"{len(more)} more gaps are too narrow for robots of radius {radius:g} m"
+    if more := problems[_MOST_GAPS:]:
         where = shapely.union_all([problem.where for problem in more])
-        return [*problems[:_MOST_GAPS], Problem(words, where, None, False)]
+        problems[_MOST_GAPS:] = [Problem(f"{len(more)} more gaps are {narrows}", where, None, False)]
     return problems
 
 
-def _cut_off(reached: tuple[BaseGeometry, ...], free: MultiPolygon, radius: float) -> list[Problem]:
-    """Warn of places that are out of reach from the largest part, because of gaps that are too narrow."""
-    rooms = [part for part in free.geoms if part.area >= np.pi * radius**2]
+def _cut_off(
+    reached: tuple[shapely.Geometry, ...], sealed: MultiPolygon, free: MultiPolygon, radius: float
+) -> Iterator[Problem]:
     if not free.is_empty and not reached:
-        return [Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)]
-    if len(reached) <= len(rooms):
-        return []
-    area = sum(part.area for part in reached[1:])
-    words = (
-        f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space: "
-        f"{area:.3g} m² are cut off from the largest"
-    )
-    where = MultiPolygon([polygon for part in reached[1:] for polygon in _polygons(part)])
-    return [Problem(words, where, None, False, "cut off")]
+        yield Problem(f"no robot of radius {radius:g} m fits anywhere", free, None, False)
+    elif len(reached) > sum(part.area >= np.pi * radius**2 for part in free.geoms):
+        parts = f"robots of radius {radius:g} m cannot pass between {len(reached)} parts of the free space"
+        area = sum(part.area for part in reached[1:])
+        yield Problem(f"{parts}: {area:.3g} m² are cut off from the largest", sealed, None, False, "cut off")
 
 
-def _polygons(geometry: BaseGeometry) -> list[Polygon]:
+def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
     return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
 
 
-# beside the window, in a process that is told only what has changed
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """Request to measure a sketch."""
+class Question(NamedTuple):
+    """Request to measure a sketch beside the window, in a process that is told only what has changed."""
 
     rest: Sketch  # without its obstacles
     order: tuple[int, ...]  # the keys of its obstacles
@@ -173,10 +154,9 @@ class MeasurementWire(Wire):
         self._known: dict[int, Item] = {}
 
     def encode(self, question: tuple[Sketch, float]) -> Question:
-        """Return the question about a sketch, for robots of a radius in m."""
         sketch, radius = question
-        known, self._known = self._known, {item.key: item for item in sketch.obstacles}
-        changed = tuple(item for item in sketch.obstacles if known.get(item.key) is not item)
+        changed = tuple(item for item in sketch.obstacles if self._known.get(item.key) is not item)
+        self._known = {item.key: item for item in sketch.obstacles}
         return Question(replace(sketch, obstacles=()), tuple(self._known), changed, radius)
 
 
@@ -189,7 +169,6 @@ class Measuring:
         self._known: dict[int, Item] = {}
 
     def __call__(self, questions: list[Question], line: Line) -> Measurement:
-        """Learn from all questions, and answer the last."""
         for question in questions:
             self._known |= {item.key: item for item in question.changed}
             self._known = {key: self._known[key] for key in question.order}
@@ -201,5 +180,4 @@ def measurement_worker(*, direct: bool = False) -> Worker[Measurement]:
     """Return what measures sketches, asked by (sketch, radius), in another process or at once in this one."""
     if direct:
         return DirectWorker(Measuring(), MeasurementWire())
-    service = "robocov_app.editor.model.measurement:Measuring"
-    return LatestWorker(service, "measures the map", MeasurementWire)
+    return LatestWorker(f"{__name__}:{Measuring.__name__}", "measures the map", MeasurementWire)

@@ -1,7 +1,7 @@
 """Sketches read from documents: what a map may not be is kept, what is no map at all is refused."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -11,23 +11,20 @@ from robocov.environment import Obstacle, Point, Ring
 from robocov.errors import JsonPath, MapError, Mistake, one_line, place, shown_json, unknown_name
 from robocov.files.strictjson import check_header, located, parse, require_json
 from robocov.mapfile import density_of
-from robocov.mapfile.models import FORMAT, VERSION
+from robocov.mapfile.models import FORMAT, VERSION, MapModel
 from robocov_app.editor.model.background import taken_apart
-from robocov_app.editor.model.sketch import Item, Sketch
+from robocov_app.editor.model.sketch import KINDS, Item, Sketch
 
-_MAP = (
-    *("$schema", "format", "version", "name", "description", "boundary", "obstacles", "starts"),
-    *("density", "extra"),
-)
-_OBSTACLES = {"polygon": env.PolygonObstacle, "circle": env.CircleObstacle, "wall": env.WallObstacle}
-_STARTS = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
+_MAP = [field.alias or name for name, field in MapModel.model_fields.items()]
+_OBSTACLES: dict[str, type[Obstacle]] = {kind: shape for shape, kind in KINDS.items()}
+_STARTS: dict[str, Any] = {"disc": env.DiscStart, "uniform": env.UniformStart, "points": env.PointsStart}
+# parser method of each key
 _READ_AS = {"center": "point", "holes": "rings", "name": "text", "path": "way", "repeat": "repeat"}
 _READ_AS |= dict.fromkeys(("vertices", "points", "positions"), "ring")
 _READ_AS |= dict.fromkeys(("radius", "width", "speed"), "number")
-"""Parser method of each key."""
 
+# extent of a raster on a map without a boundary, m, unless it states its own
 _UNBOUNDED: Ring = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
-"""Extent of a raster on a map without a boundary, m, unless it states its own."""
 
 _Read = TypeVar("_Read")
 
@@ -48,16 +45,13 @@ def sketch_of(document: Any, where: str = "map", folder: Path | None = None) -> 
     check_header(document, where, FORMAT, VERSION)
     reader = _Reader(where)
     members = reader.members(document, (), _MAP)
-    obstacles = reader.items(members.get("obstacles", []), ("obstacles",), "obstacles")
-    shapes: list[Obstacle] = [
-        reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)
-    ]
-    starts = reader.object(members.get("starts", {}), ("starts",))
-    extra = reader.object(members.get("extra", {}), ("extra",))
+    obstacles = reader.typed(list, members.get("obstacles", []), ("obstacles",), "a list of obstacles")
+    shapes = [reader.either(_OBSTACLES, value, ("obstacles", k)) for k, value in enumerate(obstacles)]
+    starts = reader.typed(dict, members.get("starts", {}), ("starts",), "an object")
+    extra = reader.typed(dict, members.get("extra", {}), ("extra",), "an object")
     marks, background, others = taken_apart(extra, [shape.name for shape in shapes])
-    boundary, schema = members.get("boundary"), members.get("$schema")
+    boundary, schema, density = (members.get(key) for key in ("boundary", "$schema", "density"))
     boundary = None if boundary is None else reader.ring(boundary, ("boundary",))
-    density = members.get("density")
     return Sketch(
         name=reader.text(members.get("name", ""), ("name",)),
         description=reader.text(members.get("description", ""), ("description",)),
@@ -81,32 +75,24 @@ class _Reader:
         at = f"{place(path[:-1] if at_key else path)}: " if path[: -1 if at_key else None] else ""
         raise MapError.of(self._where, [Mistake(path, at + what, at_key)])
 
-    def object(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
-        if not isinstance(value, dict):
-            self.refuse(path, f"{shown_json(value)}, but an object was wanted")
+    def typed(self, kind: type[_Read], value: Any, path: JsonPath, wanted: str) -> _Read:
+        if not isinstance(value, kind):
+            self.refuse(path, f"{shown_json(value)}, but {wanted} was wanted")
         return value
 
-    def members(self, value: Any, path: JsonPath, known: Iterable[str]) -> Mapping[str, Any]:
-        known = list(known)
-        for key in self.object(value, path):
+    def members(self, value: Any, path: JsonPath, known: Sequence[str]) -> dict[str, Any]:
+        for key in self.typed(dict, value, path, "an object"):
             if key not in known:
                 self.refuse((*path, key), unknown_name("key", str(key), known), at_key=True)
-        return self.object(value, path)
+        return value  # type: ignore[no-any-return]
 
     def text(self, value: Any, path: JsonPath) -> str:
-        if not isinstance(value, str):
-            self.refuse(path, f"{shown_json(value)}, but a text was wanted")
-        return value
+        return self.typed(str, value, path, "a text")
 
     def number(self, value: Any, path: JsonPath) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             self.refuse(path, f"{shown_json(value)}, but a number was wanted")
         return float(value)
-
-    def items(self, value: Any, path: JsonPath, what: str) -> list[Any]:
-        if not isinstance(value, list):
-            self.refuse(path, f"{shown_json(value)}, but a list of {what} was wanted")
-        return value
 
     def point(self, value: Any, path: JsonPath) -> Point:
         if not isinstance(value, list | tuple) or len(value) != 2:
@@ -117,27 +103,24 @@ class _Reader:
         return self.number(x, (*path, 0)), self.number(y, (*path, 1))
 
     def ring(self, value: Any, path: JsonPath) -> Ring:
-        points = self.items(value, path, "points [x, y]")
+        points = self.typed(list, value, path, "a list of points [x, y]")
         return tuple([self.point(point, (*path, k)) for k, point in enumerate(points)])
 
     def rings(self, value: Any, path: JsonPath) -> tuple[Ring, ...]:
-        return tuple([self.ring(ring, (*path, k)) for k, ring in enumerate(self.items(value, path, "rings"))])
+        rings = self.typed(list, value, path, "a list of rings")
+        return tuple([self.ring(ring, (*path, k)) for k, ring in enumerate(rings)])
 
     def repeat(self, value: Any, path: JsonPath) -> env.Repeat:
         if value not in env.REPEATS:
             self.refuse(path, f"{shown_json(value)}, but one of {', '.join(env.REPEATS)} was wanted")
-        found: env.Repeat = value
-        return found
+        return value  # type: ignore[no-any-return]
 
     def way(self, value: Any, path: JsonPath) -> env.ObstaclePath:
         return self.built(env.ObstaclePath, value, path)
 
     def either(self, classes: Mapping[str, type[_Read]], value: Any, path: JsonPath) -> _Read:
-        """Return what an object says, of the class of its kind."""
         wanted = f"one of {', '.join(classes)}"
-        if not isinstance(value, dict):
-            self.refuse(path, f"{shown_json(value)}, but an object whose kind is {wanted} was wanted")
-        if "kind" not in value:
+        if "kind" not in self.typed(dict, value, path, f"an object whose kind is {wanted}"):
             self.refuse((*path, "kind"), "missing, but it was wanted")
         kind = value["kind"]
         if kind not in tuple(classes):
@@ -147,7 +130,7 @@ class _Reader:
     def built(self, of: type[_Read], value: Any, path: JsonPath, *more: str) -> _Read:
         """Return an object of a dataclass whose fields are the keys; what may be None may also be null."""
         known: tuple[Field[Any], ...] = fields(of)  # type: ignore[arg-type]
-        members = self.members(value, path, (*more, *(field.name for field in known)))
+        members = self.members(value, path, [*more, *(field.name for field in known)])
         found = {}
         for key, default in ((field.name, field.default) for field in known):
             if key in members and not (members[key] is None and default is None):

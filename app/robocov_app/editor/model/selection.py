@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
-from robocov import environment as env
-from robocov.environment import Obstacle, Point, StartSpec
-from robocov.errors import MapError, counted, one_line
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch, kind_and_name
+from robocov.environment import Obstacle, Point
+from robocov.errors import counted
+from robocov_app.editor.model import require
+from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,18 +18,13 @@ class Vertex:
 
     of: Owner  # key of an obstacle, `BOUNDARY`, or name of a start
     ring: int  # 0 for the outline, or a wall's line; 1, 2, ... for the holes of a polygon
-    # in the ring. Of a circle, and of a start that is a disc: 0 the centre, and 1 to 4 its rim in the east,
-    # north, west and south
-    index: int
+    index: int  # in the ring; of a disc: 0 the centre, 1 to 4 its rim in the east, north, west, south
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A place on an edge, `point` in m: from vertex `index` of a ring to the next."""
+class Edge(Vertex):
+    """A place on an edge, `point` in m: from a vertex of a ring to the next."""
 
-    of: Owner
-    ring: int
-    index: int
     point: Point
 
 
@@ -46,26 +42,25 @@ class Selection:
 
     @classmethod
     def of(cls, *owners: Owner) -> Selection:
-        """Return the selection of whole things: keys, `BOUNDARY`, names of starts."""
-        return cls(
-            items=frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY),
-            starts=frozenset(each for each in owners if isinstance(each, str)),
-            boundary=BOUNDARY in owners,
-        )
+        items = frozenset(each for each in owners if isinstance(each, int) and each != BOUNDARY)
+        starts = frozenset(each for each in owners if isinstance(each, str))
+        return cls(items, starts=starts, boundary=BOUNDARY in owners)
 
     @classmethod
     def all(cls, sketch: Sketch) -> Selection:
         """Return the selection of every obstacle that is not locked or hidden, every start, the boundary."""
-        free = [item.key for item in sketch.obstacles if not (item.locked or item.hidden)]
-        return replace(cls.of(*free, *dict(sketch.starts)), boundary=sketch.boundary is not None)
+        shut = frozenset(item.key for item in sketch.obstacles if not item.takeable)
+        return cls.of(*(owner for owner in sketch.owners if owner not in shut)).within(sketch)
 
     @property
     def owners(self) -> frozenset[Owner]:
-        """The whole things that are selected."""
         return self.items | self.starts | ({BOUNDARY} if self.boundary else frozenset())
 
+    def items_in(self, sketch: Sketch) -> list[Item]:
+        """Return the selected obstacles, the lowest first."""
+        return [item for item in sketch.obstacles if item.key in self.items]
+
     def plus(self, other: Selection) -> Selection:
-        """Return both together."""
         items, starts = self.items | other.items, self.starts | other.starts
         return Selection(items, self.vertices | other.vertices, starts, self.boundary or other.boundary)
 
@@ -76,21 +71,17 @@ class Selection:
 
     def within(self, sketch: Sketch) -> Selection:
         """Return what of the selection there is in a sketch, as after undoing."""
-        return Selection(
-            self.items & sketch.places.keys(),
-            frozenset(vertex for vertex in self.vertices if exists(sketch, vertex)),
-            self.starts & dict(sketch.starts).keys(),
-            self.boundary and sketch.boundary is not None,
-        )
+        items, starts = self.items & sketch.places.keys(), self.starts & dict(sketch.starts).keys()
+        vertices = frozenset(vertex for vertex in self.vertices if exists(sketch, vertex))
+        return Selection(items, vertices, starts, self.boundary and sketch.boundary is not None)
 
     def without_vertices(self) -> Selection:
-        """Return the whole things of the selection, without single vertices."""
         return replace(self, vertices=frozenset())
 
     def with_groups(self, sketch: Sketch) -> Selection:
         """Return the selection with the members of all its groups, but for the locked and the hidden."""
         groups = {sketch.item(key).group for key in self.items} - {""}
-        members = {i.key for i in sketch.obstacles if i.group in groups and not (i.locked or i.hidden)}
+        members = {item.key for item in sketch.obstacles if item.group in groups and item.takeable}
         return replace(self, items=self.items | members)
 
     def words(self, sketch: Sketch) -> str:
@@ -102,7 +93,7 @@ class Selection:
             return f"{vertices} vertices" if vertices > 1 else "vertex"
         if len(owners) > 1:
             return counted(len(owners), "obstacle" if self.items else "start")
-        return display_name(sketch, next(iter(owners))) if owners else "nothing"
+        return sketch.display_name(next(iter(owners))) if owners else "nothing"
 
 
 @dataclass(frozen=True)
@@ -114,57 +105,15 @@ class Change:
     words: str
 
 
-def display_name(sketch: Sketch, owner: Owner) -> str:
-    """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
-    if owner == BOUNDARY:
-        return "boundary"
-    return one_line(f"start “{owner}”" if isinstance(owner, str) else kind_and_name(sketch.item(owner).shape))
-
-
 def numbered_name(sketch: Sketch, owner: Owner) -> str:
     """Return a name that tells things apart: obstacles without a name by their number, "wall 17"."""
-    name = display_name(sketch, owner)
+    name = sketch.display_name(owner)
     if isinstance(owner, str) or owner == BOUNDARY or sketch.item(owner).shape.name:
         return name
     return f"{name} {sketch.places[owner] + 1}"
 
 
-def ring_points(sketch: Sketch, owner: Owner) -> tuple[tuple[Point, ...], ...]:
-    """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
-    if owner == BOUNDARY:
-        return () if sketch.boundary is None else (sketch.boundary,)
-    thing: Obstacle | StartSpec | None
-    if isinstance(owner, str):
-        thing = dict(sketch.starts).get(owner)
-    else:
-        thing = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(thing, env.PolygonObstacle):
-        return (thing.vertices, *thing.holes)
-    if isinstance(thing, env.WallObstacle):
-        return (thing.points,)
-    if isinstance(thing, env.PointsStart):
-        return (thing.positions,)
-    if isinstance(thing, env.CircleObstacle | env.DiscStart):
-        (x, y), r = thing.center, thing.radius
-        return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
-    return ()
-
-
-def with_rings(sketch: Sketch, owner: Owner, rings: Sequence[Sequence[Point]]) -> Sketch:
-    """Return the sketch with other vertices for something that `ring_points` has rings of, not circles."""
-    lines = [tuple(ring) for ring in rings]
-    if isinstance(owner, str):
-        return sketch.with_start(owner, env.PointsStart(lines[0]))
-    if owner == BOUNDARY:
-        return replace(sketch, boundary=lines[0])
-    shape = sketch.item(owner).shape
-    if isinstance(shape, env.WallObstacle):
-        return sketch.with_shapes({owner: replace(shape, points=lines[0])})
-    assert isinstance(shape, env.PolygonObstacle)
-    return sketch.with_shapes({owner: replace(shape, vertices=lines[0], holes=tuple(lines[1:]))})
-
-
-def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], words: str) -> Change:
+def replace_obstacles(sketch: Sketch, shapes: Mapping[Any, Sequence[Obstacle]], words: str) -> Change:
     """Return the change that puts shapes, none or several, in the place of some obstacles."""
     fresh = sketch.fresh_key
     items: list[Item] = []
@@ -181,33 +130,19 @@ def replace_obstacles(sketch: Sketch, shapes: Mapping[int, Sequence[Obstacle]], 
 
 
 def points_of(sketch: Sketch, owner: Owner) -> tuple[tuple[Vertex, Point], ...]:
-    """Return the vertices of something and where they are, m; the handles that a window shows."""
     return tuple(
         (Vertex(owner, ring, index), point)
-        for ring, points in enumerate(ring_points(sketch, owner))
+        for ring, points in enumerate(sketch.ring_points(owner))
         for index, point in enumerate(points)
     )
 
 
 def exists(sketch: Sketch, vertex: Vertex) -> bool:
-    """Return whether there is such a vertex."""
-    rings = ring_points(sketch, vertex.of)
+    rings = sketch.ring_points(vertex.of)
     return 0 <= vertex.ring < len(rings) and 0 <= vertex.index < len(rings[vertex.ring])
 
 
 def place_of(sketch: Sketch, vertex: Vertex) -> Point:
     """Return where a vertex is, m; MapError when there is none."""
-    if not exists(sketch, vertex):
-        raise MapError("there is no such vertex any more")
-    return ring_points(sketch, vertex.of)[vertex.ring][vertex.index]
-
-
-def rings_of(sketch: Sketch, owner: Owner) -> tuple[tuple[int, tuple[Point, ...], bool], ...]:
-    """Return the rings of something: number, points, and whether it is closed; none of circles and starts."""
-    if isinstance(owner, str):
-        return ()
-    shape = sketch.item(owner).shape if owner in sketch.places else None
-    if isinstance(shape, env.CircleObstacle):
-        return ()
-    closed = not isinstance(shape, env.WallObstacle)
-    return tuple((k, points, closed) for k, points in enumerate(ring_points(sketch, owner)))
+    require(exists(sketch, vertex), "there is no such vertex any more")
+    return sketch.ring_points(vertex.of)[vertex.ring][vertex.index]

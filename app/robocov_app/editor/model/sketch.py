@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 import shapely
-from shapely import GeometryCollection, LineString, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
 from robocov.density import Density
 from robocov.environment import Obstacle, Point, Ring, StartSpec
+from robocov.errors import one_line
 from robocov.mapfile import dump_document, from_json, to_json
 from robocov.mapfile.models import FARTHEST, LARGEST
 from robocov_app.editor.model.background import MARKS, Background, annotated, taken_apart
+from robocov_app.editor.model.geometry import Box, as_array
 
 KINDS = {env.PolygonObstacle: "polygon", env.CircleObstacle: "circle", env.WallObstacle: "wall"}
+_LINES = {env.WallObstacle: "points", env.PointsStart: "positions"}
 BOUNDARY: Final = -1  # stands for the boundary where obstacles have their keys
-Owner: TypeAlias = int | str
-"""Owner of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start."""
+Owner: TypeAlias = int | str  # of vertices: the key of an obstacle, `BOUNDARY`, or the name of a start
 
 
 @dataclass(frozen=True)
@@ -30,27 +30,24 @@ class Item:
     """An obstacle of a sketch."""
 
     key: int  # who it is, whatever it looks like: stays the same through every edit; not in the file
-    # as `robocov.environment` has it; in a draft it may break rules, such as a polygon with two corners
-    shape: Obstacle
+    shape: Obstacle  # in a draft it may break rules, such as a polygon with two corners
     note: str = ""  # what people wrote about it
     group: str = ""  # the name of the group that it is in; empty for none
     locked: bool = False  # not to be taken by the mouse
     hidden: bool = False  # not shown in the editor either; robots meet it all the same
 
     @cached_property
-    def geometry(self) -> BaseGeometry:
+    def geometry(self) -> shapely.Geometry:
         """Covered area as a valid shapely geometry, m: a line or a point where it covers nothing."""
         return geometry_of(self.shape)
 
     @property
-    def marks(self) -> dict[str, Any]:
-        """Attributes that the editor keeps besides the shape."""
-        return {name: value for name in MARKS if (value := getattr(self, name))}
+    def takeable(self) -> bool:
+        return not (self.locked or self.hidden)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived again."""
-        marks = {name: getattr(self, name) for name in MARKS}
-        return {"key": self.key, "shape": replace(self.shape), **marks}
+        return {name: getattr(self, name) for name in ("key", *MARKS)} | {"shape": replace(self.shape)}
 
 
 @dataclass(frozen=True)
@@ -63,8 +60,7 @@ class Sketch:
     obstacles: tuple[Item, ...] = ()  # from the bottom to the top
     starts: tuple[tuple[str, StartSpec], ...] = ()  # the first is the default
     background: Background | None = None
-    # free keys of the file, without what the editor keeps there itself
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, Any] = field(default_factory=dict)  # the file's free keys, without the editor's
     schema: str | None = None  # the file's ``$schema``
     density: Density | None = None  # how much each place counts; pictures are read when the map is
 
@@ -74,13 +70,13 @@ class Sketch:
     @classmethod
     def from_environment(cls, environment: env.Environment) -> Sketch:
         """Return the sketch of a map, with keys 0, 1, ... in the order of its obstacles."""
-        names = [shape.name for shape in environment.obstacles]
-        marks, background, extra = taken_apart(to_json(environment).get("extra", {}), names)
+        shapes, free_keys = environment.obstacles, dict(environment.extra)
+        marks, background, extra = taken_apart(free_keys, [shape.name for shape in shapes])
         return cls(
             name=environment.name,
             description=environment.description,
             boundary=environment.boundary,
-            obstacles=tuple(Item(k, s, **marks.get(k, {})) for k, s in enumerate(environment.obstacles)),
+            obstacles=tuple(Item(k, shape, **marks.get(k, {})) for k, shape in enumerate(shapes)),
             starts=tuple(environment.starts.items()),
             background=background,
             extra=extra,
@@ -94,68 +90,109 @@ class Sketch:
 
     def unchecked(self) -> env.Environment:
         """Return the map without a look at its rules: if it breaks one, it may fail at anything."""
-        marks = {place: item.marks for place, item in enumerate(self.obstacles) if item.marks}
+        shapes, marks = [item.shape for item in self.obstacles], dict[int, dict[str, Any]]()
+        for k, item in enumerate(self.obstacles):
+            marks[k] = {name: value for name in MARKS if (value := getattr(item, name))}
         return env.Environment(
             name=self.name,
             boundary=self.boundary or (),
-            obstacles=tuple(item.shape for item in self.obstacles),
+            obstacles=tuple(shapes),
             starts=dict(self.starts),
             description=self.description,
-            extra=annotated(self.extra, marks, [i.shape.name for i in self.obstacles], self.background),
+            extra=annotated(self.extra, marks, [shape.name for shape in shapes], self.background),
             schema=self.schema,
             density=self.density,
         )
 
     def item(self, key: int) -> Item:
-        """Return the obstacle with a key; a KeyError where there is none."""
         return self.obstacles[self.places[key]]
 
     def start(self, name: str) -> StartSpec:
-        """Return the start of that name; a KeyError where there is none."""
         return dict(self.starts)[name]
+
+    def thing(self, owner: Owner) -> Obstacle | StartSpec | None:
+        """Return an obstacle or a start; None of the boundary, and where there is no such thing."""
+        if isinstance(owner, str):
+            return dict(self.starts).get(owner)
+        return self.item(owner).shape if owner in self.places else None
+
+    @property
+    def owners(self) -> tuple[Owner, ...]:
+        return BOUNDARY, *self.places, *dict(self.starts)
+
+    def display_name(self, owner: Owner) -> str:
+        """Return what people call something: "polygon “desk”", "start “corner”", "boundary"."""
+        if isinstance(owner, str):
+            return one_line(f"start “{owner}”")
+        shape = None if owner == BOUNDARY else self.item(owner).shape
+        kind = "boundary" if shape is None else KINDS[type(shape)]
+        return one_line(f"{kind} “{shape.name}”") if shape and shape.name else kind
+
+    def ring_points(self, owner: Owner) -> tuple[Ring, ...]:
+        """Return where the vertices of something are, m, ring by ring; empty where there is no such thing."""
+        if owner == BOUNDARY:
+            return () if self.boundary is None else (self.boundary,)
+        thing: Any = self.thing(owner)
+        if isinstance(thing, env.PolygonObstacle):
+            return (thing.vertices, *thing.holes)
+        if isinstance(thing, env.CircleObstacle | env.DiscStart):
+            (x, y), r = thing.center, thing.radius
+            return (((x, y), (x + r, y), (x, y + r), (x - r, y), (x, y - r)),)
+        return (getattr(thing, _LINES[type(thing)]),) if type(thing) in _LINES else ()
+
+    def rings_of(self, owner: Owner) -> tuple[tuple[int, Ring, bool], ...]:
+        """Return the rings of something: number, points, whether it is closed; none of circles and starts."""
+        thing = self.thing(owner)
+        if isinstance(owner, str) or isinstance(thing, env.CircleObstacle):
+            return ()
+        closed = not isinstance(thing, env.WallObstacle)
+        return tuple((k, points, closed) for k, points in enumerate(self.ring_points(owner)))
+
+    def with_rings(self, owner: Owner, rings: Iterable[Sequence[Point]]) -> Sketch:
+        """Return the sketch with other vertices for something that `ring_points` has, but circles."""
+        line, *holes = map(tuple, rings)
+        if owner == BOUNDARY:
+            return replace(self, boundary=line)
+        thing: Any = self.thing(owner)
+        if isinstance(thing, env.PolygonObstacle):
+            return self.with_things({owner: replace(thing, vertices=line, holes=tuple(holes))})
+        return self.with_things({owner: replace(thing, **{_LINES[type(thing)]: line})})
 
     @cached_property
     def places(self) -> Mapping[int, int]:
-        """Index in `obstacles` of each key."""
         return {item.key: place for place, item in enumerate(self.obstacles)}
 
     @cached_property
-    def geometries(self) -> Any:
-        """Geometries of the obstacles in their order, an array of shapely geometries."""
-        geometries = np.empty(len(self.obstacles), dtype=object)
-        geometries[:] = [item.geometry for item in self.obstacles]
-        return geometries
+    def geometries(self) -> Any:  # an array of shapely geometries
+        return np.array([item.geometry for item in self.obstacles], dtype=object)
 
     @cached_property
     def tree(self) -> shapely.STRtree:
-        """An index of `geometries`."""
         return shapely.STRtree(self.geometries)
 
     @property
     def fresh_key(self) -> int:
-        """A key that no obstacle has."""
-        return max((item.key for item in self.obstacles), default=-1) + 1
+        return max(self.places, default=-1) + 1
 
     def added(self, shapes: Iterable[Obstacle | tuple[Obstacle, str]]) -> tuple[Sketch, tuple[int, ...]]:
         """Return the sketch with more obstacles on top, each a shape or one with a note; and their keys."""
         pairs = [each if isinstance(each, tuple) else (each, "") for each in shapes]
-        items = tuple(Item(k, shape, note) for k, (shape, note) in enumerate(pairs, self.fresh_key))
+        items = [Item(k, *pair) for k, pair in enumerate(pairs, self.fresh_key)]
         return replace(self, obstacles=(*self.obstacles, *items)), tuple(item.key for item in items)
 
-    def with_shapes(self, shapes: Mapping[int, Obstacle]) -> Sketch:
-        """Return the sketch with other shapes for some keys; what stays equal stays the same object."""
-        changed = {key: shape for key, shape in shapes.items() if shape != self.item(key).shape}
+    def with_things(self, things: Mapping[Any, Any]) -> Sketch:
+        """Return the sketch with other obstacles by their keys, and other or more starts by their names."""
+        changed = {
+            k: shape for k, shape in things.items() if isinstance(k, int) and shape != self.item(k).shape
+        }
         items = [replace(i, shape=changed[i.key]) if i.key in changed else i for i in self.obstacles]
-        return replace(self, obstacles=tuple(items))
+        starts = dict(self.starts) | {name: spec for name, spec in things.items() if isinstance(name, str)}
+        return replace(self, obstacles=tuple(items), starts=tuple(starts.items()))
 
-    def with_start(self, name: str, spec: StartSpec) -> Sketch:
-        """Return the sketch with a start changed in its place, or added as the last."""
-        return replace(self, starts=tuple({**dict(self.starts), name: spec}.items()))
-
-    def without(self, keys: Iterable[int]) -> Sketch:
-        """Return the sketch without some obstacles."""
-        gone = frozenset(keys)
-        return replace(self, obstacles=tuple(item for item in self.obstacles if item.key not in gone))
+    def without(self, owners: Iterable[Owner]) -> Sketch:
+        gone = frozenset(owners)
+        obstacles = tuple(item for item in self.obstacles if item.key not in gone)
+        return replace(self, obstacles=obstacles, starts=tuple(s for s in self.starts if s[0] not in gone))
 
     def named(self, name: str) -> Sketch:
         """Return the sketch with a name if nobody has given it one."""
@@ -163,19 +200,13 @@ class Sketch:
         return replace(self, name=name) if self.name == Sketch.name and name else self
 
     @property
-    def bounds(self) -> tuple[float, float, float, float] | None:
-        """Smallest x, y and largest x, y of all that there is, m, with a shown picture; None of nothing."""
+    def bounds(self) -> Box | None:
+        """Bounding box of all that there is, with a shown picture; None of nothing."""
         points = list(self.boundary or ())
         if self.background is not None and self.background.shown:
             points += self.background.corners
-        for _, spec in self.starts:
-            if isinstance(spec, env.PointsStart):
-                points += spec.positions
-            elif isinstance(spec, env.DiscStart):
-                (x, y), r = spec.center, abs(spec.radius)
-                points += [(x - r, y - r), (x + r, y + r)]
-        boxes = shapely.bounds(self.geometries).reshape(-1, 4)
-        corners = np.concatenate([np.array(points, dtype=float).reshape(-1, 2), boxes[:, :2], boxes[:, 2:]])
+        points += [point for name, _ in self.starts for ring in self.ring_points(name) for point in ring]
+        corners = np.concatenate([as_array(points), shapely.bounds(self.geometries).reshape(-1, 2)])
         corners = corners[np.isfinite(corners).all(axis=1)]
         if not len(corners):
             return None
@@ -196,28 +227,22 @@ def sketch_text(sketch: Sketch) -> str:
     return dump_document(draft_document(sketch))
 
 
-def kind_and_name(shape: Obstacle) -> str:
-    """Return what people call an obstacle: "wall", "polygon “desk”"."""
-    kind = KINDS[type(shape)]
-    return f"{kind} “{shape.name}”" if shape.name else kind
-
-
-def geometry_of(shape: Obstacle) -> BaseGeometry:
+def geometry_of(shape: Obstacle) -> shapely.Geometry:
     """Return what any obstacle covers as a valid geometry: nothing where it is too large or too far away."""
     if isinstance(shape, env.CircleObstacle):
         if not _is_near([shape.center]):
-            return GeometryCollection()
+            return shapely.GeometryCollection()
         return shape.polygon if 0.0 < shape.radius <= LARGEST else shapely.Point(shape.center)
     points = shape.points if isinstance(shape, env.WallObstacle) else shape.vertices
     if not _is_near(points) or not points:
-        return GeometryCollection()
-    line = LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
+        return shapely.GeometryCollection()
+    line = shapely.LineString(points) if len(set(points)) > 1 else shapely.Point(points[0])
     if isinstance(shape, env.WallObstacle):
         return shape.polygon if line.length > 0.0 and 0.0 < shape.width <= LARGEST else line
     if len(points) < 3:
         return line
     holes = [hole for hole in shape.holes if len(hole) >= 3 and _is_near(hole)]
-    polygon = shape.polygon if len(holes) == len(shape.holes) else Polygon(points, holes)
+    polygon = shape.polygon if len(holes) == len(shape.holes) else shapely.Polygon(points, holes)
     return polygon if polygon.is_valid else shapely.make_valid(polygon)
 
 

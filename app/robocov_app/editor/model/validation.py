@@ -3,22 +3,23 @@
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeAlias
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal, TypeAlias
 
 import numpy as np
 import shapely
 from shapely import LineString, MultiPoint, MultiPolygon, Polygon
-from shapely.geometry.base import BaseGeometry
 
 from robocov import environment as env
 from robocov.arrays import Array
 from robocov.environment import Obstacle, Point, Ring, StartSpec
-from robocov.errors import MapError, StartError, counted, listed, one_line
+from robocov.errors import MapError, StartError, counted, listed
 from robocov.mapfile.check import check_rules
-from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST, validate
+from robocov.mapfile.models import FARTHEST, LARGEST, LONGEST_LABEL, SMALLEST, validate
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.editor.model.selection import numbered_name, rings_of
+from robocov_app.editor.model.geometry import as_array
+from robocov_app.editor.model.selection import numbered_name
 from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch, draft_document
 
 Kind: TypeAlias = Literal[
@@ -28,7 +29,6 @@ Kind: TypeAlias = Literal[
 """Kind of a problem, by which fixes are found: see `robocov_app.editor.edits.fixes`."""
 
 _FLAT = 1e-9  # an outline whose area is below this part of its width or height squared is a line
-_LONGEST_NAME = 100
 _LONGEST_TEXT = 10_000
 _MOST_PLACES = 20
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]")
@@ -41,19 +41,10 @@ _NOUNS = {"vertices": "corner", "points": "point", "positions": "place", "holes"
 class Problem:
     """Something that is wrong, or may be."""
 
-    words: str  # a sentence for people
-    # the place: a point, an edge, an area; None where it is nowhere, such as a missing boundary
-    where: BaseGeometry | None
-    of: Owner | None  # the key of an obstacle, `BOUNDARY`, or the name of a start; None of the map as a whole
-    grave: bool  # the map cannot run so; else it is a warning
-    kind: Kind = "other"
-
-
-class _Fault(NamedTuple):
-    """Fault of a part: words that follow its name and a colon, and the place."""
-
-    words: str
-    where: BaseGeometry | None
+    words: str  # a sentence for people; below, one that begins with a colon or a blank goes on after its name
+    where: shapely.Geometry | None  # a point, an edge, an area; None where it is nowhere
+    of: Owner | None = None  # None of the map as a whole
+    grave: bool = True  # the map cannot run so; else it is a warning
     kind: Kind = "other"
 
 
@@ -71,17 +62,17 @@ def examined(sketch: Sketch, radius: float) -> tuple[tuple[Problem, ...], MultiP
             validate(draft_document(sketch), "map")
             check_rules(environment, "map")
         except MapError as error:
-            otherwise = Problem(in_words(str(error), sketch), None, None, True)
+            otherwise = Problem(in_words(str(error), sketch), None)
             found = list(_space_faults(sketch, free, set())) or [otherwise]
-    return (*found, *_warnings(sketch, free, radius, {problem.of for problem in found})), free
+    found += _warnings(sketch, free, radius, {problem.of for problem in found})
+    for k, problem in enumerate(found):
+        if problem.of is not None and problem.words[0] in ": ":
+            found[k] = replace(problem, words=numbered_name(sketch, problem.of) + problem.words)
+    return tuple(found), free
 
 
 def in_words(message: str, sketch: Sketch) -> str:
-    """Return a message of the map's rules with the names of things instead of places in a file.
-
-    >>> in_words('map: starts["a b"].positions[1]: x', Sketch())
-    'start “a b”, place 2: x'
-    """
+    """Return a message of the map's rules with the names of things instead of places in a file."""
 
     def named(match: re.Match[str]) -> str:
         words, noun = [match[1]], "corner"
@@ -106,112 +97,87 @@ def in_words(message: str, sketch: Sketch) -> str:
 
 
 def place_words(x: float, y: float) -> str:
-    """Return a place as people read it.
-
-    >>> place_words(1.25, 0.0)
-    '(1.25, 0)'
-    """
     return f"({x:.5g}, {y:.5g})"
-
-
-# the map as a whole, and its parts one by one
 
 
 def _faults(sketch: Sketch) -> Iterator[Problem]:
     for words in _label_faults(sketch.name):
-        yield Problem(f"the map {words}", None, None, True)
+        yield Problem(f"the map {words}", None)
     if len(sketch.description) > _LONGEST_TEXT:
-        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None, None, True)
+        yield Problem(f"the description is longer than {_LONGEST_TEXT} characters", None)
     if sketch.boundary is None:
         words = "there is no boundary: draw one round all that is free"
-        yield Problem(words, None, BOUNDARY, True, "no boundary")
-    faults: list[tuple[Owner, _Fault]] = []
-    if sketch.boundary is not None:
-        faults += [(BOUNDARY, fault) for fault in _ring_faults(sketch.boundary, "it")]
-    faults += [(item.key, fault) for item in sketch.obstacles for fault in _shape_faults(item.shape)]
-    for owner, (words, where, kind) in faults:
-        yield Problem(f"{numbered_name(sketch, owner)}: {words}", where, owner, True, kind)
-    for name, spec in sketch.starts:
-        for words in _label_faults(name):
-            yield Problem(f"a start {words}", None, name, True)
-        for words, where, kind in _start_faults(spec):
-            yield Problem(f"{numbered_name(sketch, name)}: {words}", where, name, True, kind)
+        yield Problem(words, None, BOUNDARY, kind="no boundary")
+    for owner in sketch.owners:
+        for words in _label_faults(owner) if isinstance(owner, str) else ():
+            yield Problem(f"a start {words}", None, owner)
+        for fault in _thing_faults(sketch.thing(owner), sketch.boundary if owner == BOUNDARY else None):
+            yield replace(fault, of=owner, words=f": {fault.words}")
 
 
 def _label_faults(name: str) -> Iterator[str]:
     if not name:
         yield "has no name"
-    elif len(name) > _LONGEST_NAME:
-        yield f"has a name of {len(name)} characters: at most {_LONGEST_NAME} are possible"
+    elif len(name) > LONGEST_LABEL:
+        yield f"has a name of {len(name)} characters: at most {LONGEST_LABEL} are possible"
     elif _CONTROL.search(name):
         yield "has a name with line breaks or other control characters"
 
 
-def _shape_faults(shape: Obstacle) -> Iterator[_Fault]:
-    if shape.name is not None:
-        yield from (_Fault(words, None) for words in _label_faults(shape.name))
-    if isinstance(shape, env.PolygonObstacle):
-        yield from _polygon_faults(shape)
-    elif isinstance(shape, env.CircleObstacle):
-        yield from _size_faults("radius", shape.radius, shape.center)
-        yield from _far_faults((shape.center,))
-    else:
-        yield from _size_faults("width", shape.width, shape.points[0] if shape.points else None)
-        far = list(_far_faults(shape.points))
+def _thing_faults(thing: Obstacle | StartSpec | None, boundary: Ring | None) -> Iterator[Problem]:
+    if isinstance(thing, Obstacle) and thing.name is not None:
+        yield from (Problem(words, None) for words in _label_faults(thing.name))
+    if boundary is not None:
+        yield from _ring_faults(boundary, "it")
+    elif isinstance(thing, env.PolygonObstacle):
+        yield from _polygon_faults(thing)
+    elif isinstance(thing, env.CircleObstacle | env.DiscStart):
+        yield from _size_faults("radius", thing.radius, thing.center)
+        yield from _far_faults((thing.center,))
+    elif isinstance(thing, env.WallObstacle):
+        yield from _size_faults("width", thing.width, thing.points[0] if thing.points else None)
+        far = list(_far_faults(thing.points))
         yield from far
-        points = np.array(shape.points, dtype=float).reshape(-1, 2)
+        points = as_array(thing.points)
         extent = np.ptp(points, axis=0).max() if len(points) else 0.0
         if not far and (len(points) < 2 or extent < SMALLEST):
-            yield _Fault("it has no length: it needs two points that are apart", _drawn(points))
+            yield Problem("it has no length: it needs two points that are apart", _drawn(points))
         elif not far and extent > LARGEST:
             words = f"it is {extent:.5g} m long: at most {LARGEST / 1000:g} km are possible"
-            yield _Fault(words, _drawn(points))
-
-
-def _start_faults(spec: StartSpec) -> Iterator[_Fault]:
-    if isinstance(spec, env.DiscStart):
-        yield from _size_faults("radius", spec.radius, spec.center)
-        yield from _far_faults((spec.center,))
-    elif isinstance(spec, env.PointsStart):
-        if not spec.positions:
-            yield _Fault("has no places: it needs one a robot", None)
-        yield from _far_faults(spec.positions)
+            yield Problem(words, _drawn(points))
+    elif isinstance(thing, env.PointsStart):
+        if not thing.positions:
+            yield Problem("has no places: it needs one a robot", None)
+        yield from _far_faults(thing.positions)
         seen: set[Point] = set()
-        for place in spec.positions:
+        for place in thing.positions:
             if place in seen:
                 words = f"the place {place_words(*place)} is given twice: every robot needs its own"
-                yield _Fault(words, shapely.Point(place), "spot")
+                yield Problem(words, shapely.Point(place), kind="spot")
             seen.add(place)
 
 
-def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[_Fault]:
-    """Yield what is wrong with a closed outline, which messages call `what`."""
-    points = np.array(ring, dtype=float).reshape(-1, 2)
-    far = list(_far_faults(ring))
-    if far:
-        yield from far
+def _ring_faults(ring: Ring, what: str = "its outline") -> Iterator[Problem]:
+    points, far, count = as_array(ring), list(_far_faults(ring)), len(set(ring))
+    if far or count < 3:
+        corners = ("no corners", "one corner", "two corners", "")[min(count, 3)]
+        yield from far or [Problem(f"{what} has {corners}: it needs three", _drawn(points))]
         return
-    count = len(np.unique(points, axis=0)) if len(points) else 0
-    if count < 3:
-        corners = ("no corners", "one corner", "two corners")[count]
-        yield _Fault(f"{what} has {corners}: it needs three", _drawn(points))
-        return
-    extent = np.ptp(points, axis=0)
-    polygon = Polygon(points)
+    extent, polygon = np.ptp(points, axis=0), Polygon(points)
     if extent.max() > LARGEST:
         size = f"{extent[0]:.5g} × {extent[1]:.5g} m"
-        yield _Fault(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
+        yield Problem(f"{what} is {size} large: at most {LARGEST / 1000:g} km are possible", _drawn(points))
     elif extent.min() < SMALLEST or shapely.convex_hull(polygon).area <= _FLAT * float(extent.max()) ** 2:
-        yield _Fault(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
+        yield Problem(f"{what} encloses nothing: its corners lie on one line", _drawn(points))
     elif not polygon.is_valid:
         places = _meetings(points, polygon)
-        (x, y), more = places[0], len(places) - 1
+        more = len(places) - 1
         others = f" and at {more} more places" if more > 1 else " and at one more place" if more else ""
-        words = f"{what} crosses or touches itself at {place_words(x, y)}{others}"
-        yield _Fault(words, MultiPoint(places[:_MOST_PLACES]), "crossing")
+        words = f"{what} crosses or touches itself at {place_words(*places[0])}{others}"
+        yield Problem(words, MultiPoint(places[:_MOST_PLACES]), kind="crossing")
 
 
-def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[_Fault]:
+def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[Problem]:
     found = list(_ring_faults(shape.vertices))
     for hole in shape.holes:
         found += _ring_faults(hole, "a hole")
@@ -223,30 +189,29 @@ def _polygon_faults(shape: env.PolygonObstacle) -> Iterator[_Fault]:
     for hole in shape.holes:
         inner = Polygon(hole)
         if not shell.covers(inner):
-            yield _Fault("a hole sticks out of its outline", inner - shell, "crossing")
+            yield Problem("a hole sticks out of its outline", inner - shell, kind="crossing")
         elif not Polygon(shape.vertices, [*good, hole]).is_valid:
             words = "a hole meets the outline or another hole: it must be apart from them"
-            yield _Fault(words, inner, "crossing")
+            yield Problem(words, inner, kind="crossing")
         else:
             good.append(hole)
 
 
-def _size_faults(what: str, size: float, at: Point | None) -> Iterator[_Fault]:
+def _size_faults(what: str, size: float, at: Point | None) -> Iterator[Problem]:
     if not SMALLEST <= size <= LARGEST:
         limit = f"at least {1000 * SMALLEST:g} mm" if size < SMALLEST else f"at most {LARGEST / 1000:g} km"
-        where = None if at is None else shapely.Point(at)
-        yield _Fault(f"its {what} is {size:.5g} m: {limit} is possible", where)
+        yield Problem(f"its {what} is {size:.5g} m: {limit} is possible", at and shapely.Point(at))
 
 
-def _far_faults(points: Ring) -> Iterator[_Fault]:
+def _far_faults(points: Ring) -> Iterator[Problem]:
     for x, y in points:
         if not max(abs(x), abs(y)) <= FARTHEST:
             limit = f"maps reach {FARTHEST / 1000:.0f} km from their origin"
-            yield _Fault(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
+            yield Problem(f"{place_words(x, y)} is too far away: {limit}", shapely.Point(x, y))
             return
 
 
-def _drawn(points: Array) -> BaseGeometry | None:
+def _drawn(points: Array) -> shapely.Geometry | None:
     if not len(points):
         return None
     return LineString(points) if len(points) > 1 else shapely.Point(points[0])
@@ -254,19 +219,15 @@ def _drawn(points: Array) -> BaseGeometry | None:
 
 def _meetings(points: Array, polygon: Polygon) -> list[Point]:
     """Return where an outline meets itself, left to right: ends of its noded pieces that not two share."""
-    ring = LineString(np.concatenate([points, points[:1]]))
-    pieces = shapely.get_parts(shapely.unary_union(ring))
+    pieces = shapely.get_parts(shapely.unary_union(LineString(np.concatenate([points, points[:1]]))))
     ends = np.concatenate([np.asarray(piece.coords)[[0, -1]] for piece in pieces])
     places, counts = np.unique(ends, axis=0, return_counts=True)
     meeting = places[counts > 2] if (counts > 2).any() else places[counts != 2]
     if not len(meeting):
         reason = shapely.is_valid_reason(polygon)
-        x, y = (float(value) for value in reason[reason.index("[") + 1 : -1].split())
+        x, y = map(float, reason[reason.index("[") + 1 : -1].split())
         return [(x, y)]
     return [(x, y) for x, y in meeting.tolist()]
-
-
-# the free space, and the starts in it
 
 
 def _rough_free(sketch: Sketch) -> MultiPolygon:
@@ -289,90 +250,84 @@ def _space_faults(sketch: Sketch, free: MultiPolygon, faulty: set[Owner | None])
     if free.is_empty:
         if BOUNDARY not in faulty:
             hull = shapely.convex_hull(MultiPoint(sketch.boundary))
-            yield Problem("no free space is left inside the boundary", hull, BOUNDARY, True)
+            yield Problem("no free space is left inside the boundary", hull, BOUNDARY)
         return
     for name, spec in sketch.starts:
-        if isinstance(spec, env.PointsStart):
-            yield from _blocked(sketch, name, spec, free)
-        elif name not in faulty:
-            yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
+        if not isinstance(spec, env.PointsStart):
+            if name not in faulty:
+                yield from _no_room(name, spec, free, DEFAULT_RADIUS, grave=True)
+            continue
+        points = shapely.points(as_array(spec.positions))
+        for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
+            near = sketch.tree.query(points[k], predicate="intersects")
+            what = "outside the boundary"
+            if len(near):
+                what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
+            yield Problem(f"{_spot(spec, k)} is {what}", points[k], name, kind="spot")
 
 
-def _blocked(sketch: Sketch, name: str, spec: env.PointsStart, free: MultiPolygon) -> Iterator[Problem]:
-    if not spec.positions:
-        return
-    points = shapely.points(np.array(spec.positions, dtype=float))
-    for k in np.flatnonzero(~shapely.contains_properly(free, points)).tolist():
-        near = sketch.tree.query(points[k], predicate="intersects")
-        what = "outside the boundary"
-        if len(near):
-            what = f"inside {numbered_name(sketch, sketch.obstacles[int(near.max())].key)}"
-        words = f"{_spot(name, spec, k)} is {what}"
-        yield Problem(words, points[k], name, True, "spot")
-
-
-def _spot(name: str, spec: env.PointsStart, k: int) -> str:
-    return f"start “{one_line(name)}”: place {k + 1} at {place_words(*spec.positions[k])}"
+def _spot(spec: env.PointsStart, k: int) -> str:
+    return f": place {k + 1} at {place_words(*spec.positions[k])}"
 
 
 def _no_room(name: str, spec: StartSpec, free: MultiPolygon, radius: float, grave: bool) -> Iterator[Problem]:
     try:
         env.Start(name, spec, free).sample(1, radius=radius)
     except StartError:
-        is_disc = isinstance(spec, env.DiscStart)
-        what = "its disc" if is_disc else "the free space"
-        words = f"start “{one_line(name)}”: {what} has no room for a robot of radius {radius:g} m"
-        where = shapely.Point(spec.center).buffer(spec.radius) if isinstance(spec, env.DiscStart) else None
-        yield Problem(words, where, name, grave, "no room" if is_disc else "other")
+        words = f"has no room for a robot of radius {radius:g} m"
+        if isinstance(spec, env.DiscStart):
+            disc = shapely.Point(spec.center).buffer(spec.radius)
+            yield Problem(f": its disc {words}", disc, name, grave, "no room")
+        else:
+            yield Problem(f": the free space {words}", None, name, grave)
 
 
 def _tight_places(name: str, spec: env.PointsStart, free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    points = shapely.points(np.array(spec.positions, dtype=float))
+    points = shapely.points(as_array(spec.positions))
     away = shapely.distance(points, free.boundary)
     for k in np.flatnonzero(away < radius).tolist():
-        words = f"{_spot(name, spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
+        words = f"{_spot(spec, k)} is {away[k]:.3g} m from a wall: robots need {radius:g} m"
         yield Problem(words, points[k], name, False, "spot")
-    tree = shapely.STRtree(points)
-    pairs = tree.query(points, predicate="dwithin", distance=2 * radius).T
+    pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=2 * radius).T
     for i, j in sorted((i, j) for i, j in pairs.tolist() if i < j):
         gap = math.dist(spec.positions[i], spec.positions[j])
         if gap < 2 * radius:
-            apart = f"are {gap:.3g} m apart: robots need {2 * radius:g} m"
-            words = f"{_spot(name, spec, i)} and place {j + 1} {apart}"
+            words = f"{_spot(spec, i)} and place {j + 1} are {gap:.3g} m apart: robots need {2 * radius:g} m"
             yield Problem(words, MultiPoint([points[i], points[j]]), name, False, "spot")
-
-
-# warnings
 
 
 def _warnings(sketch: Sketch, free: MultiPolygon, radius: float, bad: set[Owner | None]) -> Iterator[Problem]:
     """Yield what may be a mistake, but not of what is at fault already."""
     if BOUNDARY not in bad:
-        yield from _outside(sketch)
-    yield from _twice(sketch)
-    yield from _double_vertices(sketch)
+        inside, shapes = Polygon(sketch.boundary), sketch.geometries
+        shapely.prepare(inside)
+        # what only touches it from outside does nothing either
+        outside = ~shapely.intersects(inside, shapes) | shapely.touches(inside, shapes)
+        for k in np.flatnonzero(outside & ~shapely.is_empty(shapes)).tolist():
+            yield Problem(" lies outside the boundary", shapes[k], sketch.obstacles[k].key, False, "outside")
+    below: set[object] = set()
+    for item in sketch.obstacles:
+        form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
+        if form in below and not item.geometry.is_empty:
+            words = " lies on another one that is just the same"
+            yield Problem(words, item.geometry, item.key, False, "twice")
+        below.add(form)
+    for owner in sketch.owners:
+        for _, ring, closed in sketch.rings_of(owner):
+            if 3 <= len(set(ring)) < len(ring):
+                steps = pairwise((*ring, ring[0]) if closed else ring)
+                if twice := [at for at, after in steps if at == after]:
+                    words = f": two vertices lie in the same place, {place_words(*twice[0])}"
+                    yield Problem(words, MultiPoint(twice), owner, False, "double")
     yield from _paths(sketch, bad)
     if free.is_empty:
         return
     yield from _sealed_rooms(free, radius)
     for name, spec in sketch.starts:
-        if name in bad:
-            continue
-        if isinstance(spec, env.PointsStart):
+        if name not in bad and isinstance(spec, env.PointsStart):
             yield from _tight_places(name, spec, free, radius)
-        elif radius > DEFAULT_RADIUS:
+        elif name not in bad and radius > DEFAULT_RADIUS:
             yield from _no_room(name, spec, free, radius, grave=False)
-
-
-def _outside(sketch: Sketch) -> Iterator[Problem]:
-    """Warn of obstacles outside the boundary; what only touches it from there does nothing either."""
-    inside = Polygon(sketch.boundary)
-    shapely.prepare(inside)
-    outside = ~shapely.intersects(inside, sketch.geometries) | shapely.touches(inside, sketch.geometries)
-    for k in np.flatnonzero(outside & ~shapely.is_empty(sketch.geometries)).tolist():
-        item = sketch.obstacles[k]
-        words = f"{numbered_name(sketch, item.key)} lies outside the boundary"
-        yield Problem(words, item.geometry, item.key, False, "outside")
 
 
 def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
@@ -382,48 +337,18 @@ def _paths(sketch: Sketch, faulty: set[Owner | None]) -> Iterator[Problem]:
     for item in sound:
         if item.shape.path is None:
             continue
-        area = env.swept_area(item.shape.polygon, item.shape.path)
-        met, beyond = env.in_the_way(area, standing, inside)
-        names, places = [numbered_name(sketch, key) for key in met], list(met.values())
-        if beyond is not None:
-            names, places = [*names, "the boundary"], [*places, beyond]
+        met, beyond = env.in_the_way(env.swept_area(item.shape.polygon, item.shape.path), standing, inside)
+        names = [numbered_name(sketch, key) for key in met] + ([] if beyond is None else ["the boundary"])
         if names:
-            words = f"{numbered_name(sketch, item.key)} moves through {listed(names)}"
-            yield Problem(words, shapely.union_all(places), item.key, False)
-
-
-def _twice(sketch: Sketch) -> Iterator[Problem]:
-    below: set[object] = set()
-    for item in sketch.obstacles:
-        form = (type(item.shape), *(v for n, v in vars(item.shape).items() if n not in ("name", "polygon")))
-        if form in below and not item.geometry.is_empty:
-            words = f"{numbered_name(sketch, item.key)} lies on another one that is just the same"
-            yield Problem(words, item.geometry, item.key, False, "twice")
-        below.add(form)
-
-
-def _double_vertices(sketch: Sketch) -> Iterator[Problem]:
-    for owner in (BOUNDARY, *(item.key for item in sketch.obstacles)):
-        for _, ring, closed in rings_of(sketch, owner):
-            if len(set(ring)) == len(ring) or len(set(ring)) < 3:
-                continue
-            following = (*ring[1:], ring[0]) if closed else ring[1:]
-            twice = [at for at, after in zip(ring, following, strict=False) if at == after]
-            if twice:
-                at = place_words(*twice[0])
-                words = f"{numbered_name(sketch, owner)}: two vertices lie in the same place, {at}"
-                yield Problem(words, MultiPoint(twice), owner, False, "double")
+            where = shapely.union_all([*met.values(), beyond])
+            yield Problem(f" moves through {listed(names)}", where, item.key, False)
 
 
 def _sealed_rooms(free: MultiPolygon, radius: float) -> Iterator[Problem]:
-    """Warn of parts of the free space that nothing leads to from the largest."""
-    slivers = []
-    for part in list(free.geoms)[1:]:
-        if part.area < math.pi * radius * radius:
-            slivers.append(part)
-            continue
-        spot = part.representative_point()
-        at = place_words(spot.x, spot.y)
+    rest = list(free.geoms)[1:]
+    slivers = [part for part in rest if part.area < math.pi * radius * radius]
+    for part in rest[: len(rest) - len(slivers)]:  # the largest first
+        at = place_words(*part.representative_point().coords[0])
         words = f"the room of {part.area:.3g} m² round {at} is sealed: no way leads in"
         yield Problem(words, part, None, False, "sealed")
     if slivers:

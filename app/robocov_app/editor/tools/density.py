@@ -1,9 +1,10 @@
 """The tool for the density: hot spots and areas by dragging, their weights by typing."""
 
+import math
+
 import numpy as np
 import shapely
 
-from robocov.arrays import Array
 from robocov.density import Gaussian, WeightedArea, WeightedPolygons
 from robocov.environment import Point, Ring
 from robocov_app.editor.edits import density
@@ -19,49 +20,40 @@ class DensityTool(Tool):
     """Adds hot spots, moves, sizes and weighs them, and takes them away; areas where a map has those."""
 
     name = "density"
-    title = "Density"
     hint = "drag from a hot spot's middle outwards; drag middles and rims; click a middle, type its weight"
 
     def __init__(self) -> None:
         super().__init__()
         self.weight = FIRST_WEIGHT
         self.chosen: int | None = None
-        self.change: Change | None = None  # what letting go of the mouse would make
-        self._from: Point | None = None
-        self._at: Point = (0.0, 0.0)
         self._taken: int | None = None
         self._corner: int | None = None  # of an area; 0 of a hot spot whose rim was taken
 
     @property
     def busy(self) -> bool:
-        return self._from is not None or self.chosen is not None
+        return self.begun is not None or self.chosen is not None
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self._from, self._at, self.change = event.point, event.point, None
+        super().press(context, event)
         self._taken, self._corner = _under(density.features_of(context.sketch), event)
         if self._taken is not None and self._corner is None:
             self.chosen = self._taken
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self._at = event.point
-        if self._from is not None and distance(self._from, event.raw) >= 0.25 * event.reach:
-            self.change = self._wanted(context, event.point)
+        if self.begun is not None and event.is_apart_from(self.begun.point):
+            self.change = self._wanted(context, self.begun.point, event.point)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
         """Make what was dragged; a click on a middle chooses it, elsewhere nothing is chosen."""
-        begun, change, self._from, self.change = self._from, self.change, None, None
-        if begun is None:
-            return
-        if clicked or change is None:
-            self.chosen = None if self._corner is not None else self._taken
+        begun, change, self.begun, self.change = self.begun, self.change, None, None
+        if begun is not None and change is not None and not clicked:
+            context.change(change)
+            new = len(density.features_of(context.sketch)) - 1
+            self.chosen = new if self._taken is None else self._taken
+        elif begun is not None:
+            self.chosen = self._taken if self._corner is None else None
             if self.chosen is not None:
                 context.say("type what it weighs, then Enter; Backspace takes it away")
-            return
-        context.change(change)
-        self.chosen = self._taken if self._taken is not None else len(density.features_of(context.sketch)) - 1
-
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
-        self.press(context, event)
 
     def finish(self, context: Workspace) -> bool:
         had, self.chosen = self.chosen is not None, None
@@ -75,8 +67,7 @@ class DensityTool(Tool):
         return True
 
     def cancel(self, context: Workspace) -> bool:
-        had = self.busy
-        self._from = self.change = self.chosen = None
+        had, self.chosen = super().cancel(context), None
         return had
 
     def enter(self, context: Workspace, text: str) -> None:
@@ -87,33 +78,34 @@ class DensityTool(Tool):
 
     def preview(self, context: Workspace) -> Preview | None:
         features = density.features_of(self.change.sketch if self.change is not None else context.sketch)
-        dots = tuple(map(_middle, features))
-        dots += tuple(p for each in features if isinstance(each, WeightedArea) for p in each.vertices)
-        words = ""
-        shown = self._taken if self._taken is not None else len(features) - 1
-        if self._from is not None and self.change is not None and 0 <= shown < len(features):
+        dots = [_middle(feature) for feature in features]
+        dots += [point for area in features if isinstance(area, WeightedArea) for point in area.vertices]
+        shown, words = self.chosen, ""
+        if self.begun is not None and self.change is not None:
+            shown = self._taken if self._taken is not None else len(features) - 1
+        if shown is not None and 0 <= shown < len(features):
             feature = features[shown]
-            size = f"σ {length_words(density.spread_of(feature))}, " if isinstance(feature, Gaussian) else ""
-            words = f"{size}weight {feature.weight:g}"
-        elif self.chosen is not None and self.chosen < len(features):
-            words = f"weight {features[self.chosen].weight:g}"
+            words = f"weight {feature.weight:g}"
+            if isinstance(feature, Gaussian) and self.change is not None:
+                words = f"σ {length_words(density.spread_of(feature))}, {words}"
         if not features and not words:
             return None
-        return Preview(words=words, rings=tuple(map(_outline, features)), dots=dots, chosen=self.chosen)
+        rings = tuple(map(_outline, features))
+        return Preview(words=words, rings=rings, dots=tuple(dots), chosen=self.chosen)
 
     def shape_of_cursor(self, context: Workspace) -> str:
-        return "move" if self._taken is not None and self._from is not None else "cross"
+        return "move" if self._taken is not None and self.begun is not None else "cross"
 
-    def _wanted(self, context: Workspace, to: Point) -> Change | None:
-        assert self._from is not None
-        sketch, begun, number = context.sketch, self._from, self._taken
+    def _wanted(self, context: Workspace, begun: Point, to: Point) -> Change | None:
+        sketch, number = context.sketch, self._taken
         if number is None and isinstance(sketch.density, WeightedPolygons):
             return density.area_added(sketch, rectangle(begun, to), self.weight)
         if number is None:
             return density.peak_added(sketch, begun, max(distance(begun, to), 0.02), self.weight)
-        if number >= len(density.features_of(sketch)):
+        features = density.features_of(sketch)
+        if number >= len(features):
             return None
-        feature = density.features_of(sketch)[number]
+        feature = features[number]
         if isinstance(feature, Gaussian):
             if self._corner is not None:
                 return density.peak_sized(sketch, number, distance(feature.center, to))
@@ -144,14 +136,14 @@ def _under(features: tuple[density.Feature, ...], event: PointerEvent) -> tuple[
 def _middle(feature: density.Feature) -> Point:
     if isinstance(feature, Gaussian):
         return feature.center
-    inside = feature.polygon.representative_point()
-    return float(inside.x), float(inside.y)
+    ((x, y),) = feature.polygon.representative_point().coords
+    return x, y
 
 
 def _outline(feature: density.Feature) -> Ring:
     """Return the outline of an area, or that of a hot spot one standard deviation from its centre."""
     if isinstance(feature, WeightedArea):
         return feature.vertices
-    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS, endpoint=False)
-    points: Array = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(feature.matrix).T
-    return tuple((x, y) for x, y in (points + np.array(feature.center)).tolist())
+    turn = np.linspace(0.0, math.tau, _CORNERS, endpoint=False)
+    points = np.column_stack([np.cos(turn), np.sin(turn)]) @ np.linalg.cholesky(feature.matrix).T
+    return tuple((x, y) for x, y in (points + feature.center).tolist())

@@ -1,35 +1,37 @@
 """Tools that draw: obstacles, the boundary, starts, doors in walls; and the tape measure."""
 
-from abc import ABC
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from math import copysign
 
 from robocov import environment as env
-from robocov.environment import Obstacle, Point
+from robocov.environment import Point
 from robocov.errors import MapError, counted
 from robocov_app.editor.edits import create
+from robocov_app.editor.model import require
 from robocov_app.editor.model.coordinates import length_of, next_point_of, size_of
 from robocov_app.editor.model.geometry import bearing_words, distance, length_words, rectangle, ring_area
 from robocov_app.editor.model.selection import Change
-from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace, constrained_point
+from robocov_app.editor.model.sketch import Sketch
+from robocov_app.editor.tools.tool import PointerEvent, Preview, Tool, Workspace
 from robocov_app.toolkit.draw_tools import SAME, Outline
 
 
-class DrawTool(Tool, ABC):
+class DrawTool(Tool):
     """Draws point by point, or with a single drag; the tools below say what the points make."""
 
     begins_typed = True
     least, most = 2, 1_000_000  # points that are needed, and that are taken
     closes = False  # whether a click on the first point ends it
     drags = False  # whether it can be drawn by a single drag, too
+    make: Callable[[Sketch, Sequence[Point]], Change]
 
     def __init__(self) -> None:
         super().__init__()
         self.outline = Outline(self.least, self.most, self.closes, self.drags)
 
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change | None:
-        return None
+    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
+        return self.make(context.sketch, points)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         """Return what to show of the points, the last of which is the cursor."""
@@ -37,11 +39,8 @@ class DrawTool(Tool, ABC):
         words = bearing_words(points[-2], points[-1]) + (f"   {ring_area(points):.2f} m²" if closed else "")
         return Preview(points, closed, True, words=words)
 
-    def dragged(self, a: Point, b: Point) -> list[Point]:
-        return [a, b]
-
     def placed(self, event: PointerEvent) -> Point:
-        return constrained_point(event, self.origin)
+        return event.constrained(self.origin)
 
     def end_for(self, text: str) -> Point | None:
         """Return where a drag from the first point ends for a typed size; None where that is no size."""
@@ -86,9 +85,7 @@ class DrawTool(Tool, ABC):
             return False
         if len(points) < self.least:
             raise MapError(f"{self.title.lower()}: {len(points)} of at least {self.least} points were drawn")
-        change = self.made(context, points)
-        if change is not None:
-            context.change(change)
+        context.change(self.made(context, points))
         return True
 
     def back(self, context: Workspace) -> bool:
@@ -99,25 +96,23 @@ class DrawTool(Tool, ABC):
 
     def enter(self, context: Workspace, text: str) -> None:
         outline = self.outline
-        end = self.end_for(text) if len(self.points) == 1 else None
-        if end is not None:
+        if len(self.points) == 1 and (end := self.end_for(text)) is not None:
             self._finish_drag(context, end)
-        else:
-            outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
-            outline.points.append(outline.at)
-            outline.dragging = False
+            return
+        outline.at = next_point_of(text, self.origin, outline.at if self.points else None)
+        outline.points.append(outline.at)
+        outline.dragging = False
 
     def preview(self, context: Workspace) -> Preview | None:
         return self.shown(context, (*self.points, self.outline.at)) if self.points else None
 
     def _finish_drag(self, context: Workspace, end: Point) -> None:
-        self.outline.points = self.dragged(self.points[0], end)
+        self.outline.points = list(rectangle(self.points[0], end)) if self.closes else [self.points[0], end]
         self.finish(context)
 
     def _far_corner(self, text: str) -> Point:
         """Return the corner of a rectangle of a typed size, on the cursor's side of the first."""
-        width, height = size_of(text)
-        (x, y), (to_x, to_y) = self.points[0], self.outline.at
+        (x, y), (to_x, to_y), (width, height) = self.points[0], self.outline.at, size_of(text)
         return x + (width if to_x >= x else -width), y + (height if to_y >= y else -height)
 
 
@@ -125,19 +120,15 @@ class PolygonTool(DrawTool):
     """Draws an obstacle with corners."""
 
     name = "polygon"
-    title = "Polygon"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     least, closes = 3, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.polygon_drawn(context.sketch, points)
+    make = staticmethod(create.polygon_drawn)
 
 
 class WallTool(DrawTool):
     """Draws a poly-line that is some width thick."""
 
     name = "wall"
-    title = "Wall"
     hint = "click its points, Enter or a double click ends it; or drag; [ and ] change its width"
     drags = True
 
@@ -146,7 +137,7 @@ class WallTool(DrawTool):
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         line = points if distance(points[-2], points[-1]) > SAME else points[:-1]
-        shapes: tuple[Obstacle, ...] = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
+        shapes = (env.WallObstacle(line, context.wall_width),) if len(line) > 1 else ()
         words = f"{bearing_words(points[-2], points[-1])}   {length_words(context.wall_width)} wide"
         return Preview(points, False, True, shapes, words=words)
 
@@ -155,7 +146,6 @@ class MeasureTool(DrawTool):
     """Measures along a line; what was measured stays until something else is."""
 
     name = "measure"
-    title = "Measure"
     hint = "click points, or drag; “level” turns the map so that the line lies level; Esc takes the tape away"
     drags = True
 
@@ -199,9 +189,7 @@ class PlacesTool(DrawTool):
     title = "Start spots"
     hint = "click a place for each robot; Enter ends it"
     least = 1
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.points_start_drawn(context.sketch, points)
+    make = staticmethod(create.points_start_drawn)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         words = f"{counted(len(points) - 1, 'robot')}; Enter ends it"
@@ -212,15 +200,9 @@ class BoundaryTool(DrawTool):
     """Draws the outer boundary: a rectangle by dragging, anything else corner by corner."""
 
     name = "boundary"
-    title = "Boundary"
     hint = "drag a rectangle, or click the corners and press Enter; type 10 x 8 after the first corner"
     least, closes, drags = 3, True, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.boundary_drawn(context.sketch, points)
-
-    def dragged(self, a: Point, b: Point) -> list[Point]:
-        return list(rectangle(a, b))
+    make = staticmethod(create.boundary_drawn)
 
     def placed(self, event: PointerEvent) -> Point:
         return event.point if self.outline.dragging else super().placed(event)
@@ -240,29 +222,24 @@ class RectangleTool(DrawTool):
     """Draws a rectangle from corner to corner; with Shift a square."""
 
     name = "rectangle"
-    title = "Rectangle"
     hint = "drag from corner to corner, or click both; type 3 x 2 for metres; Shift makes a square"
     most, drags = 2, True
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.rectangle_drawn(context.sketch, *points)
+    make = staticmethod(create.rectangle_drawn)
 
     def placed(self, event: PointerEvent) -> Point:
         if not event.shift or not self.points:
             return event.point
-        x, y = self.points[0]
-        dx, dy = event.point[0] - x, event.point[1] - y
-        side = max(abs(dx), abs(dy))
-        return x + copysign(side, dx), y + copysign(side, dy)
+        (x, y), (to_x, to_y) = self.points[0], event.point
+        side = max(abs(to_x - x), abs(to_y - y))
+        return x + copysign(side, to_x - x), y + copysign(side, to_y - y)
 
     def end_for(self, text: str) -> Point:
         return self._far_corner(text)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         (ax, ay), (bx, by) = points
-        wide, high = abs(bx - ax), abs(by - ay)
-        ring = rectangle(*points)
-        shapes: tuple[Obstacle, ...] = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
+        wide, high, ring = abs(bx - ax), abs(by - ay), rectangle(*points)
+        shapes = (env.PolygonObstacle(ring),) if min(wide, high) > SAME else ()
         words = f"{length_words(wide)} x {length_words(high)}   {wide * high:.2f} m²"
         return Preview(ring, True, shapes=shapes, words=words)
 
@@ -271,22 +248,19 @@ class CircleTool(DrawTool):
     """Draws a round pillar from its middle."""
 
     name = "circle"
-    title = "Circle"
     hint = "drag from the middle to the rim, or click both; type the radius for metres"
     most, drags = 2, True
+    make_round = staticmethod(create.circle_drawn)
 
     def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.circle_drawn(context.sketch, points[0], distance(*points))
-
-    def placed(self, event: PointerEvent) -> Point:
-        return event.point
+        return self.make_round(context.sketch, points[0], distance(*points))
 
     def end_for(self, text: str) -> Point:
         return self.points[0][0] + length_of(text), self.points[0][1]
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
-        shapes: tuple[Obstacle, ...] = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
+        shapes = (env.CircleObstacle(points[0], radius),) if radius > SAME else ()
         return Preview(points, shapes=shapes, words=f"radius {length_words(radius)}")
 
 
@@ -296,9 +270,7 @@ class DiscTool(CircleTool):
     name = "disc"
     title = "Start disc"
     hint = "drag from the middle to the rim: the robots start somewhere in it; type the radius for metres"
-
-    def made(self, context: Workspace, points: Sequence[Point]) -> Change:
-        return create.disc_start_drawn(context.sketch, points[0], distance(*points))
+    make_round = staticmethod(create.disc_start_drawn)
 
     def shown(self, context: Workspace, points: tuple[Point, ...]) -> Preview:
         radius = distance(*points)
@@ -310,43 +282,32 @@ class DoorTool(Tool):
     """Opens a door in a wall; the pieces stay walls."""
 
     name = "door"
-    title = "Door"
     hint = "click a wall where its door is to be, or drag along it; type the door's width in metres"
     begins_typed = True
 
     def __init__(self) -> None:
         super().__init__()
         self.width = 0.9
-        self._from: Point | None = None
-        self._at: Point = (0.0, 0.0)
         self._wall: int | None = None  # over which the cursor is, or that was pressed
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        self._from = self._at = event.point
+        self.begun, self.at = event, event.point
         self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
-        if self._wall is None:
-            raise MapError("click a wall: doors are opened in walls")
-
-    def twice(self, context: Workspace, event: PointerEvent) -> None:
-        self.press(context, event)
+        require(self._wall is not None, "click a wall: doors are opened in walls")
 
     def move(self, context: Workspace, event: PointerEvent) -> None:
-        self._at = event.point
-        if self._from is None:
+        self.at = event.point
+        if self.begun is None:
             self._wall = create.wall_at(context.sketch, event.raw, 0.6 * event.reach)
 
     def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, self._from, wall, self._wall = self._from, None, self._wall, None
+        begun, self.begun, wall, self._wall = self.begun, None, self._wall, None
         if begun is None or wall is None:
             return
         if clicked:
             context.change(create.door_opened(context.sketch, wall, event.point, self.width))
         else:
-            context.change(create.wall_opened(context.sketch, wall, begun, event.point))
-
-    def cancel(self, context: Workspace) -> bool:
-        had, self._from = self._from is not None, None
-        return had
+            context.change(create.wall_opened(context.sketch, wall, begun.point, event.point))
 
     def enter(self, context: Workspace, text: str) -> None:
         self.width = create.door_width(length_of(text))
@@ -355,7 +316,7 @@ class DoorTool(Tool):
     def preview(self, context: Workspace) -> Preview | None:
         if self._wall is None or self._wall not in context.sketch.places:
             return None
-        a, b = create.door_at(context.sketch, self._wall, self._at, self.width)
-        if self._from is not None and distance(self._from, self._at) > 0.1 * self.width:
-            a, b = (create.on_wall(context.sketch, self._wall, place) for place in (self._from, self._at))
+        a, b = create.door_at(context.sketch, self._wall, self.at, self.width)
+        if self.begun is not None and distance(self.begun.point, self.at) > 0.1 * self.width:
+            a, b = (create.on_wall(context.sketch, self._wall, at) for at in (self.begun.point, self.at))
         return Preview((a, b), words=f"door, {length_words(distance(a, b))}")

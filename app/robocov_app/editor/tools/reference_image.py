@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.editor.edits.properties import underlaid
+from robocov_app.editor.model import require
 from robocov_app.editor.model.background import Background, levelled, to_scale
 from robocov_app.editor.model.coordinates import length_of
 from robocov_app.editor.model.geometry import distance, length_words
@@ -15,79 +15,60 @@ class ReferenceImageTool(Tool):
     """Scales, levels and moves the picture."""
 
     name = "picture"
-    title = "Picture"
     hint = "click two points; type how far apart they are, or Enter to make their line level; drag moves it"
     snaps = False
 
     def __init__(self) -> None:
         super().__init__()
         self.moved: Background | None = None  # the picture where it is being dragged to
-        self._points: list[Point] = []
-        self._at: Point = (0.0, 0.0)
-        self._from: Point | None = None
-
-    @property
-    def busy(self) -> bool:
-        return bool(self._points)
 
     def press(self, context: Workspace, event: PointerEvent) -> None:
-        if context.sketch.background is None:
-            raise MapError("there is no picture under the map: Ctrl B takes one")
-        self._from = event.raw
-
-    def move(self, context: Workspace, event: PointerEvent) -> None:
-        self._at = event.raw
-        background = context.sketch.background
-        if self._from is None or background is None or distance(self._from, event.raw) < 0.25 * event.reach:
-            return
-        dx, dy = event.raw[0] - self._from[0], event.raw[1] - self._from[1]
-        self.moved = replace(background, corner=(background.corner[0] + dx, background.corner[1] + dy))
-
-    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
-        begun, moved = self._from, self.moved
-        self._from = self.moved = None
-        if begun is None:
-            return
-        if moved is not None and not clicked:
-            corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
-            context.change(underlaid(context.sketch, replace(moved, corner=corner)))
-            return
-        self._points = [*self._points[-1:], event.raw]
-        if len(self._points) == 2:
-            context.say("type how many metres apart the points are; Enter alone makes their line level")
+        require(context.sketch.background is not None, "there is no picture under the map: Ctrl B takes one")
+        self.begun = event
 
     def twice(self, context: Workspace, event: PointerEvent) -> None:
         """Take no notice: two points in one place mean nothing."""
 
+    def move(self, context: Workspace, event: PointerEvent) -> None:
+        self.at, laid = event.raw, context.sketch.background
+        if self.begun is not None and laid is not None and event.is_apart_from(self.begun.raw):
+            dx, dy = event.raw[0] - self.begun.raw[0], event.raw[1] - self.begun.raw[1]
+            self.moved = replace(laid, corner=(laid.corner[0] + dx, laid.corner[1] + dy))
+
+    def release(self, context: Workspace, event: PointerEvent, *, clicked: bool) -> None:
+        begun, moved, self.begun, self.moved = self.begun, self.moved, None, None
+        if begun is not None and moved is not None and not clicked:
+            corner = round(moved.corner[0], 4), round(moved.corner[1], 4)
+            context.change(underlaid(context.sketch, replace(moved, corner=corner)))
+        elif begun is not None:
+            self.clicked = [*self.clicked[-1:], event.raw]
+            if len(self.clicked) == 2:
+                context.say("type how many metres apart the points are; Enter alone makes their line level")
+
     def finish(self, context: Workspace) -> bool:
-        """Turn the picture so that the line through the two points is level or upright."""
-        if len(self._points) != 2 or context.sketch.background is None:
+        if len(self.clicked) != 2 or context.sketch.background is None:
             return False
-        (a, b), self._points = self._points, []
+        (a, b), self.clicked = self.clicked, []
         context.change(underlaid(context.sketch, levelled(context.sketch.background, a, b)))
         return True
 
     def enter(self, context: Workspace, text: str) -> None:
-        if len(self._points) != 2 or context.sketch.background is None:
+        if len(self.clicked) != 2 or context.sketch.background is None:
             raise MapError("click two points of the picture first")
-        a, b = self._points
+        a, b = self.clicked
         laid = to_scale(context.sketch.background, a, b, length_of(text))
-        self._points = []
+        self.clicked = []
         context.change(underlaid(context.sketch, laid))
 
-    def back(self, context: Workspace) -> bool:
-        return bool(self._points and self._points.pop())
-
     def cancel(self, context: Workspace) -> bool:
-        had = bool(self._points or self._from)
-        self._points, self._from, self.moved = [], None, None
-        return had
+        self.moved = None
+        return super().cancel(context)
 
     def preview(self, context: Workspace) -> Preview | None:
-        if not self._points:
+        if not self.clicked:
             return None
-        line = (*self._points, self._at)[:2]
+        line = (*self.clicked, self.at)[:2]
         words = f"now {length_words(distance(*line))}"
-        if len(self._points) == 2:
+        if len(self.clicked) == 2:
             words += "; type how far apart they are, or Enter makes them level"
         return Preview(line, words=words)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import chain, combinations, islice
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -16,10 +17,12 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import CircleObstacle, DiscStart, Point, PointsStart, WallObstacle
-from robocov_app.editor.model.geometry import cos_sin, nearest_on
-from robocov_app.editor.model.selection import Vertex, ring_points, rings_of
-from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
+from robocov_app.editor.model.geometry import as_array, bearing, cos_sin, nearest_on
+from robocov_app.editor.model.selection import Vertex
+from robocov_app.editor.model.sketch import Owner, Sketch, geometry_of
+from robocov_app.render.surface_cache import Latest
 
+Dragged: TypeAlias = Iterable[Owner | Vertex]
 PointKind: TypeAlias = Literal["vertex", "centre", "middle"]
 
 MANY = 1500  # vertices of a map from which on the window does not wait for its targets
@@ -29,48 +32,38 @@ _MOST_EDGES = 8  # edges near a point that are looked at: more can only be where
 class Targets:
     """Snap targets, with `more` points, without what is dragged; outlines of walls and circles too."""
 
-    def __init__(
-        self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
-    ) -> None:
-        dragged = list(without)
-        vertices = {each for each in dragged if isinstance(each, Vertex)}
-        owners = {each for each in dragged if not isinstance(each, Vertex)}
-        owners |= {item.key for item in sketch.obstacles if item.hidden}
-        touched = {(vertex.of, vertex.ring) for vertex in vertices}
-        rims, centres = list(more), list[Point]()
-        walls, circles = list[BaseGeometry](), list[BaseGeometry]()
-        points, starts, ends = list[Point](), list[Point](), list[Point]()
-        for owner in (BOUNDARY, *sketch.places):
-            for ring, line, closed in rings_of(sketch, owner) if owner not in owners else ():
-                begin, end = line if closed else line[:-1], (*line[1:], *(line[:1] if closed else ()))
-                if (owner, ring) in touched:
-                    gone = [Vertex(owner, ring, k) in vertices for k in range(len(line))]
-                    line = tuple(point for point, is_gone in zip(line, gone, strict=True) if not is_gone)
-                    kept = [k for k in range(len(begin)) if not (gone[k] or gone[(k + 1) % len(gone)])]
-                    begin, end = tuple(begin[k] for k in kept), tuple(end[k] for k in kept)
-                points += line
-                starts += begin
-                ends += end
-        for item in sketch.obstacles:
-            if item.key in owners:
+    def __init__(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> None:
+        dragged: dict[tuple[Owner, int], set[int]] = defaultdict(set)
+        owners: set[Owner] = {item.key for item in sketch.obstacles if item.hidden}
+        for each in without:
+            if isinstance(each, Vertex):
+                dragged[each.of, each.ring].add(each.index)
+            else:
+                owners.add(each)
+        points, rims, centres = list[Point](), list(more), list[Point]()
+        edges, walls, circles = list[tuple[Point, Point]](), list[BaseGeometry](), list[BaseGeometry]()
+        for owner in sketch.owners:
+            if owner in owners:
                 continue
-            if isinstance(item.shape, CircleObstacle):
-                centres.append(item.shape.center)
-                rims += ring_points(sketch, item.key)[0][1:]
-                circles.append(item.geometry)
-            elif isinstance(item.shape, WallObstacle):
-                walls.append(item.geometry)
-        for name, spec in sketch.starts:
-            if name not in owners and isinstance(spec, DiscStart):
-                centres.append(spec.center)
-                rims += ring_points(sketch, name)[0][1:]
-            elif name not in owners and isinstance(spec, PointsStart):
-                places = enumerate(spec.positions)
-                centres += [at for k, at in places if Vertex(name, 0, k) not in vertices]
-        lows, highs = _array(starts), _array(ends)
+            thing = sketch.thing(owner)
+            if isinstance(thing, CircleObstacle | DiscStart):
+                centres.append(thing.center)
+                rims += sketch.ring_points(owner)[0][1:]
+            if isinstance(thing, CircleObstacle):
+                circles.append(geometry_of(thing))
+            elif isinstance(thing, WallObstacle):
+                walls.append(geometry_of(thing))
+            elif isinstance(thing, PointsStart):
+                centres += [at for k, at in enumerate(thing.positions) if k not in dragged[owner, 0]]
+            for ring, line, closed in sketch.rings_of(owner):
+                gone, count = dragged[owner, ring], len(line)
+                points += [point for k, point in enumerate(line) if k not in gone] if gone else line
+                pairs = [(k, (k + 1) % count) for k in range(count if closed else count - 1)]
+                edges += [(line[a], line[b]) for a, b in pairs if a not in gone and b not in gone]
+        lows, highs = np.array(edges, dtype=float).reshape(-1, 2, 2).transpose(1, 0, 2)
         kinds = {
-            "vertex": np.concatenate([_array(points), _array(rims), _outline(walls)[0]]),
-            "centre": _array(centres),
+            "vertex": np.concatenate([as_array([*points, *rims]), _outline(walls)[0]]),
+            "centre": as_array(centres),
             "middle": (lows + highs) / 2,
         }
         self._places = {kind: (cKDTree(at), at) for kind, at in kinds.items() if len(at)}
@@ -84,25 +77,21 @@ class Targets:
         self._sorted = tuple(marks[np.argsort(marks[:, axis], kind="stable")] for axis in (0, 1))
 
     def nearest(self, point: Point, kind: PointKind, reach: float) -> Point | None:
-        """Return the nearest point of a kind within `reach` metres."""
         if kind not in self._places:
             return None
         tree, places = self._places[kind]
         away, k = tree.query(point, distance_upper_bound=np.nextafter(reach, np.inf))
-        if not away <= reach:
-            return None
-        x, y = places[k].tolist()
-        return x, y
+        return _point(places[k]) if away <= reach else None
 
-    def edges_near(self, point: Point, reach: float) -> tuple[Array, Array]:
-        """Return the starts and the ends, (k, 2) m each, of the edges within `reach`, the nearest first."""
+    def edges_near(self, point: Point, reach: float) -> list[tuple[Point, Point]]:
+        """Return the ends of the edges within `reach` m, the nearest first."""
         x, y = point
         found = np.sort(self._edges.query(shapely.box(x - reach, y - reach, x + reach, y + reach)))
         starts, ends = self.starts[found], self.ends[found]
-        away = np.hypot(*(nearest_on(starts, ends, np.array(point)) - point).T)
+        _, away = nearest_on(starts, ends, point)
         order = np.argsort(away, kind="stable")
         order = order[away[order] <= reach][:_MOST_EDGES]
-        return starts[order], ends[order]
+        return [(_point(starts[k]), _point(ends[k])) for k in order]
 
     def in_line(self, point: Point, axis: int, reach: float, horizon: float) -> Point | None:
         """Return the mark within the horizon that is nearest along an axis, within `reach` m, then at all."""
@@ -113,8 +102,7 @@ class Targets:
         if not len(some):
             return None
         off = np.round(np.abs(some[:, axis] - point[axis]), 9)
-        x, y = some[np.lexsort((np.hypot(*(some - point).T), off))[0]].tolist()
-        return x, y
+        return _point(some[np.lexsort((np.hypot(*(some - point).T), off))[0]])
 
 
 class Snapper:
@@ -122,36 +110,21 @@ class Snapper:
 
     def __init__(self) -> None:
         self.patient = False  # to wait for the targets of large maps too
-        self._sketch: Sketch | None = None
-        self._key: object = None
-        self._known: Targets | None = None
-        self._coming: Future[Targets] | None = None
-        self._pool: ThreadPoolExecutor | None = None
+        self._latest: Latest[Future[Targets]] = Latest()
+        self._pool = ThreadPoolExecutor(1, "targets")
 
-    def targets(
-        self, sketch: Sketch, without: Iterable[Owner | Vertex] = (), more: Sequence[Point] = ()
-    ) -> Targets | None:
+    def targets(self, sketch: Sketch, without: Dragged = (), more: Sequence[Point] = ()) -> Targets | None:
         """Return what to snap to; None as long as that is being worked out."""
-        key = frozenset(without), tuple(more)
-        if self._sketch is not sketch or self._key != key:
-            self._sketch, self._key, self._known, self._coming = sketch, key, None, None
-            if self.patient or vertex_count(sketch) < MANY:
-                self._known = Targets(sketch, *key)
-            else:
-                self._pool = self._pool or ThreadPoolExecutor(1, "targets")
-                self._coming = self._pool.submit(Targets, sketch, *key)
-        if self._known is None and self._coming is not None and self._coming.done():
-            self._known = self._coming.result()
-        return self._known
+        look = frozenset(without), tuple(more)
+        coming = self._latest.of(sketch, look, lambda: self._pool.submit(Targets, sketch, *look))
+        at_once = coming.done() or self.patient or vertex_count(sketch) < MANY
+        return coming.result() if at_once else None
 
     def close(self) -> None:
-        """End."""
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
+        self._pool.shutdown(cancel_futures=True)
 
 
 def vertex_count(sketch: Sketch) -> int:
-    """Return about how many vertices a sketch has."""
     shapes = (item.shape for item in sketch.obstacles)
     return sum(len(getattr(shape, "vertices", getattr(shape, "points", ()))) for shape in shapes)
 
@@ -163,8 +136,9 @@ def _outline(geometries: list[BaseGeometry]) -> tuple[Array, Array]:
     return points[:-1][is_edge], points[1:][is_edge]
 
 
-def _array(points: Sequence[Point]) -> Array:
-    return np.array(points, dtype=float).reshape(-1, 2)
+def _point(at: Array) -> Point:
+    x, y = at.tolist()
+    return x, y
 
 
 Kind: TypeAlias = Literal["vertex", "middle", "centre", "crossing", "edge", "angle", "aligned", "grid"]
@@ -222,18 +196,18 @@ class _Line:
     words: str
     length: float = math.inf
 
-    def foot(self, point: Point) -> Point:
+    def along(self, point: Point) -> float:
         dx, dy = point[0] - self.through[0], point[1] - self.through[1]
-        along = dx * self.direction[0] + dy * self.direction[1]
-        if self.kind == "edge":
-            along = min(max(along, 0.0), self.length)
-        return self.at(along)
+        return dx * self.direction[0] + dy * self.direction[1]
+
+    def foot(self, point: Point) -> Point:
+        along = self.along(point)
+        return self.at(min(max(along, 0.0), self.length) if self.kind == "edge" else along)
 
     def at(self, along: float) -> Point:
         return self.through[0] + along * self.direction[0], self.through[1] + along * self.direction[1]
 
     def crossing(self, other: _Line) -> Point | None:
-        """Return where it crosses another line; None where it does not."""
         (ux, uy), (vx, vy) = self.direction, other.direction
         across = ux * vy - uy * vx
         if abs(across) < _PARALLEL:
@@ -250,8 +224,7 @@ class _Line:
         if grid <= 0.0:
             return None
         if self.kind == "angle":
-            dx, dy = foot[0] - self.through[0], foot[1] - self.through[1]
-            return self.at(_multiple(dx * self.direction[0] + dy * self.direction[1], grid))
+            return self.at(_multiple(self.along(foot), grid))
         if min(map(abs, self.direction)) >= _PARALLEL:
             return None
         axis = 0 if abs(self.direction[1]) < _PARALLEL else 1
@@ -267,18 +240,20 @@ class _Line:
 
 def snapped(point: Point, targets: Targets, snapping: Snapping, origin: Point | None = None) -> Snap:
     """Return where a point snaps: to points, crossing lines, lines, the grid; angles count from `origin`."""
-    return _ranked(point, targets, snapping, origin)[1]
+    return _Candidates(point, targets, snapping, origin).best()[1]
 
 
 def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets, snapping: Snapping) -> Snap:
     """Return as `point` the move near (dx, dy) m that snaps the nearest of some points."""
     best: tuple[tuple[int, float], Snap] | None = None
     # what many points meet somewhere means little of one of them
-    telling = snapping.to - {"grid", "angle", "middle", "crossing"}
-    of_others = Snapping(snapping.reach, snapping.grid, snapping.angle, telling)
-    for k, (x, y) in enumerate(_outermost(points)):
+    of_others = replace(snapping, to=snapping.to - {"grid", "angle", "middle", "crossing"})
+    if len(points) > _MOST_POINTS:  # the first one, and those on their hull
+        hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
+        points = [points[0], *hull[:: math.ceil(len(hull) / (_MOST_POINTS - 1))]]
+    for k, (x, y) in enumerate(points):
         at = x + dx, y + dy
-        rank, snap = _ranked(at, targets, snapping if k == 0 else of_others, None)
+        rank, snap = _Candidates(at, targets, snapping if k == 0 else of_others).best()
         by = dx + snap.point[0] - at[0], dy + snap.point[1] - at[1]
         # what rounding adds is not to add to the reach
         away = math.hypot(by[0] - dx, by[1] - dy)
@@ -288,115 +263,91 @@ def snapped_move(points: Sequence[Point], dx: float, dy: float, targets: Targets
 
 
 def snapped_angle(degrees: float, step: float = 15.0, reach: float = 3.0) -> float:
-    """Return the nearest multiple of `step` degrees if it is within `reach` degrees, else the angle itself.
-
-    >>> snapped_angle(43.0), snapped_angle(40.0)
-    (45.0, 40.0)
-    """
+    """Return the nearest multiple of `step` degrees if that is within `reach`, else the angle itself."""
     nearest = step * round(degrees / step)
     return nearest + 0.0 if abs(nearest - degrees) <= reach else degrees
 
 
-def _ranked(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> tuple[int, Snap]:
-    """Return how well a point snapped, the lower the better, and where to."""
-    ways = (_at_vertices, _at_points, _on_lines, _on_grid)
-    for rank, way in enumerate(ways):
-        found = [(math.dist(point, snap.point), snap) for snap in way(point, targets, snapping, origin)]
-        near = [each for each in found if each[0] <= snapping.reach]
-        if near:
-            return rank, min(near, key=lambda each: (*_telling(each[1]), each[0]))[1]
-    return 4, Snap(point)
+@dataclass(frozen=True)
+class _Candidates:
+    """Where a point may snap to; angles count from `origin`."""
 
+    point: Point
+    targets: Targets
+    how: Snapping
+    origin: Point | None = None
 
-def _telling(snap: Snap) -> tuple[int, int]:
-    """Return how much the guides say, the lower the more: two lines more than one, and the grid little."""
-    lines = sum(guide.kind != "grid" for guide in snap.guides)
-    return -lines, -len(snap.guides)
+    def best(self) -> tuple[int, Snap]:
+        """Return how well the point snapped, the lower the better, and where to."""
+        found = chain(self.marks("centre", "middle"), self.crossings())
+        ways = (self.marks("vertex"), found, self.on_lines(), self.on_grid())
+        for rank, way in enumerate(ways):
+            near = [snap for snap in way if math.dist(self.point, snap.point) <= self.how.reach]
+            if near:
+                return rank, min(near, key=self.telling)
+        return len(ways), Snap(self.point)
 
+    def telling(self, snap: Snap) -> tuple[int, int, float]:
+        # two lines say more than one, and the grid little
+        lines = sum(guide.kind != "grid" for guide in snap.guides)
+        return -lines, -len(snap.guides), math.dist(self.point, snap.point)
 
-def _mark(kind: Kind, place: Point, words: str = "") -> Snap:
-    return Snap(place, (Guide(kind, (place,), words or kind),))
+    def marks(self, *kinds: PointKind) -> Iterator[Snap]:
+        for kind in kinds:
+            place = self.targets.nearest(self.point, kind, self.how.reach) if kind in self.how.to else None
+            if place is not None:
+                yield _mark(kind, place)
 
-
-def _at_vertices(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    place = targets.nearest(point, "vertex", snapping.reach) if "vertex" in snapping.to else None
-    if place is not None:
-        yield _mark("vertex", place)
-
-
-def _at_points(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    place = targets.nearest(point, "centre", snapping.reach) if "centre" in snapping.to else None
-    if place is not None:
-        yield _mark("centre", place)
-    place = targets.nearest(point, "middle", snapping.reach) if "middle" in snapping.to else None
-    if place is not None:
-        yield _mark("middle", place, "middle of an edge")
-    if "crossing" in snapping.to:
-        for edge, other in combinations(_edges(point, targets, snapping), 2):
+    def crossings(self) -> Iterator[Snap]:
+        for edge, other in combinations(self.edges(), 2) if "crossing" in self.how.to else ():
             place = other.crossing(edge)
             if place is not None:
                 yield _mark("crossing", place)
 
-
-def _on_lines(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    lines = []
-    if "angle" in snapping.to and origin is not None and math.dist(point, origin) > snapping.reach:
-        lines.append(_ray(point, origin, snapping.angle))
-    if "aligned" in snapping.to:
-        for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))):
-            mark = targets.in_line(point, axis, snapping.reach, _HORIZON * snapping.reach)
+    def on_lines(self) -> Iterator[Snap]:
+        lines, reach, origin = list[_Line](), self.how.reach, self.origin
+        if "angle" in self.how.to and origin is not None and math.dist(self.point, origin) > reach:
+            degrees = self.how.angle * round(bearing(origin, self.point) / self.how.angle)
+            words = f"{math.remainder(degrees, 360.0) % 360.0:g}°"
+            lines.append(_Line("angle", origin, cos_sin(degrees), (origin,), words))
+        for axis, direction in ((0, (0.0, 1.0)), (1, (1.0, 0.0))) if "aligned" in self.how.to else ():
+            mark = self.targets.in_line(self.point, axis, reach, _HORIZON * reach)
             if mark is not None:
                 lines.append(_Line("aligned", mark, direction, (mark,), "in line"))
-    if "edge" in snapping.to:
-        lines += list(_edges(point, targets, snapping))[:4]
-    for k, line in enumerate(lines):
-        for other in lines[:k]:
-            # where two edges cross is a matter of its own
-            both_edges = line.kind == other.kind == "edge"
-            place = None if both_edges else line.crossing(other)
+        lines += islice(self.edges(), 4) if "edge" in self.how.to else ()
+        for k, line in enumerate(lines):
+            for other in lines[:k]:
+                # where two edges cross is a matter of its own
+                both_edges = line.kind == other.kind == "edge"
+                place = None if both_edges else line.crossing(other)
+                if place is not None:
+                    yield Snap(place, (other.shown(place), line.shown(place)))
+            foot = line.foot(self.point)
+            place = line.grid_place(foot, self.how.grid) if "grid" in self.how.to else None
             if place is not None:
-                yield Snap(place, (other.shown(place), line.shown(place)))
-        foot = line.foot(point)
-        place = line.grid_place(foot, snapping.grid) if "grid" in snapping.to else None
-        if place is not None:
-            yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
-        yield Snap(foot, (line.shown(foot),))
+                yield Snap(place, (line.shown(place), Guide("grid", (place,), "grid")))
+            yield Snap(foot, (line.shown(foot),))
+
+    def on_grid(self) -> Iterator[Snap]:
+        if "grid" in self.how.to and self.how.grid > 0.0:
+            x, y = (_multiple(value, self.how.grid) for value in self.point)
+            for place in ((x, y), (x, self.point[1]), (self.point[0], y)):
+                yield _mark("grid", place)
+                if math.dist(place, self.point) <= self.how.reach:
+                    return
+
+    def edges(self) -> Iterator[_Line]:
+        for a, b in self.targets.edges_near(self.point, self.how.reach):
+            length = math.dist(a, b)
+            if length > 0.0:
+                direction = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+                yield _Line("edge", a, direction, (a, b), "edge", length)
 
 
-def _on_grid(point: Point, targets: Targets, snapping: Snapping, origin: Point | None) -> Iterator[Snap]:
-    if "grid" in snapping.to and snapping.grid > 0.0:
-        x, y = (_multiple(value, snapping.grid) for value in point)
-        for place in ((x, y), (x, point[1]), (point[0], y)):
-            yield _mark("grid", place)
-            if math.dist(place, point) <= snapping.reach:
-                return
-
-
-def _ray(point: Point, origin: Point, step: float) -> _Line:
-    degrees = math.degrees(math.atan2(point[1] - origin[1], point[0] - origin[0]))
-    nearest = step * round(degrees / step)
-    words = f"{math.remainder(nearest, 360.0) % 360.0:g}°"
-    return _Line("angle", origin, cos_sin(nearest), (origin,), words)
-
-
-def _edges(point: Point, targets: Targets, snapping: Snapping) -> Iterator[_Line]:
-    starts, ends = targets.edges_near(point, snapping.reach)
-    for (ax, ay), (bx, by) in zip(starts.tolist(), ends.tolist(), strict=True):
-        length = math.hypot(bx - ax, by - ay)
-        if length > 0.0:
-            direction = (bx - ax) / length, (by - ay) / length
-            yield _Line("edge", (ax, ay), direction, ((ax, ay), (bx, by)), "edge", length)
+def _mark(kind: Kind, place: Point) -> Snap:
+    return Snap(place, (Guide(kind, (place,), "middle of an edge" if kind == "middle" else kind),))
 
 
 def _multiple(value: float, step: float) -> float:
     """Return the nearest multiple of a step, as the decimal that it is: 3 steps of 0.1 are 0.3."""
     return round(step * round(value / step), 9) + 0.0
-
-
-def _outermost(points: Sequence[Point]) -> Sequence[Point]:
-    """Return the first point, and of many others those on their hull."""
-    if len(points) <= _MOST_POINTS:
-        return points
-    hull = shapely.get_coordinates(shapely.convex_hull(shapely.multipoints(np.array(points)))).tolist()
-    step = math.ceil(len(hull) / (_MOST_POINTS - 1))
-    return [points[0], *((x, y) for x, y in hull[::step])]
