@@ -121,7 +121,6 @@ class Autosaver:
                 self._changed.notify_all()
 
     def _work(self) -> None:
-        """Write what is wanted, the newest only, with pauses in which others can work."""
         pause = 0.0
         while True:
             with self._changed:
@@ -159,7 +158,6 @@ class Autosaver:
 
 
 def autosave_folder() -> Path | None:
-    """Return where work is kept; None where it is not to be."""
     named = os.environ.get(FOLDER)
     if named is not None:
         return Path(named) if named else None
@@ -186,7 +184,6 @@ def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work |
 
 
 def discard(folder: Path) -> None:
-    """Remove the folder of a record for good."""
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -207,7 +204,6 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
 
 
 def read_record(folder: Path, kind: str) -> Record:
-    """Return what a folder holds; MapError when that is no such record."""
     file = folder / _FILE
     held = parse(read_bytes(file), str(file))
     if not isinstance(held, dict) or held.get("format") != kind or held.get("version") != 1:
@@ -229,7 +225,6 @@ def _places(folder: Path | None) -> list[Path]:
 
 
 def _age(place: Path) -> float:
-    """Return how many seconds ago a folder was changed last; 0 where it is gone."""
     with suppress(OSError):
         return time.time() - place.stat().st_mtime
     return 0.0

@@ -6,7 +6,6 @@ _ours = ""
 
 
 def get() -> str:
-    """Return the text on the clipboard."""
     try:
         return (pygame.scrap.get_text() if pygame.scrap.has_text() else "") or _ours
     except (pygame.error, AttributeError):
@@ -14,7 +13,6 @@ def get() -> str:
 
 
 def put(text: str) -> None:
-    """Put a text on the clipboard."""
     global _ours
     _ours = text
     try:

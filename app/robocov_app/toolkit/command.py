@@ -42,7 +42,6 @@ class Command:
 
     @property
     def tip(self) -> str:
-        """Title and keys, as a tool tip says them."""
         keys = " or ".join(key_words(key) for key in self.keys)
         return f"{self.title} ({keys})" if keys else self.title
 
@@ -69,13 +68,10 @@ class Commands:
         return name in self._named
 
     def do(self, name: str) -> None:
-        """Do a command, or tell why it cannot be done."""
         self._do(self._named[name])
 
     def _do(self, command: Command) -> None:
         self._attempt(lambda: _done(command))
-
-    # keys
 
     def of_key(self, event: pygame.event.Event) -> Command | None:
         """Return the command of a key that goes down; None while it is held and does not repeat."""
@@ -85,25 +81,19 @@ class Commands:
         return None if command is None or (held and not command.repeats) else command
 
     def press(self, event: pygame.event.Event) -> bool:
-        """Do the command of a key that goes down; return whether there is one."""
         command = self.of_key(event)
         if command is not None:
             self._do(command)
         return command is not None
 
     def release(self, event: pygame.event.Event) -> None:
-        """Take note of a key that comes up."""
         self._down.discard(event.key)
 
     def hold(self, key: int) -> None:
-        """Take note of a key that is held down already."""
         self._down.add(key)
 
     def forget_keys(self) -> None:
-        """Take note that the window has lost the keyboard, or that something else has got its keys."""
         self._down.clear()
-
-    # what is typed
 
     def _typable(self) -> dict[str, Command]:
         return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}
@@ -212,7 +202,6 @@ class Menu:
         self._do(command.name)
 
     def take(self, event: pygame.event.Event) -> bool:
-        """Take an event; return whether it was meant for the menu. A press beside it closes it."""
         if event.type == pygame.KEYDOWN:
             self._key(key_of(event))
         elif event.type == pygame.MOUSEBUTTONDOWN and self._ui is not None:
@@ -237,7 +226,6 @@ class Menu:
             self._choose(command)
 
     def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        """Draw it, whole in the window."""
         if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
             self._ui = Ui(self._page, theme, scale)
             self._ui.background = None
@@ -267,7 +255,6 @@ def draw_keys(
     groups: Sequence[str],
     words: str,
 ) -> None:
-    """Show the keys of commands, group by group in columns, under a line with a hint."""
     dim(screen, theme)
     keyed = [each for each in commands if each.keys and not each.hidden]
     blocks: list[tuple[str, Command | None]] = []

@@ -67,7 +67,6 @@ class Question(Dialog):
     chosen: int = 0
 
     def page(self, ui: Ui) -> None:
-        """Show title, words and buttons."""
         ui.words(self.title, size=16, bold=True)
         ui.space(6)
         size = ui.px(TEXT + 1)
@@ -92,7 +91,6 @@ class Question(Dialog):
         answer.call()
 
     def key(self, name: str, ui: Ui) -> bool:
-        """Choose by arrows and Tab, answer by Enter or an answer's own key."""
         by = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}.get(name, 0)
         self.chosen = (self.chosen + by) % len(self.answers)
         own = next((each for each in self.answers if each.key == name), None)
@@ -103,7 +101,6 @@ class Question(Dialog):
         return True
 
     def cancelled(self) -> None:
-        """Do what Escape does."""
         self.on_cancel()
 
 
@@ -136,7 +133,6 @@ class Choice(Dialog):
     trouble: str = ""
 
     def page(self, ui: Ui) -> None:
-        """Show the field and the lines below it."""
         if self.title:
             ui.words(self.title, colour=ui.theme.faint, bold=True)
         if ui.edit is None or ui.focus != "text":
@@ -182,7 +178,6 @@ class Choice(Dialog):
         ui.edit = TextEdit(text, len(text), len(text))
 
     def key(self, name: str, ui: Ui) -> bool:
-        """Choose by arrows, complete by Tab, accept by Enter; other keys edit the text."""
         found = list(self.options(self.text))
         option = found[self.chosen] if self.chosen < len(found) else None
         by = {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0)
@@ -200,7 +195,6 @@ class Choice(Dialog):
         return True
 
     def wheel(self, notches: float) -> None:
-        """Move through the list."""
         self.chosen = max(self.chosen - round(notches), 0)
         self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
 
@@ -208,7 +202,6 @@ class Choice(Dialog):
 def list_choice(
     title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
 ) -> Choice:
-    """Return a choice of one of some lines: those that hold all words typed."""
 
     def found(typed: str) -> list[Option]:
         words = typed.lower().split()
@@ -288,11 +281,9 @@ class Dialogs:
 
     @property
     def open(self) -> bool:
-        """Whether something is asked."""
         return self.asked is not None
 
     def ask(self, dialog: Dialog) -> None:
-        """Ask something."""
         self.asked, self._ui, self._swallow, self._drawn = dialog, None, "", False
 
     def swallow(self, letter: str) -> None:
@@ -300,7 +291,6 @@ class Dialogs:
         self._swallow = letter if self.open else ""
 
     def close(self) -> None:
-        """Give up what is asked."""
         asked, self.asked = self.asked, None
         if asked is not None:
             asked.cancelled()
@@ -359,7 +349,6 @@ class Dialogs:
             ui.take(event)
 
     def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        """Draw what is asked over everything else."""
         asked = self.asked
         if asked is None:
             return

@@ -48,7 +48,6 @@ def shown_cursor() -> int:
 
 
 def show_cursor(shape: int) -> None:
-    """Give the mouse's cursor one of the system's shapes."""
     global _cursor
     _cursor = shape
     with suppress(pygame.error):  # not every display has cursors

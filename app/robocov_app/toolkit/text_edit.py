@@ -23,12 +23,10 @@ class TextEdit:
 
     @classmethod
     def of(cls, text: str) -> Self:
-        """Return an edit of a text, all of it selected."""
         return cls(text, len(text), 0)
 
     @property
     def selection(self) -> tuple[int, int]:
-        """Ends of what is selected, in order."""
         return min(self.caret, self.anchor), max(self.caret, self.anchor)
 
     def place(self, caret: int, *, extend: bool = False) -> None:
@@ -39,7 +37,6 @@ class TextEdit:
         self._typing = False
 
     def select_word(self, at: int) -> None:
-        """Select the word around a place."""
         for word in re.finditer(r"[\w.]+|\s+|[^\w.\s]+", self.text):
             if word.start() <= at <= word.end():
                 self.anchor, self.caret = word.span()

@@ -76,7 +76,6 @@ class _List:
         return max(len(self.options) * self.row + 2 - self.rect.height, 0)
 
     def item(self, k: int) -> Rect:
-        """Return where the option of a number is, which may be outside of the list."""
         y = self.rect.top + 1 + k * self.row - round(self.top)
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
 
@@ -87,7 +86,6 @@ class _List:
         return k if 0 <= k < len(self.options) else None
 
     def show(self, k: int) -> None:
-        """Choose an option, and scroll it into sight."""
         self.chosen = min(max(k, 0), len(self.options) - 1)
         low, high = self.chosen * self.row, (self.chosen + 1) * self.row + 2 - self.rect.height
         self.top = min(max(self.top, high, 0.0), low)
@@ -122,8 +120,6 @@ class Ui:
         self._again = False
         self._grabbed = 0.0
         self._begin()
-
-    # runs
 
     def _begin(self) -> None:
         self.x, self.y, self.wide = 0.0, 0.0, self.box.width / self.scale
@@ -207,7 +203,6 @@ class Ui:
         return name in (*_ENTER, "space", "left", "right", "up", "down")
 
     def draw(self, screen: Surface) -> None:
-        """Draw the page, anew where something is different."""
         if self.stale or self._picture is None or self._picture.get_size() != self.box.size:
             self.stale = False
             for _ in range(3):  # what a page needs of height is known after it has run
@@ -232,7 +227,6 @@ class Ui:
         return next((each for each in self._under() if each.tip), None) if self.active is None else None
 
     def draw_over(self, screen: Surface) -> None:
-        """Draw what hangs over other things: the open list, the tool tip."""
         if self.open_list is not None:
             self._draw_list(screen, self.open_list)
         tipped = self._tip_of()
@@ -256,25 +250,19 @@ class Ui:
             picture = label(line, size, (245, 247, 250))
             screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
 
-    # focus
-
     @property
     def typing(self) -> bool:
-        """Whether letters go into a field."""
         return self.edit is not None
 
     @property
     def busy(self) -> bool:
-        """Whether somebody holds a widget, types or chooses."""
         return self.active is not None or self.typing or self.open_list is not None
 
     def stop_typing(self) -> None:
-        """Take the keys away from all widgets, and close the open list."""
         self.focus = self.edit = self.open_list = None
         self.stale = True
 
     def move_focus(self, by: int) -> None:
-        """Give the focus to the next widget; a field is edited at once."""
         order = self._order
         if not order:
             return
@@ -282,19 +270,14 @@ class Ui:
         self.set_focus(order[k % len(order)])
 
     def set_focus(self, key: str) -> None:
-        """Give the focus to a widget."""
         self.focus, self.open_list, self.stale = key, None, True
         entry = self.shown.get(f"entry:{key}")
         self.edit = TextEdit.of(entry.text) if entry is not None else None
 
-    # layout
-
     def px(self, length: float) -> int:
-        """Return a length in pixels."""
         return round(length * self.scale)
 
     def inset(self, left: float, top: float, right: float = 0.0) -> None:
-        """Leave some room free at the sides and above what is to come."""
         self.end_row()
         self.x, self.y, self.wide = self.x + left, self.y + top, self.wide - left - right
 
@@ -311,18 +294,15 @@ class Ui:
         self._height, self._below = height, below
 
     def end_row(self) -> None:
-        """Go on below the row that was begun."""
         if self._next:
             self.y += self._height + self._below
         self._next = 0
 
     def space(self, height: float) -> None:
-        """Leave some height free."""
         self.end_row()
         self.y += height
 
     def cell(self) -> Rect:
-        """Take the next cell, px."""
         if not self._cells:
             self.row()
         if self._next == len(self._cells):
@@ -334,7 +314,6 @@ class Ui:
 
     @property
     def rest(self) -> Rect:
-        """Rest of the box below the last row, px."""
         top = self.box.top + self.px(self.y + (self._height + self._below if self._next else 0.0))
         left = self.box.left + self.px(self.x)
         return Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
@@ -403,8 +382,6 @@ class Ui:
         self._round(knob.inflate(-self.px(4), -self.px(2)), fill, radius=BAR / 2)
         return top
 
-    # what widgets share
-
     def _shade(self, part: float) -> Colour:
         return mix(self.theme.panel, self.theme.ink, part)
 
@@ -422,7 +399,6 @@ class Ui:
         return self._is(pygame.MOUSEBUTTONDOWN) and self._hovers(rect)
 
     def _key(self, key: str) -> str:
-        """Return the name of the key that is pressed for a widget; empty if none is."""
         event = self._event
         for_it = event is not None and event.type == pygame.KEYDOWN and self.focus == key
         return key_of(event) if event is not None and for_it else ""
@@ -487,10 +463,7 @@ class Ui:
             side = "center" if at == "center" else f"mid{at}"
             self.surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
 
-    # widgets
-
     def header(self, text: str) -> None:
-        """Write a heading."""
         self.row(height=18, below=2)
         self.label(text, style="header")
         self.row()
@@ -512,7 +485,6 @@ class Ui:
         bold: bool = False,
         indent: float = 0.0,
     ) -> None:
-        """Write a paragraph over the whole width, in as many lines as it needs."""
         self.row(*((indent, 0.0) if indent else (0.0,)), height=size + 4, gap=0, below=1)
         for line in wrapped(text, self.px(size), self.px(self.wide - indent), bold):
             if indent:
@@ -530,7 +502,6 @@ class Ui:
         chosen: bool = False,
         small: bool = False,
     ) -> bool:
-        """Show a button; return whether it was pressed."""
         key, rect = key or text, self.cell()
         rect.height = min(rect.height, self.px(_TALLEST))
         clicked = self._clicks("button", key, rect, text, chosen, tip, why)
@@ -760,8 +731,6 @@ class Ui:
         screen.fill(theme.ink, (x, tall.top, max(1, self.px(1)), tall.height))
         screen.set_clip(clip)
 
-    # lists that drop down
-
     def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
         """Show a menu that drops down; return what was chosen of it, if that is another."""
         rect = self.cell()
@@ -855,7 +824,6 @@ class Ui:
         screen.set_clip(None)
 
     def find(self, kind: str, key: str) -> Shown | None:
-        """Return a widget that is shown, None if there is none of that kind and key."""
         return self.shown.get(f"{kind}:{key}")
 
 
@@ -874,7 +842,6 @@ class SidePanel(ABC):
         """Show it."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Fit another layout and theme."""
         self.hidden = not layout.panel[2]
         if self.hidden:
             self.ui.stop_typing()
@@ -883,10 +850,8 @@ class SidePanel(ABC):
         self.ui.box, self.ui.stale = Rect(layout.panel), True
 
     def draw(self, screen: Surface) -> None:
-        """Draw the panel and what hangs over it."""
         self.ui.draw(screen)
         self.ui.draw_over(screen)
 
     def take(self, event: pygame.event.Event) -> bool:
-        """Give an event to the widgets; return whether one of them took it."""
         return not self.covered and not self.hidden and self.ui.take(event)

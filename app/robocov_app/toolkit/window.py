@@ -77,7 +77,6 @@ class BaseWindow(ABC):
         """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
 
     def run(self) -> None:
-        """Go on until the window is closed."""
         clock, before = pygame.time.Clock(), perf_counter()
         try:
             with undisturbed():
@@ -98,11 +97,9 @@ class BaseWindow(ABC):
 
     @property
     def resting(self) -> bool:
-        """Whether nothing has moved or come for a while."""
         return self._calm >= CALM
 
     def frame(self, seconds: float) -> None:
-        """Take what has happened, let so many seconds pass, and draw what is different."""
         rested = self.resting
         self.advance(seconds)
         if self.closed:
@@ -116,7 +113,6 @@ class BaseWindow(ABC):
             self.remote.send(self.screen)
 
     def advance(self, seconds: float) -> None:
-        """Take what has happened, and let so many seconds pass."""
         if self.remote is not None:
             self.remote.receive(self)
         events = pygame.event.get()
@@ -132,7 +128,6 @@ class BaseWindow(ABC):
         self.update(seconds)
 
     def toggle_fullscreen(self) -> None:
-        """Fill the screen, or be a window again."""
         if self.remote is not None:  # it has the size of a page, which can do this by itself
             return
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
@@ -182,7 +177,6 @@ def screen_scale() -> float:
 
 
 def fitting(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the size, or what of it the desktop has room for."""
     wide, high = max(pygame.display.get_desktop_sizes(), default=size)
     return min(size[0], wide), min(size[1], high)
 
@@ -198,7 +192,6 @@ def open_window(size: tuple[int, int]) -> Surface:
 
 
 def show_compiling(size: tuple[int, int]) -> None:
-    """Say on the window, or on a new one of a size, why nothing else is there yet."""
     with suppress(pygame.error):
         pygame.display.init()
         screen = pygame.display.get_surface() or open_window(size)

@@ -45,11 +45,9 @@ class Wire:
     """Translates between the window and one process; called on threads, in order, anew for each process."""
 
     def encode(self, question: Any) -> object:
-        """Return what the process is told."""
         return question
 
     def decode(self, answer: Any) -> Any:
-        """Return the answer for the window."""
         return answer
 
 
@@ -79,12 +77,10 @@ class LatestWorker(Generic[_Answer]):
 
     @property
     def lives(self) -> bool:
-        """Whether there is a process."""
         return self._talk is not None and not self._talk.ended
 
     @property
     def busy(self) -> bool:
-        """Whether the newest question is not answered yet."""
         return self._answered < self._number
 
     @property
@@ -119,7 +115,6 @@ class LatestWorker(Generic[_Answer]):
         return None if reply is None else reply.answer
 
     def close(self) -> None:
-        """End the process."""
         if self._talk is not None:
             self._talk.close()
             self._talk = None
@@ -138,15 +133,12 @@ class DirectWorker(Generic[_Answer]):
 
     @property
     def trouble(self) -> str:
-        """Why the last question has no answer, in words; empty if it has one."""
         return self._reply.trouble
 
     def put(self, question: object) -> None:
-        """Answer."""
         self._reply = reply_of(self._service, [(0, self._wire.encode(question))], Line())
 
     def poll(self) -> _Answer | None:
-        """Return the answer, once."""
         reply, self._reply = self._reply, Reply(0, None, self.trouble)
         answer: _Answer | None = None if reply.answer is None else self._wire.decode(reply.answer)
         return answer
@@ -224,14 +216,10 @@ class _Talk:
             self.ended = True
 
 
-# the process
-
-
 class Line:
     """Channel of a service while it works: newer questions in, progress out."""
 
     def newer(self) -> list[Any]:
-        """Return the questions that have come since."""
         return []
 
     def tell(self, progress: object) -> None:
@@ -274,7 +262,6 @@ class _PipeLine(Line):
 
 
 def reply_of(service: Service, questions: list[tuple[int, Any]], line: Line) -> Reply:
-    """Return the reply of a service to numbered questions."""
     number = questions[-1][0]
     try:
         return Reply(number, service([question for _, question in questions], line))
@@ -351,7 +338,6 @@ def own_streams() -> tuple[BinaryIO, BinaryIO]:
 
 
 def send(stream: IO[bytes], message: object) -> None:
-    """Write one message."""
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(_LENGTH.pack(len(data)))
     stream.write(data)

@@ -58,7 +58,6 @@ class Strips:
         return float(left), float(top + above), float(width), float(below)
 
     def update(self, canvas: Canvas, team: Team | None) -> None:
-        """Look what there is to tell, on a canvas as wide as the sheet."""
         editor = self._editor
         self._entries = self._found(team)
         rows = max(len(annotations.legend_rows(canvas, self._entries)), 1)
@@ -83,7 +82,6 @@ class Strips:
         return found
 
     def draw(self, screen: Surface, canvas: Canvas, box: Box) -> None:
-        """Draw both strips."""
         left, top, width, height = box
         if self._entries:
             key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
@@ -101,7 +99,6 @@ class Strips:
 
 
 def map_words(editor: Editor) -> str:
-    """Return what the strip below the sheet says: whose map it is, and what it is like."""
     sketch, measurement = editor.sketch, editor.measurement
     unsaved = "● " if editor.document.unsaved else ""
     said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
@@ -136,10 +133,7 @@ class EditorCanvas:
         self._carried: Latest[Surface] = Latest()
         self._outlined: Latest[Surface] = Latest()
 
-    # cameras
-
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Fit another layout or theme; what was zoomed or panned stays so."""
         self.layout, self.theme = layout, theme
         if self._camera is not None:
             self._camera = self._camera.within(self._view_box())
@@ -149,18 +143,15 @@ class EditorCanvas:
 
     @property
     def camera(self) -> Camera:
-        """The camera, from world coordinates to pixels."""
         if self._camera is None:
             self.fit()
         assert self._camera is not None
         return self._camera
 
     def fit(self) -> None:
-        """Show the whole map."""
         self._show(self._bounds)
 
     def fit_selection(self) -> None:
-        """Show what is selected, or all."""
         self._show(bounds_of(self.editor.sketch, self.editor.selection) or self._bounds)
 
     @property
@@ -175,7 +166,6 @@ class EditorCanvas:
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
 
     def go_to(self, problem: Problem) -> None:
-        """Bring a problem into sight."""
         where = problem.where
         if where is None or where.is_empty:
             return
@@ -187,7 +177,6 @@ class EditorCanvas:
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
     def zoom(self, factor: float, at: Point) -> None:
-        """Magnify what is under a pixel of the window."""
         low_x, low_y, high_x, high_y = self._bounds
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
@@ -207,20 +196,15 @@ class EditorCanvas:
         self._camera = camera
         self.editor.pixel = self.layout.scale / camera.zoom
 
-    # what is where
-
     def over(self, pixel: Point) -> bool:
-        """Return whether a pixel of the window shows the sheet."""
         left, top, width, height = self.camera.view
         return left <= pixel[0] < left + width and top <= pixel[1] < top + height
 
     def to_world(self, pixel: Point) -> Point:
-        """Return the place under a pixel of the window, m."""
         x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
         return x, y
 
     def to_pixel(self, point: Point) -> Point:
-        """Return the pixel of the window where a place is."""
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
 
@@ -230,15 +214,12 @@ class EditorCanvas:
         return REACH * self.layout.scale / self.camera.zoom
 
     def problem_at(self, pixel: Point) -> Problem | None:
-        """Return the problem whose badge is under a pixel."""
         if "problems" not in self.editor.shown:
             return None
         for problem, at in overlay.badge_places(self.editor.problems, self._view()):
             if distance(at, pixel) < 10 * self.layout.scale:
                 return problem
         return None
-
-    # drawing
 
     def _view(self) -> View:
         editor, layout = self.editor, self.layout
@@ -247,7 +228,6 @@ class EditorCanvas:
         return View(self.camera, self.theme, layout.scale, layout.size, shown, editor.grid, folder)
 
     def draw(self, screen: Surface) -> None:
-        """Draw all of it."""
         editor, shown, theme = self.editor, self.editor.shown, self.theme
         box = Rect(self.layout.arena)
         self.strips.update(self._view().canvas(Surface((box.width, 1))), self.team)
@@ -328,7 +308,6 @@ class EditorCanvas:
         screen.blit(self._carried.of(drag, view.camera, drawn), (round(dx), round(-dy)), special_flags=_BLEND)
 
     def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
         theme, since = canvas.theme, self.editor.moves_since
         for key in moving(sketch):
             item = sketch.item(key)

@@ -36,7 +36,6 @@ class Outline:
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
-        """The place with most room for a name: x, y, width, height, m."""
         return name_place(self.geometry)
 
 
@@ -62,7 +61,6 @@ def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]
 
 
 def outline_of(geometry: BaseGeometry) -> Outline:
-    """Return the outline of a geometry."""
     rings: list[Array] = []
     outer: list[bool] = []
     lines: list[Array] = []
@@ -83,7 +81,6 @@ class Outlines:
         self._bounds: Latest[Array] = Latest()
 
     def of(self, item: Item) -> Outline:
-        """Return the outline of an obstacle."""
         known = self._known.get(id(item))
         if known is None or known[0] is not item:
             known = self._known[id(item)] = (item, outline_of(item.geometry))
@@ -130,17 +127,14 @@ class View:
 
     @property
     def clip(self) -> Rect:
-        """The pixels that show the world."""
         left, top, width, height = (round(value) for value in self.camera.view)
         return Rect(left, top, width, height)
 
     def canvas(self, surface: Surface) -> Canvas:
-        """Return a canvas for a surface."""
         return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
 
 
 def outside_colour(theme: Theme) -> Colour:
-    """Return the colour of what lies outside the boundary."""
     return mix(theme.panel, theme.ink, 0.05) if theme is LIGHT else mix(theme.background, (0, 0, 0), 0.28)
 
 
@@ -231,8 +225,6 @@ class Sheet:
         edge = round(_EDGE * view.scale)
         box = Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
         return box.inflate(2 * edge, 2 * edge)
-
-    # painting
 
     def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
         page.set_clip(box)

@@ -35,12 +35,10 @@ MOST_BADGES = 200
 
 
 def accent(theme: Theme) -> Colour:
-    """Return the colour of what is selected."""
     return theme.final
 
 
 def problem_colour(theme: Theme, *, grave: bool) -> Colour:
-    """Return the colour of a problem."""
     return theme.trajectory if grave else theme.others[1]
 
 
@@ -71,17 +69,12 @@ def _tag(canvas: Canvas, words: str, at: Point) -> None:
     tag(canvas.surface, words, at, canvas.theme, canvas.scale)
 
 
-# what is selected
-
-
 def draw_outline(canvas: Canvas, rings: Iterable[Array], colour: Colour, width: float = 2.0) -> None:
-    """Draw the rings of something, (k, 2) m each."""
     for ring in rings:
         canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))
 
 
 def draw_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Colour) -> None:
-    """Draw a dashed box, m."""
     low_x, low_y, high_x, high_y = box
     ring = ((low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y), (low_x, low_y))
     for a, b in pairwise(pixels(canvas, ring).tolist()):
@@ -116,7 +109,6 @@ def _square(canvas: Canvas, at: Point, fill: Colour, *, large: bool = False, rou
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
-    """Draw why a point is where it is."""
     colour = canvas.theme.forces["repulsion_obstacle"]
     words: list[str] = []
     last: Point | None = None
@@ -133,9 +125,6 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
     if last is not None and words:
         at = (last[0] + 11 * canvas.scale, last[1] + 15 * canvas.scale)
         canvas.text(" · ".join(words), at, size=canvas.theme.small_text, colour=colour)
-
-
-# starts, paths, what is drawn
 
 
 def draw_circle(canvas: Canvas, center: Array, radius: float, colour: Colour, width: float) -> None:
@@ -195,7 +184,6 @@ def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
 
 
 def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
-    """Draw where something will be."""
     colour = accent(canvas.theme)
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
@@ -211,7 +199,6 @@ def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
 
 
 def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
-    """Draw what a tool is about to do; words stand beside the cursor, px."""
     floor, scale, colour = canvas.theme.background, canvas.scale, accent(canvas.theme)
     for shape in preview.shapes:
         draw_ghost(canvas, shape.polygon)
@@ -272,7 +259,6 @@ def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bo
 
 
 def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
-    """Show what is being typed, below the cursor."""
     theme, scale, surface = canvas.theme, canvas.scale, canvas.surface
     words, hint, large = f"{text}▏", "Enter", theme.text * 1.1
     wide = canvas.text_width(words, large, bold=True) + canvas.text_width(hint, theme.small_text)
@@ -285,9 +271,6 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
     canvas.text(words, (box.left + 8 * scale, y), size=size, bold=True)
     right = box.right - 8 * scale
     canvas.text(hint, (right, y), size=theme.small_text, colour=theme.faint, anchor="right")
-
-
-# where robots do not pass
 
 
 def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
@@ -326,7 +309,6 @@ def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
 
 
 def sealed_colour(theme: Theme) -> Colour:
-    """Return the colour of what no robot comes to from the largest part."""
     return theme.forces["repulsion_robots"]
 
 
@@ -355,7 +337,6 @@ def _lines(
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap."""
     a, b, across = _gap(canvas, gap)
     colour = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
     for start, end in ((a, b), (a - across, a + across), (b - across, b + across)):
@@ -388,9 +369,6 @@ def _gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
     return a, b, np.array([b[1] - a[1], a[0] - b[0]]) / length * 5 * canvas.scale
 
 
-# problems
-
-
 def badge_places(found: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
     """Return where the badges of problems are, px: above the place, which can be seen then."""
     places = []
@@ -405,7 +383,6 @@ def badge_places(found: tuple[Problem, ...], view: View) -> list[tuple[Problem, 
 def draw_problems(
     canvas: Canvas, view: View, found: tuple[Problem, ...], told: Problem | None, hovered: Problem | None
 ) -> None:
-    """Draw a badge for each problem, and the words of those that are asked about."""
     theme, scale = canvas.theme, canvas.scale
     for problem in found[:MOST_BADGES]:
         if problem.where is not None and (problem.grave or problem in (told, hovered)):
@@ -439,16 +416,11 @@ def _draw_place(canvas: Canvas, problem: Problem) -> None:
 def draw_badge(
     canvas: Canvas, x: float, y: float, *, grave: bool, radius: float = BADGE, rim: float = 1.4
 ) -> None:
-    """Draw a disc with an exclamation mark."""
     theme, fill = canvas.theme, problem_colour(canvas.theme, grave=grave)
     _disc(canvas, (x, y), radius, (fill, theme.background, mix(fill, theme.ink, 0.3)), rim, "!")
 
 
-# the legend
-
-
 def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
-    """Return what the legend explains."""
     rows: list[tuple[object, str, Glyph]] = [
         (True, "obstacle", lambda on, x, y: _swatch(on, x, y, on.theme.obstacle, on.theme.obstacle_edge)),
         (True, "boundary", _boundary_glyph),

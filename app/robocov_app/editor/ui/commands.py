@@ -34,11 +34,7 @@ RunWith = Callable[[Editor, str], object]
 _Number = TypeVar("_Number", int, float)
 
 
-# what commands do
-
-
 def selected(editor: Editor) -> Selection:
-    """Return the selected things, and of selected vertices what they belong to; MapError without any."""
     if selection := whole(editor.selection):
         return selection
     raise MapError("nothing is selected: click something first, or press Ctrl A")
@@ -50,13 +46,11 @@ def edited(edit: Edit, *rest: object) -> Run:
 
 
 def align(editor: Editor, side: transform.Side) -> None:
-    """Align the selected vertices, or else the selected things."""
     selection = editor.selection if editor.selection.vertices else selected(editor)
     editor.change(transform.aligned(editor.sketch, selection, side))
 
 
 def of_map(edit: Edit, *rest: object) -> Run:
-    """Return what makes an edit of the whole map."""
     return lambda editor: editor.change(edit(editor.sketch, *rest))
 
 
@@ -66,12 +60,10 @@ def whole(selection: Selection) -> Selection:
 
 
 def vertices_or_things(selection: Selection) -> Selection:
-    """Return the selected vertices alone, or else the selected things."""
     return Selection(vertices=selection.vertices) if selection.vertices else selection
 
 
 def play(editor: Editor) -> str:
-    """Show where obstacles that move get to, or show them no more."""
     if editor.moves_since is not None:
         editor.moves_since = None
         return "obstacles stand as they are at time zero"
@@ -88,7 +80,6 @@ def back(editor: Editor) -> None:
 
 
 def delete(editor: Editor) -> None:
-    """Delete the selected vertices, or else the selected things."""
     selection = editor.selection
     if not selection:
         raise MapError("nothing is selected: click something first")
@@ -97,20 +88,17 @@ def delete(editor: Editor) -> None:
 
 
 def copy(editor: Editor) -> str:
-    """Copy what is selected to the clipboard."""
     selection = whole(editor.selection)
     clipboard.put(copied(editor.sketch, selection))
     return f"copied: {selection.words(editor.sketch)}"
 
 
 def cut(editor: Editor) -> None:
-    """Copy what is selected, and delete it."""
     copy(editor)
     editor.change(properties.deleted(editor.sketch, whole(editor.selection)))
 
 
 def paste(editor: Editor, at: Point | None) -> None:
-    """Paste what is in the clipboard, its middle at a place."""
     text = clipboard.get()
     if not text.strip():
         raise MapError("the clipboard is empty")
@@ -118,7 +106,6 @@ def paste(editor: Editor, at: Point | None) -> None:
 
 
 def duplicate(editor: Editor) -> None:
-    """Duplicate what is selected, to its lower right."""
     by = editor.grid * FAR / 2
     editor.change(transform.duplicated(editor.sketch, selected(editor), by, -by))
 
@@ -134,7 +121,6 @@ def level(editor: Editor) -> None:
 
 
 def nudge(x: int, y: int) -> Run:
-    """Return what moves the selection by so many spacings of the grid."""
 
     def run(editor: Editor) -> None:
         selection = editor.selection
@@ -147,7 +133,6 @@ def nudge(x: int, y: int) -> Run:
 
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
-    """Return the change that moves vertices, or else things, m."""
     act = vertices.moved if selection.vertices else transform.moved
     return act(editor.sketch, selection, dx, dy)
 
@@ -161,7 +146,6 @@ def cancel(editor: Editor) -> None:
 
 
 def select_next(editor: Editor, by: int) -> None:
-    """Select the next obstacle, start or boundary, in the order of the map."""
     order: list[Owner] = [item.key for item in editor.sketch.obstacles if not item.hidden]
     order += [*editor.start_names, *([BOUNDARY] if editor.sketch.boundary is not None else [])]
     if not order:
@@ -172,7 +156,6 @@ def select_next(editor: Editor, by: int) -> None:
 
 
 def one_vertex(editor: Editor) -> Vertex:
-    """Return the one vertex that is selected."""
     if len(editor.selection.vertices) != 1:
         raise MapError("select one vertex first: click an obstacle, then one of its corners")
     (vertex,) = editor.selection.vertices
@@ -196,7 +179,6 @@ def extend(editor: Editor) -> None:
 
 
 def fill(editor: Editor) -> None:
-    """Fill the hole whose vertex is selected."""
     vertex = one_vertex(editor)
     if not isinstance(vertex.of, int) or vertex.ring == 0:
         raise MapError("select a vertex of the hole first")
@@ -217,7 +199,6 @@ def widen(editor: Editor, factor: float) -> None:
 
 
 def next_start(editor: Editor) -> None:
-    """Show the team at the next start."""
     names = editor.start_names
     if not names:
         raise MapError("the map has no start yet: S draws one")
@@ -229,7 +210,6 @@ def next_start(editor: Editor) -> None:
 
 
 def make_default(editor: Editor) -> None:
-    """Make the selected start the map's default."""
     if len(editor.selection.starts) != 1:
         raise MapError("select one start first")
     (name,) = editor.selection.starts
@@ -237,7 +217,6 @@ def make_default(editor: Editor) -> None:
 
 
 def make_areas(editor: Editor) -> None:
-    """Make what is selected areas that count more, as the tool Density is set."""
     tool = editor.tools["density"]
     assert isinstance(tool, DensityTool)
     editor.change(density.areas_made(editor.sketch, selected(editor), tool.weight))
@@ -254,7 +233,6 @@ def fix_problem(editor: Editor) -> None:
 
 
 def next_problem(editor: Editor) -> None:
-    """Show the next problem with its words."""
     found = editor.problems
     if not found:
         editor.problem = None
@@ -263,9 +241,6 @@ def next_problem(editor: Editor) -> None:
     place = found.index(editor.problem) + 1 if editor.problem in found else 0
     editor.problem = found[place % len(found)]
     editor.say(editor.problem.words, trouble=editor.problem.grave)
-
-
-# values that are typed
 
 
 def _number(word: str, text: str, kind: type[_Number]) -> _Number:
@@ -285,7 +260,6 @@ def _set_angle(editor: Editor, text: str) -> None:
 
 
 def _set_length(name: str) -> RunWith:
-    """Return what takes a length for the editor, which may be told by how it is now."""
     return lambda editor, text: editor.set_length(name, length_of(text, now=getattr(editor, name)))
 
 
@@ -346,8 +320,6 @@ def _array(editor: Editor, text: str) -> None:
     dx, dy = (length_of(each.lstrip("-")) * (-1.0 if each.startswith("-") else 1.0) for each in parts[2:])
     editor.change(transform.arrayed(editor.sketch, selected(editor), columns, rows, dx, dy))
 
-
-# the lists
 
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
 """Headings of the help, in their order."""
@@ -504,7 +476,6 @@ _ROWS: dict[str, tuple[tuple[str, str, str, Run | None], ...]] = {
 
 
 def editor_commands(editor: Editor, of_window: Mapping[str, Callable[[], object]]) -> list[Command]:
-    """Return every command, those of the tools and of what is snapped to or shown among them."""
     found = []
     for group, rows in _ROWS.items():
         for name, title, keys, run in rows:
@@ -561,7 +532,6 @@ TYPED: dict[str, tuple[str, RunWith]] = {
 
 
 def typed_commands(editor: Editor) -> list[Command]:
-    """Return the commands with a value after them."""
 
     def run(word: str, text: str) -> None:
         editor.carry_out(lambda: run_typed(editor, word, text))
@@ -577,9 +547,6 @@ def run_typed(editor: Editor, word: str, text: str) -> None:
     if not text.strip():
         raise MapError(f"{word}: a value was wanted after it")
     TYPED[word][1](editor, text.strip())
-
-
-# the menu at the cursor
 
 
 def offered(editor: Editor) -> list[str]:

@@ -92,11 +92,8 @@ class Editor(Workspace):
         self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
         self._about: tuple[object, float] | None = None
 
-    # what there is
-
     @property
     def selector(self) -> SelectTool:
-        """The tool that selects."""
         return self.tools["select"]  # type: ignore[return-value]
 
     @property
@@ -113,12 +110,10 @@ class Editor(Workspace):
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """Problems found so far."""
         return self.measurement.problems if self.measurement is not None else ()
 
     @property
     def start_names(self) -> list[str]:
-        """The starts that a team may be shown at."""
         return [name for name, _ in self.sketch.starts]
 
     @property
@@ -127,8 +122,6 @@ class Editor(Workspace):
         names = self.start_names
         wanted = (*sorted(self.selection.starts), self.start, *names)
         return next((name for name in wanted if name in names), None)
-
-    # changing
 
     def _changed(self) -> None:
         super()._changed()
@@ -147,13 +140,11 @@ class Editor(Workspace):
             self.readings.put(self._about)
 
     def undo(self) -> None:
-        """Take the newest change back."""
         change = self.document.history.undo()
         self.say(f"undone: {change.words}" if change else "nothing to undo")
         self._changed()
 
     def redo(self) -> None:
-        """Do again what was undone last."""
         change = self.document.history.redo()
         self.say(f"done again: {change.words}" if change else "nothing to do again")
         self._changed()
@@ -167,7 +158,6 @@ class Editor(Workspace):
         self._changed()
 
     def put(self, document: Document) -> None:
-        """Put another document in the editor."""
         self.document = document
         self.measurement, self._about = None, None
         self.selector.cancel(self)
@@ -175,17 +165,13 @@ class Editor(Workspace):
         self._changed()
 
     def choose(self, name: str, *, tell: bool = True) -> None:
-        """Take a tool."""
         self.tool.cancel(self)
         self.tool, self.typed = self.tools[name], ""
         self.version += 1
         if tell:
             self.say(self.tool.hint)
 
-    # messages
-
     def attempt(self, action: Callable[[], object]) -> None:
-        """Do something; what cannot be done is told, in a sentence."""
         try:
             self.carry_out(action)
         except RobocovError as error:
@@ -203,7 +189,6 @@ class Editor(Workspace):
 
     @property
     def asked(self) -> Dialog | None:
-        """The dialog that is open."""
         return self.dialogs.asked
 
     def ask(self, title: str, words: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
@@ -212,7 +197,6 @@ class Editor(Workspace):
         self.dialogs.ask(Question(title, words, given, on_cancel=given[-1].call))
 
     def pass_time(self, seconds: float) -> None:
-        """Let the clock go on: old messages go, answers come."""
         self.now += seconds
         if self.message and self.now - self.said > (TROUBLE_FOR if self.trouble else SAID_FOR):
             self.message = ""
@@ -221,23 +205,16 @@ class Editor(Workspace):
             self.measurement = answer
             self.version += 1
 
-    # typing while something is drawn
-
     @property
     def takes_numbers(self) -> bool:
-        """Whether digits are for the tool."""
         tool = self.tool
         return tool.takes_numbers and (tool.busy or tool.begins_typed or bool(self.typed))
 
     def enter(self) -> None:
-        """Give the tool what was typed."""
         text, self.typed = self.typed, ""
         self.attempt(lambda: self.tool.enter(self, text))
 
-    # settings
-
     def switch(self, kind: str, name: str) -> None:
-        """Show something, or snap to it, or not."""
         chosen = self.shown if kind == "show" else self.snaps
         if kind == "snap" and name == "all":
             self.snaps = set() if self.snaps else set(SNAPS)
@@ -249,7 +226,6 @@ class Editor(Workspace):
         self.version += 1
 
     def set_length(self, name: str, length: float) -> None:
-        """Give grid, robots' radius or drawn walls another length, m."""
         most = 10.0 if name == "radius" else 100.0
         if not SMALLEST <= length <= most:
             wanted = f"{SMALLEST:g} to {most:g} m was wanted"
@@ -261,18 +237,15 @@ class Editor(Workspace):
             self.say(f"the grid is {length:g} m")
 
     def change_grid(self, by: int) -> None:
-        """Take the next finer or coarser grid."""
         finer = [each for each in GRIDS if each < self.grid * 0.999] or GRIDS[:1]
         coarser = [each for each in GRIDS if each > self.grid * 1.001] or GRIDS[-1:]
         self.set_length("grid", coarser[0] if by > 0 else finer[-1])
 
     def set_robots(self, count: int) -> None:
-        """Show a team of another size."""
         if not 1 <= count <= 1000:
             raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
         self.version += 1
 
     def add_robots(self, by: int) -> None:
-        """Show a team of more or fewer robots."""
         self.set_robots(min(max(self.robots + by, 1), 1000))

@@ -36,12 +36,10 @@ class FileCommands:
         self.leaving = False
 
     def close(self) -> None:
-        """End what is going on beside the window."""
         if isinstance(self.editor.asked, ImportDialog):
             self.editor.dialogs.close()
 
     def commands(self) -> dict[str, Act]:
-        """Return what the commands do, by their names."""
         return {
             "new": lambda: self.leave(self.new),
             "open": lambda: self._ask_path("Open a map", self.open, _OPENED),
@@ -53,8 +51,6 @@ class FileCommands:
             "background": lambda: self._ask_path("Picture under the map", self.underlay, PICTURES),
             "quit": lambda: self.leave(lambda: setattr(self, "leaving", True)),
         }
-
-    # leaving what is open
 
     def leave(self, then: Act) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
@@ -79,17 +75,13 @@ class FileCommands:
             self.remember(document.path)
         self.editor.say(words)
 
-    # opening
-
     def new(self) -> str:
-        """Put an empty sheet in the editor."""
         self._put(Document.new(self.drafts))
         return "a new map: 10 x 10 m; B draws another boundary"
 
     def _ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
-        """Ask for a file; for one to save to where a name is suggested."""
 
         def chosen(path: Path) -> None:
             self.editor.carry_out(lambda: call(path))
@@ -97,7 +89,6 @@ class FileCommands:
         self.editor.dialogs.ask(file_choice(title, self.editor.folder, chosen, endings=endings, text=text))
 
     def ask_recent(self) -> None:
-        """Ask which of the maps to open that were open lately, or come with robocov."""
         names = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
         names += [Option(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
 
@@ -107,7 +98,6 @@ class FileCommands:
         self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 
     def open(self, path: Path) -> None:
-        """Open a file: a map, or one of a foreign format as a new map."""
         own = self.editor.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
@@ -121,7 +111,6 @@ class FileCommands:
             self.ask_import(path, found)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
-        """Ask how a foreign file is to be imported, and show what would come of it."""
 
         def put(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
@@ -135,26 +124,20 @@ class FileCommands:
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
-        """Go on with work that was left behind."""
         self._put(Document.recovered(draft, self.drafts))
         self.editor.say(f"recovered: {draft.words()}")
 
     def remember(self, path: Path) -> None:
-        """Note a file as one that was open lately."""
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
         self.editor.recent = [name, *(each for each in self.editor.recent if each != name)][:MOST_RECENT]
 
-    # saving
-
     def save(self, then: Act | None = None) -> str | None:
-        """Save to the document's file; ask for one if it has none."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
     def ask_name(self, then: Act | None = None) -> None:
-        """Ask where to save."""
         folder = self.editor.folder
         suggested = self.editor.document.suggested(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
@@ -185,10 +168,7 @@ class FileCommands:
         answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
         self.editor.ask(title, words, *answers)
 
-    # exporting
-
     def ask_export(self) -> None:
-        """Ask where to write the map in a foreign format, which goes by the suffix."""
         self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
@@ -205,10 +185,7 @@ class FileCommands:
         files = ", ".join(map(str, report.files))
         return "; ".join([f"exported: {files}", *report.warnings, *report.dropped])
 
-    # what happens on the disk
-
     def look(self) -> None:
-        """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
         editor = self.editor
         if isinstance(asked := editor.asked, ImportDialog) and (imported := asked.poll()) is not None:
             editor.dialogs.close()
@@ -224,7 +201,6 @@ class FileCommands:
             editor.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
-        """Read the file again."""
         if self.editor.document.path is None:
             raise MapError("the map has no file yet")
         self.editor.document.reload()
@@ -233,10 +209,7 @@ class FileCommands:
         self.editor.ask_readings()
         return f"read again: {self.editor.document.title}"
 
-    # the picture under the map
-
     def underlay(self, path: Path) -> None:
-        """Put a picture under the map."""
         lay_under(self.editor, path)
         self.editor.choose("picture")
         self._fit()
@@ -289,7 +262,6 @@ def opened(path: Path, drafts: Path | None) -> Document | Importer:
 
 
 def heading(document: Document) -> str:
-    """Return what is said of a document that was opened."""
     if document.path is None:
         return f"{document.title}: opened as a copy"
     if not document.path.exists():

@@ -56,8 +56,6 @@ class ImportDialog(Dialog):
         self._picture: Latest[Surface] = Latest()
         self._ask()
 
-    # what is set
-
     def set(self, name: str, text: str) -> None:
         """Give an option a text; the default's or none takes it back."""
         option = next(each for each in self.options if each.name == name)
@@ -68,19 +66,15 @@ class ImportDialog(Dialog):
         self._ask()
 
     def keep_inside(self, place: tuple[float, float]) -> None:
-        """Keep the part of the free space that holds a place, m."""
         self.given.pop("keep", None)
         self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
-        """Return what is set."""
         given = self.given
         values = {each.name: each.value(given[each.name]) for each in self.options if each.name in given}
         of_reading = {field.name for field in fields(ReadOptions)}
         read = {name: value for name, value in values.items() if name in of_reading}
         return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
-
-    # what comes of it
 
     def _ask(self) -> None:
         self.accepted = False
@@ -103,34 +97,26 @@ class ImportDialog(Dialog):
 
     @property
     def busy(self) -> bool:
-        """Whether it is being imported."""
         return not self._mistake and self._worker.busy
 
     @property
     def trouble(self) -> str:
-        """Why it cannot be imported as it is set."""
         return self._mistake or ("" if self._worker.busy else self._worker.trouble)
 
     @property
     def ready(self) -> bool:
-        """Whether what was imported is what is set."""
         return self.imported is not None and not self.busy and not self.trouble
 
-    # the dialog
-
     def key(self, name: str, ui: Ui) -> bool:
-        """Import by Enter; other keys are for the fields."""
         if name in ("return", "enter") and ui.open_list is None:
             self.accepted = True
             return True
         return False
 
     def cancelled(self) -> None:
-        """End what works on it."""
         self._worker.close()
 
     def page(self, ui: Ui) -> None:
-        """Show options, maps and report."""
         left, top, wide = ui.x, ui.y, ui.wide
         high = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
         ui.wide = _COLUMN
@@ -209,8 +195,6 @@ class ImportDialog(Dialog):
         ui.label("importing…" if self.busy and self.imported is not None else _HINT, style="unit")
         ui.end_row()
 
-    # the maps
-
     def _place(self, box: Rect, imported: Imported, scale: float) -> float:
         """Place the two maps at the top of a box; return the height that they take, px."""
         low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
@@ -268,7 +252,6 @@ class ImportDialog(Dialog):
 def _maps(
     size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
-    """Return a picture, else transparent, of the map as it was read and as it became."""
     compared = imported.comparison
     picture = Surface(size, pygame.SRCALPHA)
     before = (compared.before, compared.lost, theme.trajectory)

@@ -29,7 +29,6 @@ class Option:
     help: str
 
     def value(self, text: str) -> Any:
-        """Return what a text means."""
         if self.kind == "choice":
             return True if text == ON else text
         if self.kind == "words":
@@ -47,7 +46,6 @@ class Option:
 
 
 def options_of(importer: Importer) -> tuple[Option, ...]:
-    """Return the options that mean something for a format, those of reading first."""
     reading = [option for option in _options(ReadOptions) if option.name in importer.options]
     return (*reading, *_options(Shaping))
 
@@ -102,7 +100,6 @@ class Importing:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
 
     def __call__(self, questions: list[Continuation], line: Line) -> Imported:
-        """Import what was wanted last."""
         last = questions[-1]
         key = last.path, last.format, last.options
         if self._read is None or self._read[0] != key:

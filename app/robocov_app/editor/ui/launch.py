@@ -89,7 +89,6 @@ def editor_window(
 
 
 def offer(window: EditorWindow, found: Sequence[Autosave]) -> None:
-    """Offer work that was left behind, the newest first."""
     if not found:
         return
     draft, rest = found[0], found[1:]
@@ -110,7 +109,6 @@ def offer(window: EditorWindow, found: Sequence[Autosave]) -> None:
 
 
 def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
-    """Return what is worth remembering of a window."""
     editor = window.editor
     width, height = window.windowed or window.screen.get_size()
     changes = {

@@ -35,7 +35,6 @@ class Field(NamedTuple):
     tip: str = ""
 
     def shown(self, editor: Editor) -> str:
-        """Return what the field shows; nothing where there is no such value."""
         try:
             return self.text(editor)
         except (MapError, LookupError):
@@ -133,7 +132,6 @@ def _note(editor: Editor, text: str) -> None:
 
 
 def _measure(editor: Editor, name: str, kinds: UnionType | type) -> str:
-    """Return the width or radius that all selected things of these kinds have."""
     found = {getattr(thing, name) for thing in _selected_things(editor) if isinstance(thing, kinds)}
     return number(found.pop()) if len(found) == 1 else ""
 
@@ -162,7 +160,6 @@ def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
 
 
 def _typed(word: str, tip: str) -> Field:
-    """Return a field of the editor's own values, which can also be typed after a command."""
     return Field(
         lambda editor: number(getattr(editor, KEPT[word])),
         lambda editor, text: run_typed(editor, word, text),
@@ -267,12 +264,10 @@ class Panel(SidePanel):
         super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:
-        """Turn to a page."""
         if name in TABS:
             self.tab, self.ui.stale = name, True
 
     def update(self) -> None:
-        """Let the page be drawn anew when something that it shows is different."""
         editor = self.editor
         (sketch, selection), unsaved = editor.preview, editor.document.unsaved
         shows = (editor.version, self.tab, id(sketch), selection, id(editor.measurement), unsaved)
@@ -280,11 +275,8 @@ class Panel(SidePanel):
             self._drawn, self.ui.stale = shows, True
 
     def focus(self, name: str) -> None:
-        """Let keys go into a field of the open page."""
         self.ui.run(None, None)
         self.ui.set_focus(name)
-
-    # the page
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
@@ -328,7 +320,6 @@ class Panel(SidePanel):
             self._do(f"{kind}:{name}")
 
     def _field(self, ui: Ui, name: str, word: str, unit: str = "") -> None:
-        """Show a field between its word and its unit, each in a cell of its own."""
         editor, field = self.editor, FIELDS[name]
         ui.label(word, key=f"word:{name}", tip=field.tip)
         given = ui.text_entry(name, field.shown(editor), tip=field.tip)
@@ -349,8 +340,6 @@ class Panel(SidePanel):
         ui.row(_NAME, 0)
         self._field(ui, name, word)
         ui.row()
-
-    # pages
 
     def _map(self, ui: Ui) -> None:
         with ui.scroll("map"):
@@ -469,10 +458,7 @@ class Panel(SidePanel):
                 if ui.option(done, aside, key=f"step:{k}", chosen=count == 0):
                     self.editor.travel(count)
 
-    # lists
-
     def _things(self, ui: Ui) -> None:
-        """Show all things of the map, the topmost first, also those that are locked or hidden."""
         editor, sketch = self.editor, self.editor.sketch
         things: list[tuple[Owner, str]] = []
         for item in reversed(sketch.obstacles):
@@ -488,7 +474,6 @@ class Panel(SidePanel):
                     self._pick(Selection.of(owner), editor.selection.without_vertices())
 
     def _vertices(self, ui: Ui) -> None:
-        """Show the vertices of what is selected, with their coordinates; in a drag, where they are by now."""
         editor = self.editor
         found = [vertex for owner in editor.handled for vertex, _ in points_of(editor.sketch, owner)]
         with ui.scroll("vertices"):
@@ -506,7 +491,6 @@ class Panel(SidePanel):
 
 
 def object_kind(editor: Editor) -> str:
-    """Return what kind of thing is selected, on which it depends what the page offers."""
     selection = editor.selection
     if not selection:
         return "nothing"
@@ -528,7 +512,6 @@ def object_kind(editor: Editor) -> str:
 
 
 def object_words(editor: Editor) -> str:
-    """Return what the object page is about."""
     selection = editor.selection
     if selection.vertices:
         return f"{selection.words(editor.sketch)} of {whole(selection).words(editor.sketch)}".upper()

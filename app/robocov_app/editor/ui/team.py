@@ -20,7 +20,6 @@ class Team:
 
 
 def placed(sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> Team:
-    """Return where a team would stand, or why it cannot."""
     try:
         points = sketch.environment().start(start).sample(robots, seed=seed, radius=radius)
     except Exception as error:  # what nobody has foreseen must not end the window either
@@ -38,7 +37,6 @@ class TeamThread:
 
     @property
     def busy(self) -> bool:
-        """Whether an answer is to come."""
         return self._answer is not None
 
     def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
@@ -59,5 +57,4 @@ class TeamThread:
         return answer
 
     def close(self) -> None:
-        """End the thread."""
         self._pool.shutdown(cancel_futures=True)

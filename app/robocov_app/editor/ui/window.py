@@ -52,11 +52,9 @@ class Pointer:
 
     @property
     def dragging(self) -> bool:
-        """Whether a button is held down on something."""
         return bool(self._drag)
 
     def take(self, event: pygame.event.Event, now: float) -> None:
-        """Take an event of the mouse at a time in seconds."""
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
         taken = not self._drag and self._panel.take(event)
@@ -73,7 +71,6 @@ class Pointer:
             self._canvas.zoom(WHEEL ** wheel_notches(event), self.at)
 
     def aim(self, pixel: tuple[int, int]) -> PointerEvent:
-        """Return where a pixel means, with what is held down on the keyboard."""
         raw, reach = self._canvas.to_world(pixel), self._canvas.reach
         editor, tool, held, point = self._editor, self._editor.tool, pygame.key.get_mods(), raw
         ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
@@ -85,7 +82,6 @@ class Pointer:
         return PointerEvent(point, raw, reach, shift, alt, ctrl)
 
     def leave(self) -> None:
-        """The mouse is not in the window any more."""
         self._editor.cursor = self._canvas.at = self._canvas.hovered = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
@@ -145,7 +141,6 @@ class Pointer:
                 self._menu(event.pos)
 
     def show(self) -> None:
-        """Let the cursor tell what a press would do."""
         canvas, editor = self._canvas, self._editor
         if inside(canvas.layout.panel, self.at):
             self._shape = -1  # the panel has set its own
@@ -227,10 +222,7 @@ class EditorWindow(BaseWindow):
         editor.ask_readings()
         self.draw()
 
-    # frames
-
     def close(self) -> None:
-        """End what is going on beside the window."""
         if self.trial is not None:
             self.trial.close()
         self.team.close()
@@ -254,7 +246,6 @@ class EditorWindow(BaseWindow):
         )
 
     def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
         editor, self.scale = self.editor, scale
         editor.theme, editor.panel = theme, editor.panel if panel is None else panel
         editor.version += 1
@@ -262,7 +253,6 @@ class EditorWindow(BaseWindow):
             self.trial.suit(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
-        """Let so many seconds pass."""
         if self.trial is not None:
             self._play(self.trial, seconds)
             return
@@ -303,7 +293,6 @@ class EditorWindow(BaseWindow):
         self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
         if self.trial is not None:
             self.trial.draw()
             return
@@ -321,10 +310,7 @@ class EditorWindow(BaseWindow):
         self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
 
-    # doing
-
     def do(self, name: str) -> None:
-        """Do the command of this name."""
         self.menu = None
         if name == "cancel" and self.help:
             self.help = False
@@ -342,7 +328,6 @@ class EditorWindow(BaseWindow):
             self.canvas.go_to(self.editor.problem)
 
     def open_palette(self, text: str = "") -> None:
-        """Open the palette, with the beginning of a command."""
 
         def told(words: str) -> None:
             self.editor.version += 1
@@ -383,7 +368,6 @@ class EditorWindow(BaseWindow):
         return left + width / 2, top + height / 2
 
     def _name(self) -> None:
-        """Go to the field with the name of what is selected, or of the map."""
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
         self.editor.panel = True
         self._arrange()
@@ -401,10 +385,7 @@ class EditorWindow(BaseWindow):
         found = [self.commands[name] if name else None for name in offered(editor)]
         self.menu = Menu(found, pixel, self.do)
 
-    # trying
-
     def try_it(self) -> None:
-        """Begin the demo on the map."""
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
             self.editor.selector.cancel(self.editor)
         trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
@@ -438,10 +419,7 @@ class EditorWindow(BaseWindow):
         else:
             self.draw()
 
-    # events
-
     def take(self, event: pygame.event.Event) -> None:
-        """Take one event."""
         if self.trial is not None:
             self.trial.take(event)
             return
