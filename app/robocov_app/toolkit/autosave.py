@@ -13,6 +13,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
+from platformdirs import user_state_path
+
 from robocov.errors import MapError, OutputError
 from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
@@ -61,16 +63,19 @@ class Autosaver:
         self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
         self._thread.start()
         if resumed is None:
-            self._want(None)  # so that other programs know of the file
+            self.keep(None)  # so that other programs know of the file
 
-    def keep(self, content: _Content) -> None:
+    def keep(self, content: _Content | None) -> None:
         """Keep work that is not saved; only the newest counts, and it is asked for in the thread."""
-        self._want(content)
+        with self._changed:
+            if self._place is not None and not self._closed:
+                self._wanted = self._path, content
+                self._changed.notify_all()
 
     def settle(self, path: Path | None) -> None:
         """Forget what was kept: the document was saved, or opened anew."""
         self._path = path
-        self._want(None)
+        self.keep(None)
 
     def flush(self, timeout: float = 5.0) -> bool:
         """Wait until everything is on the disk; return whether it is."""
@@ -114,12 +119,6 @@ class Autosaver:
             return place
         return None
 
-    def _want(self, content: _Content | None) -> None:
-        with self._changed:
-            if self._place is not None and not self._closed:
-                self._wanted = self._path, content
-                self._changed.notify_all()
-
     def _work(self) -> None:
         pause = 0.0
         while True:
@@ -158,28 +157,22 @@ class Autosaver:
 
 
 def autosave_folder() -> Path | None:
-    named = os.environ.get(FOLDER)
-    if named is not None:
-        return Path(named) if named else None
-    from platformdirs import user_state_path
-
-    return user_state_path("robocov", appauthor=False) / "drafts"
+    folder = os.environ.get(FOLDER, str(user_state_path("robocov", appauthor=False) / "drafts"))
+    return Path(folder) if folder else None
 
 
 def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work | None]) -> tuple[_Work, ...]:
     """Return what `read` makes of work that ended programs left, the newest first; remove empty folders."""
     found = []
     for place in _places(folder):
-        try:
+        with suppress(OutputError, MapError, OSError):  # in use, or not to be read
             with locked(place):
                 record = read_record(place, kind) if (place / _FILE).exists() else None
                 work = None if record is None else read(record)
-        except (OutputError, MapError, OSError):  # in use, or not to be read
-            continue
-        if record is not None and work is not None:
-            found.append((record.when, work))
-        elif _age(place) > _YOUNG:
-            shutil.rmtree(place, ignore_errors=True)
+            if record is not None and work is not None:
+                found.append((record.when, work))
+            elif time.time() - place.stat().st_mtime > _YOUNG:
+                shutil.rmtree(place, ignore_errors=True)
     return tuple(work for _, work in sorted(found, key=lambda pair: pair[0], reverse=True))
 
 
@@ -217,14 +210,7 @@ def read_record(folder: Path, kind: str) -> Record:
 
 
 def _places(folder: Path | None) -> list[Path]:
-    if folder is None:
+    try:
+        return sorted(place for place in folder.iterdir() if place.is_dir()) if folder is not None else []
+    except OSError:
         return []
-    with suppress(OSError):
-        return sorted(place for place in folder.iterdir() if place.is_dir())
-    return []
-
-
-def _age(place: Path) -> float:
-    with suppress(OSError):
-        return time.time() - place.stat().st_mtime
-    return 0.0

@@ -11,7 +11,7 @@ from pygame import Rect, Surface
 from robocov.errors import InputError, unknown_name
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import Theme, mix
-from robocov_app.toolkit.dialogs import Choice, Option
+from robocov_app.toolkit.dialogs import Choice, Dialog, Option
 from robocov_app.toolkit.input import key_of, key_words
 from robocov_app.toolkit.overlay import card, dim
 from robocov_app.toolkit.ui import SMALL, TEXT, Ui
@@ -64,9 +64,6 @@ class Commands:
     def __getitem__(self, name: str) -> Command:
         return self._named[name]
 
-    def __contains__(self, name: object) -> bool:
-        return name in self._named
-
     def do(self, name: str) -> None:
         self._do(self._named[name])
 
@@ -79,12 +76,6 @@ class Commands:
         held = event.key in self._down
         self._down.add(event.key)
         return None if command is None or (held and not command.repeats) else command
-
-    def press(self, event: pygame.event.Event) -> bool:
-        command = self.of_key(event)
-        if command is not None:
-            self._do(command)
-        return command is not None
 
     def release(self, event: pygame.event.Event) -> None:
         self._down.discard(event.key)
@@ -175,19 +166,19 @@ def palette(commands: Commands, ghost: str, told: Callable[[str], object]) -> Ch
     return Choice("", commands.offered, accept, ghost, hint)
 
 
-class Menu:
+class Menu(Dialog):
     """Commands to choose from at a place of the window, None for a line between groups."""
+
+    margin = 5.0, 5.0
+    veils, closes_beside = False, True
 
     def __init__(
         self, rows: Sequence[Command | None], at: tuple[int, int], do: Callable[[str], object]
     ) -> None:
         self.commands, self.at, self._do = rows, at, do
-        self.open = True
         self.chosen = -1
-        self._ui: Ui | None = None
 
-    def _page(self, ui: Ui) -> None:
-        ui.inset(5, 5, 5)
+    def page(self, ui: Ui) -> None:
         for k, command in enumerate(self.commands):
             ui.row(height=7 if command is None else 24, below=0)
             if command is None:
@@ -198,49 +189,27 @@ class Menu:
                 self._choose(command)
 
     def _choose(self, command: Command) -> None:
-        self.open = False
+        self.done = True
         self._do(command.name)
 
-    def take(self, event: pygame.event.Event) -> bool:
-        if event.type == pygame.KEYDOWN:
-            self._key(key_of(event))
-        elif event.type == pygame.MOUSEBUTTONDOWN and self._ui is not None:
-            self.open = self._ui.box.collidepoint(event.pos)
-            return self._ui.take(event) or not self.open
-        elif self._ui is not None:
-            self._ui.take(event)
-        keys = (pygame.KEYDOWN, pygame.KEYUP, pygame.TEXTINPUT)
-        return event.type in (*keys, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION)
-
-    def _key(self, name: str) -> None:
+    def key(self, name: str, ui: Ui) -> bool:
         usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
         by = {"up": -1, "down": 1}.get(name, 0)
-        if name == "escape":
-            self.open = False
-        elif by and usable:
+        if by and usable:
             k = usable.index(self.chosen) + by if self.chosen in usable else (0 if by > 0 else -1)
             self.chosen = usable[k % len(usable)]
         elif name in ("return", "enter") and self.chosen in usable:
             command = self.commands[self.chosen]
             assert command is not None
             self._choose(command)
+        return True
 
-    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
-            self._ui = Ui(self._page, theme, scale)
-            self._ui.background = None
-        wide = round(50 * scale) + max(
-            text_width(each.title, round(TEXT * scale)) + text_width(_keys(each), round(SMALL * scale))
-            for each in self.commands
-            if each is not None
-        )
-        high = round(sum(7 if each is None else 24 for each in self.commands) * scale + 10 * scale)
-        box = Rect(*self.at, wide, high)
-        self._ui.box = box.clamp(screen.get_rect())
-        card(screen, self._ui.box, theme, scale)
-        self._ui.stale = True
-        self._ui.draw(screen)
-        self._ui.draw_over(screen)
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        title, keys = round(TEXT * scale), round(SMALL * scale)
+        listed = [each for each in self.commands if each is not None]
+        widths = [text_width(each.title, title) + text_width(_keys(each), keys) for each in listed]
+        box.update(self.at, (round(50 * scale) + max(widths), box.height))
+        box.clamp_ip(screen)
 
 
 def _keys(command: Command) -> str:

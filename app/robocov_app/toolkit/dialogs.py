@@ -21,8 +21,6 @@ from robocov_app.toolkit.ui import TEXT, Ui
 MOST_LISTED = 5000  # names of a folder that are looked at
 ROWS = 9  # lines of a list that are in sight
 _MOST_LINES = 14
-_MARGIN = 20.0
-
 _NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 
 
@@ -30,11 +28,24 @@ class Dialog(ABC):
     """Something that is asked, in a card over the window."""
 
     width = 560.0
+    margin = 20.0, 16.0  # beside and above what is in it, px at scale 1
+    veils = True  # whether all else steps back
+    closes_beside = False  # whether a press beside it gives it up
     done = False
 
     @abstractmethod
     def page(self, ui: Ui) -> None:
         """Show it."""
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        box.midtop = screen.width // 2, max(round((screen.height - box.height) * 0.42), 0)
+
+    def framed(self, ui: Ui) -> None:
+        """Show it, and leave its margin around it: the page of its `Ui`."""
+        side, above = self.margin
+        ui.inset(side, above, side)
+        self.page(ui)
+        ui.space(above)
 
     @abstractmethod
     def key(self, name: str, ui: Ui) -> bool:
@@ -120,6 +131,7 @@ class Choice(Dialog):
     """A list that typing narrows down; an error of `accept` is told below, and nothing typed is lost."""
 
     width = 620.0
+    closes_beside = True
 
     title: str
     options: Callable[[str], Sequence[Option]]  # the lines for what is typed
@@ -153,6 +165,9 @@ class Choice(Dialog):
         ui.row(height=22, below=0)
         more = f"{len(found)} in all · " if len(found) > ROWS else ""
         ui.label(more + self.hint, style="unit", at="center")
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        box.midtop = screen.width // 2, round(64 * scale)
 
     def typed(self, ui: Ui) -> None:
         """Take note of what the field holds: letters and Enter may come within one frame."""
@@ -202,7 +217,6 @@ class Choice(Dialog):
 def list_choice(
     title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
 ) -> Choice:
-
     def found(typed: str) -> list[Option]:
         words = typed.lower().split()
         lines = [(each, f"{each.text} {each.aside}".lower()) for each in options()]
@@ -275,7 +289,6 @@ class Dialogs:
     def __init__(self) -> None:
         self.asked: Dialog | None = None
         self._ui: Ui | None = None
-        self._high = 0.0
         self._swallow = ""
         self._drawn = False  # whether it was, since it is asked
 
@@ -297,11 +310,13 @@ class Dialogs:
 
     def take(self, event: pygame.event.Event) -> bool:
         """Take an event; return whether something is asked, which takes all of mouse and keyboard."""
-        asked, ui = self.asked, self._ui
+        asked = self.asked
         if asked is None:
             return False
-        if ui is None:  # keys come before it was drawn
-            ui = self._made(asked, LIGHT, 1.0)
+        if event.type == pygame.DROPFILE and not asked.veils:
+            self.close()
+            return False
+        ui = self._ui or self._made(asked, LIGHT, 1.0)  # keys come before it was drawn
         if not self._drawn and event.type in OF_THE_MOUSE:
             return True
         ui.stale = True
@@ -310,16 +325,20 @@ class Dialogs:
             if event.text == swallowed:
                 return True
         if event.type == pygame.KEYDOWN:
-            self._key(asked, ui, event)
+            name, self._swallow = key_of(event), ""
+            composing = ui.edit is not None and bool(ui.edit.composed)
+            if name == "escape" and not composing:
+                self.close()
+            elif composing or not asked.key(name, ui):
+                ui.take(event)
             if self.asked is not asked:  # it was answered, and that asks something else
                 self.swallow(event.unicode)
         elif event.type == pygame.MOUSEWHEEL:
             asked.wheel(wheel_notches(event))
-        elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):
-            if isinstance(asked, Choice):
-                self.close()
-        else:
+        elif event.type != pygame.MOUSEBUTTONDOWN or ui.box.collidepoint(event.pos):
             ui.take(event)
+        elif asked.closes_beside:
+            self.close()
         if isinstance(asked, Choice):
             asked.typed(ui)
         if asked.done and self.asked is asked:
@@ -327,41 +346,25 @@ class Dialogs:
         return event.type not in _NOT_OURS
 
     def _made(self, asked: Dialog, theme: Theme, scale: float) -> Ui:
-        def page(ui: Ui) -> None:
-            ui.inset(_MARGIN, _MARGIN - 4, _MARGIN)
-            asked.page(ui)
-            ui.end_row()
-            self._high = ui.y + _MARGIN - 4
-
-        self._ui = ui = Ui(page, theme, scale)
-        self._high = 0.0
+        self._ui = ui = Ui(asked.framed, theme, scale)
         ui.background = None
         ui.box = Rect(0, 0, round(asked.width * scale), 100)
         ui.run(None, None)
         return ui
 
-    def _key(self, asked: Dialog, ui: Ui, event: pygame.event.Event) -> None:
-        name, self._swallow = key_of(event), ""
-        composing = ui.edit is not None and bool(ui.edit.composed)
-        if name == "escape" and not composing:
-            self.close()
-        elif composing or not asked.key(name, ui):
-            ui.take(event)
-
     def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        asked = self.asked
+        asked, ui = self.asked, self._ui
         if asked is None:
             return
-        ui, self._drawn = self._ui, True
+        self._drawn = True
         if ui is None or ui.theme is not theme or ui.scale != scale:
             ui = self._made(asked, theme, scale)
-        dim(screen, theme)
+        if asked.veils:
+            dim(screen, theme)
         wide = min(asked.width * scale, screen.get_width() - 24 * scale)
         for _ in range(2):  # its height is known after it has run
-            high = min(round(self._high * scale) or 100, screen.get_height())
-            ui.box = Rect(0, 0, round(wide), high)
-            top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
-            ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
+            ui.box = Rect(0, 0, round(wide), min(round(ui.y * scale), screen.get_height()))
+            asked.place(ui.box, screen.get_rect(), scale)
             ui.run(None, None)
         card(screen, ui.box, theme, scale)
         ui.stale = True

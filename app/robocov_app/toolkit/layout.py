@@ -87,7 +87,7 @@ def largest_scale(size: tuple[int, int]) -> float:
     return max(floor(8 * min(size[0] / least[0], size[1] / least[1])) / 8, 0.25)
 
 
-def inside(box: Box, pixel: tuple[float, float]) -> bool:
+def inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
     """Return whether a pixel is in a box.
 
     >>> inside((10, 10, 5, 5), (14, 10)), inside((10, 10, 5, 5), (15, 10))

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import TypeVar
 
+from platformdirs import user_config_path
 from pydantic import BaseModel
 
 from robocov.errors import OutputError
@@ -15,13 +16,8 @@ Kept = TypeVar("Kept", bound=BaseModel)
 
 
 def settings_file(name: str = "window.json") -> Path | None:
-    """Return where the settings are kept, None where they are not to be."""
-    named = os.environ.get(FOLDER)
-    if named is not None:
-        return Path(named) / name if named else None
-    from platformdirs import user_config_path
-
-    return user_config_path("robocov", appauthor=False) / name
+    folder = os.environ.get(FOLDER, str(user_config_path("robocov", appauthor=False)))
+    return Path(folder) / name if folder else None
 
 
 def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:

@@ -14,7 +14,7 @@ Keys of widgets are unique within a page. Where `why` is given a widget is disab
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -34,9 +34,10 @@ from robocov_app.toolkit.text_edit import TextEdit
 TEXT = 12.0  # a widget's text
 SMALL = 11.0  # the text of small buttons, headings and units
 BAR = 10.0  # width of a scroll bar
+MARGIN = 12.0  # of a panel, in which its scroll bar is
 LONGEST_LIST = 268.0  # greatest height of an open list
 LIST_ROW = 24.0
-_KNOB, _TALLEST = 12.0, 32.0  # a slider's knob, a button in a row that is higher
+_TALLEST = 32.0  # a button in a row that is higher
 _NOTCH = 40.0
 
 TIP_AFTER = 0.6  # seconds for which the mouse rests before a tool tip appears
@@ -67,7 +68,7 @@ class _List:
     options: list[str]
     rect: Rect
     row: int
-    chosen: int
+    chosen: int = 0
     top: float = 0.0
     picked: str | None = None
 
@@ -114,9 +115,7 @@ class Ui:
         self._heights: dict[str, float] = {}
         self._hot = ""
         self._rested = perf_counter()
-        self._tipped = False
         self._clicked = (-1.0, "")
-        self._order: list[str] = []
         self._again = False
         self._grabbed = 0.0
         self._begin()
@@ -126,8 +125,14 @@ class Ui:
         self._clip = self.box
         self._cells: list[tuple[float, float]] = []
         self._next, self._height, self._below = 0, 26.0, 6.0
-        self._order = []
         self.shown = {}
+
+    @property
+    def _order(self) -> list[str]:
+        """Keys of what can have the focus, in the order of Tab."""
+        return [
+            each.key for each in self.shown.values() if each.enabled and each.kind not in ("label", "bar")
+        ]
 
     def run(self, event: pygame.event.Event | None, surface: Surface | None) -> None:
         """Run the page for an event, for a drawing, or to learn how high it is."""
@@ -149,23 +154,33 @@ class Ui:
         if kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
             return self.box.collidepoint(event.pos)
         if kind in (pygame.MOUSEBUTTONDOWN, pygame.KEYDOWN):
-            self._rested, self._tipped = perf_counter(), False
+            self._rested = perf_counter()
         if self.open_list is not None and self._list_takes(event):
             return True
-        if kind == pygame.KEYDOWN and not self._key_is_ours(key_of(event)):
-            return False
+        if kind == pygame.KEYDOWN:
+            name = key_of(event)
+            if self.focus is None or (self.edit is not None and _is_function_key(name)):
+                return False
+            if name in ("tab", "shift+tab"):
+                self.move_focus(-1 if "shift" in name else 1)
+            elif name == "escape":
+                self.stop_typing()
+            elif self.edit is None and name not in (*_ENTER, "space", "left", "right", "up", "down"):
+                return False
         if kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
-            if self.edit is not None and kind == pygame.TEXTEDITING:
+            if self.edit is None:
+                return False
+            if kind == pygame.TEXTEDITING:
                 self.edit.composed = event.text
-            elif self.edit is not None:
+            else:
                 self.edit.type(event.text)
-            self.stale |= self.edit is not None
-            return self.edit is not None
+            self.stale = True
+            return True
         if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
             return False
         if kind == pygame.MOUSEBUTTONDOWN and self.focus is not None:
-            pressed = [each.key for each in self.shown.values() if each.rect.collidepoint(event.pos)]
-            if self.focus not in pressed:
+            shown = self.shown.values()
+            if not any(each.key == self.focus and each.rect.collidepoint(event.pos) for each in shown):
                 self.stop_typing()
         self.stale = True
         self.run(event, None)
@@ -182,25 +197,12 @@ class Ui:
             return True
         under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
         if under != self._hot:
-            self._hot, self._rested, self._tipped, self.stale = under, perf_counter(), False, True
+            self._hot, self._rested, self.stale = under, perf_counter(), True
         return self.box.collidepoint(event.pos)
 
     def _under(self) -> Iterator[Shown]:
         if self.open_list is None and self.box.collidepoint(self.at):
             yield from (each for each in self.shown.values() if each.rect.collidepoint(self.at))
-
-    def _key_is_ours(self, name: str) -> bool:
-        if self.focus is None:
-            return False
-        if name in ("tab", "shift+tab"):
-            self.move_focus(-1 if "shift" in name else 1)
-            return True
-        if name == "escape":
-            self.stop_typing()
-            return True
-        if self.edit is not None:
-            return not _is_function_key(name)
-        return name in (*_ENTER, "space", "left", "right", "up", "down")
 
     def draw(self, screen: Surface) -> None:
         if self.stale or self._picture is None or self._picture.get_size() != self.box.size:
@@ -217,24 +219,12 @@ class Ui:
             return
         screen.blit(self._picture, self.box)
 
-    @property
-    def due(self) -> float | None:
-        """Seconds until a tool tip appears, None where none will."""
-        shown = self._tip_of()
-        return max(self._rested + TIP_AFTER - perf_counter(), 0.0) if shown and not self._tipped else None
-
-    def _tip_of(self) -> Shown | None:
-        return next((each for each in self._under() if each.tip), None) if self.active is None else None
-
     def draw_over(self, screen: Surface) -> None:
         if self.open_list is not None:
             self._draw_list(screen, self.open_list)
-        tipped = self._tip_of()
-        if tipped is not None and perf_counter() - self._rested >= TIP_AFTER:
-            self._tipped = True
-            self._draw_tip(screen, tipped)
-
-    def _draw_tip(self, screen: Surface, tipped: Shown) -> None:
+        tipped = next((each for each in self._under() if each.tip), None)
+        if tipped is None or self.active is not None or perf_counter() - self._rested < TIP_AFTER:
+            return
         size, theme = self.px(SMALL), self.theme
         lines = wrapped(tipped.tip, size, self.px(240))
         high = self.px(SMALL + 5)
@@ -314,15 +304,15 @@ class Ui:
 
     @property
     def rest(self) -> Rect:
-        top = self.box.top + self.px(self.y + (self._height + self._below if self._next else 0.0))
-        left = self.box.left + self.px(self.x)
+        """Rest of the box below the last row that was ended, px."""
+        left, top = self.box.left + self.px(self.x), self.box.top + self.px(self.y)
         return Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
 
     @contextmanager
-    def scroll(self, key: str, height: float | None = None, margin: float = 12.0) -> Iterator[None]:
-        """Scroll what is within, where it needs more height than there is; `margin` is right of the bar."""
+    def scroll(self, key: str) -> Iterator[None]:
+        """Scroll what is within, where it needs more height than there is."""
         self.end_row()
-        room = self.rest.height / self.scale if height is None else height
+        room = self.rest.height / self.scale
         before = self.x, self.y, self.wide, self._clip
         rect = Rect(self.box.left, self.rest.top, self.box.width, self.px(room))
         needed = self._heights.get(key, 0.0)
@@ -330,7 +320,7 @@ class Ui:
         top = self._scrolled[key] = min(max(self._scrolled.get(key, 0.0), 0.0), beyond)
         if beyond:
             top = self._bar(key, rect, needed, top)
-            self.wide -= max(BAR + 4 - margin, 0.0)
+            self.wide -= BAR + 4 - MARGIN
         self._clip = self._clip.clip(rect)
         if self.surface is not None:
             self.surface.set_clip(self._clip)
@@ -399,9 +389,8 @@ class Ui:
         return self._is(pygame.MOUSEBUTTONDOWN) and self._hovers(rect)
 
     def _key(self, key: str) -> str:
-        event = self._event
-        for_it = event is not None and event.type == pygame.KEYDOWN and self.focus == key
-        return key_of(event) if event is not None and for_it else ""
+        event = self._event if self.focus == key else None
+        return key_of(event) if event is not None and event.type == pygame.KEYDOWN else ""
 
     def _note(
         self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
@@ -416,7 +405,6 @@ class Ui:
         self._note(kind, key, rect, text, value, tip, why)
         if why:
             return False
-        self._order.append(key)
         if self._pressed(rect):
             self.active, self._event = key, None
         elif self._is(pygame.MOUSEBUTTONUP) and self.active == key:
@@ -531,23 +519,22 @@ class Ui:
         rect = self.cell()
         return rect, self._clicks("area", key, rect, "", None)
 
-    def tabs(self, key: str, names: Sequence[str], now: str, *widths: float) -> str | None:
+    def tabs(
+        self, key: str, names: Sequence[str], now: str, *widths: float, titles: Mapping[str, str] = {}
+    ) -> str | None:
         """Show buttons side by side of which one is chosen; return another one that was."""
         self.row(*(widths or [0.0] * len(names)), below=8)
         found = None
         for name in names:
-            title = name[:1].upper() + name[1:]
-            if self.button(title, key=f"{key}:{name}", chosen=name == now, small=True) and name != now:
+            title, chosen = titles.get(name, name.capitalize()), name == now
+            if self.button(title, key=f"{key}:{name}", chosen=chosen, small=True) and not chosen:
                 found = name
         self.row()
         return found
 
-    def section(self, title: str, *, key: str = "", folded: bool = False) -> bool:
+    def section(self, title: str, *, key: str = "") -> bool:
         """Show a heading that folds what belongs to it; return whether that is to be shown."""
         key = f"section:{key or title}"
-        if folded and key not in self._heights:
-            self._folded.add(key)
-        self._heights[key] = 0.0
         self.row(height=20, below=4)
         rect = self.cell()
         if self._clicks("section", key, rect, title, None):
@@ -573,78 +560,58 @@ class Ui:
             field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
             edge = theme.final if now or hovered else self._shade(0.35)
             self._round(box, theme.final if now else field, edge, 3, max(1, self.px(0.75)))
-            if now:
-                self._tick(box)
+            if now and self.surface is not None:
+                side = 4 * box.width
+                large = Surface((side, side), pygame.SRCALPHA, 32)
+                corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
+                for start, end in pairwise(corners):
+                    pygame.draw.line(large, on_accent(theme), start, end, max(4, round(side / 8)))
+                tick = pygame.transform.smoothscale(large.premul_alpha(), box.size)
+                self.surface.blit(tick, box, special_flags=pygame.BLEND_PREMULTIPLIED)
             words = rect.move(self.px(23), 0)
             words.width -= self.px(23)
             self._write(text, words, theme.ink, TEXT)
             self._ring(key, rect)
         return (not now) if clicked else None
 
-    def _tick(self, box: Rect) -> None:
-        assert self.surface is not None
-        side = 4 * box.width
-        large = Surface((side, side), pygame.SRCALPHA, 32)
-        corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
-        for start, end in pairwise(corners):
-            pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side / 8)))
-        picture = pygame.transform.smoothscale(large.premul_alpha(), box.size)
-        self.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-
     def slider(
-        self,
-        key: str,
-        now: float,
-        low: float,
-        high: float,
-        *,
-        step: float = 0.0,
-        tip: str = "",
-        why: str = "",
+        self, key: str, now: float, low: float, high: float, *, step: float = 0.0, why: str = ""
     ) -> float | None:
         """Show a slider; return where it was moved to. Arrows move it by `step`, or a fiftieth."""
-        rect = self.cell()
-        track = Rect(rect.left, 0, rect.width, self.px(14))
+        rect, theme = self.cell(), self.theme
+        track, knob = Rect(rect.left, 0, rect.width, self.px(14)), Rect(0, 0, self.px(12), self.px(14))
         track.centery = rect.centery
-        knob_wide = self.px(_KNOB)
-        free, span = max(track.width - knob_wide, 1), max(high - low, 1e-300)
-        value: float | None = None
+        free, span = max(track.width - knob.width, 1), max(high - low, 1e-300)
+        value = now
         if not why:
-            self._order.append(key)
             place = track.left + free * min(max((now - low) / span, 0.0), 1.0)
             pressed = self._pressed(track)
-            on_knob = pressed and place <= self.at[0] <= place + knob_wide
+            on_knob = pressed and place <= self.at[0] <= place + knob.width
             if pressed:
                 self.active, self._event = key, None
-                self._grabbed = self.at[0] - place if on_knob else knob_wide / 2
+                self._grabbed = self.at[0] - place if on_knob else knob.width / 2
             if (pressed and not on_knob) or (self.active == key and self._is(pygame.MOUSEMOTION)):
                 value = low + span * (self.at[0] - self._grabbed - track.left) / free
             elif by := {"left": -1, "down": -1, "right": 1, "up": 1}.get(self._key(key), 0):
                 value = now + by * (step or span / 50)
-        if value is not None:
+        if value != now:
             value = min(max(value, low), high)
             if step:
                 value = min(max(low + round((value - low) / step) * step, low), high)
-            value = value if value != now else None
-        shown = now if value is None else value
-        self._note("slider", key, track, "", shown, tip, why)
+        self._note("slider", key, track, "", value, "", why)
         if self._draws(rect):
-            self._draw_slider(key, track, min(max((shown - low) / span, 0.0), 1.0), why)
-        return value
-
-    def _draw_slider(self, key: str, track: Rect, part: float, why: str) -> None:
-        theme, groove = self.theme, track.inflate(0, -self.px(8))
-        half = groove.height // 2 / self.scale
-        self._round(groove, self._shade(0.18), radius=half)
-        filled = groove.copy()
-        filled.width = max(round(part * (track.width - self.px(_KNOB))) + self.px(_KNOB / 2), groove.height)
-        accent = self._shade(0.35) if why else theme.final
-        self._round(filled, mix(theme.panel, accent, 0.6), radius=half)
-        strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
-        knob = Rect(0, 0, self.px(_KNOB), self.px(14))
-        knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
-        self._round(knob, mix(accent, theme.ink, strength), radius=5)
-        self._ring(key, track)
+            part = min(max((value - low) / span, 0.0), 1.0)
+            groove = track.inflate(0, -self.px(8))
+            half = groove.height // 2 / self.scale
+            self._round(groove, self._shade(0.18), radius=half)
+            groove.width = max(round(part * (track.width - knob.width)) + self.px(6), groove.height)
+            accent = self._shade(0.35) if why else theme.final
+            self._round(groove, mix(theme.panel, accent, 0.6), radius=half)
+            strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
+            knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
+            self._round(knob, mix(accent, theme.ink, strength), radius=5)
+            self._ring(key, track)
+        return value if value != now else None
 
     def text_entry(
         self, key: str, text: str, *, ghost: str = "", tip: str = "", live: bool = False
@@ -652,9 +619,17 @@ class Ui:
         """Show a field; return its text after Enter, with `live` after each letter."""
         rect = self.cell()
         given: str | None = None
-        self._order.append(key)
         if self._pressed(rect):
-            self._press_field(key, text, rect)
+            self._event, now = None, perf_counter()
+            double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
+            self._clicked = now, key
+            if self.focus == key and self.edit is not None:
+                self.active = key
+                self.edit.place(self._caret_at(self.edit, rect))
+                if double:
+                    self.edit.select_word(self.edit.caret)
+            else:
+                self.focus, self.edit = key, TextEdit.of(text)
         edit = self.edit if self.focus == key else None
         if edit is not None:
             if self._is(pygame.MOUSEMOTION) and self.active == key:
@@ -674,19 +649,6 @@ class Ui:
         if self._draws(rect):
             self._draw_field(rect, edit, shown, ghost)
         return given
-
-    def _press_field(self, key: str, text: str, rect: Rect) -> None:
-        self._event = None
-        now = perf_counter()
-        double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
-        self._clicked = now, key
-        if self.focus != key or self.edit is None:
-            self.focus, self.edit = key, TextEdit.of(text)
-            return
-        self.active = key
-        self.edit.place(self._caret_at(self.edit, rect))
-        if double:
-            self.edit.select_word(self.edit.caret)
 
     def _caret_at(self, edit: TextEdit, rect: Rect) -> int:
         size = self.px(TEXT)
@@ -739,8 +701,18 @@ class Ui:
             self.open_list = None
         opened = self._clicks("menu", key, rect, now, now, tip) or self._key(key) == "down"
         if opened and picked is None:
-            self._event = None
-            self._unfold(key, rect, list(options), now)
+            row = self.px(LIST_ROW)
+            high = min(len(options) * row + 2, self.px(LONGEST_LIST))
+            below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
+            place = Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
+            if below < high and above > below:
+                place.bottom = rect.top - self.px(2)
+            wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
+            place.width = min(max(wide, rect.width), self.box.width - self.px(16))
+            place.right = min(place.right, self.box.right - self.px(8))
+            self.open_list, self._open_key = _List(list(options), place, row), key
+            self.open_list.show(self.open_list.options.index(now) if now in options else 0)
+            self.focus, self.edit, self._event = key, None, None
         if self.surface is not None and self._draws(rect):
             ink = self._face(rect, key, "")
             words = rect.inflate(-self.px(18), 0)
@@ -750,20 +722,6 @@ class Ui:
             corners = [(x - side, y - side // 2), (x + side, y - side // 2), (x, y + side // 2 + 1)]
             pygame.draw.polygon(self.surface, ink, corners)
         return picked if picked != now else None
-
-    def _unfold(self, key: str, rect: Rect, options: list[str], now: str) -> None:
-        row = self.px(LIST_ROW)
-        high = min(len(options) * row + 2, self.px(LONGEST_LIST))
-        below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
-        place = Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
-        if below < high and above > below:
-            place.bottom = rect.top - self.px(2)
-        wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
-        place.width = min(max(wide, rect.width), self.box.width - self.px(16))
-        place.right = min(place.right, self.box.right - self.px(8))
-        self.open_list, self._open_key = _List(options, place, row, 0), key
-        self.open_list.show(options.index(now) if now in options else 0)
-        self.focus, self.edit = key, None
 
     def _list_takes(self, event: pygame.event.Event) -> bool:
         """Give an event to the open list; it takes all presses, and keys but the function keys."""

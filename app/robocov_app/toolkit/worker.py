@@ -10,12 +10,12 @@ import importlib
 import os
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 import threading
 import time
 import traceback
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
@@ -27,7 +27,6 @@ _Answer = TypeVar("_Answer")
 
 READY = "ready"  # first message of a process: its service is loaded
 
-_LENGTH = struct.Struct("<Q")
 _PIPE = 1 << 20
 _SET_DEATH_SIGNAL = 1
 
@@ -106,7 +105,8 @@ class LatestWorker(Generic[_Answer]):
         """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
         if self._talk is None:
             return None
-        ended, reply = self._talk.ended, self._talk.heard()
+        ended, replies = self._talk.ended, self._talk.replies
+        reply = replies.pop() if replies else None
         if reply is not None:
             self._answered, self.trouble, self._since = reply.number, reply.trouble, time.monotonic()
         if ended and self.busy:
@@ -158,29 +158,22 @@ class _Talk:
         self.process = started(service)
         self.ended = False
         self.progress: Reply | None = None
+        self.replies: deque[Reply] = deque(maxlen=1)
         self._wire = wire
-        self._changed = threading.Condition()
+        self._questions: deque[tuple[int, object]] = deque(maxlen=1)
+        self._asked = threading.Event()
         self._closed = False
-        self._wanted: tuple[int, object] | None = None
-        self._reply: Reply | None = None
         self._threads = [threading.Thread(target=call, daemon=True) for call in (self._write, self._read)]
         for thread in self._threads:
             thread.start()
 
     def ask(self, number: int, question: object) -> None:
-        with self._changed:
-            self._wanted = number, question
-            self._changed.notify()
-
-    def heard(self) -> Reply | None:
-        with self._changed:
-            reply, self._reply = self._reply, None
-        return reply
+        self._questions.append((number, question))
+        self._asked.set()
 
     def close(self) -> None:
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
+        self._closed = True
+        self._asked.set()
         self.process.kill()
         self.process.wait()
         for thread in self._threads:
@@ -190,14 +183,11 @@ class _Talk:
         assert self.process.stdin is not None
         # when the process has ended, reading says so
         with suppress(OSError), self.process.stdin as stream:
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._closed or self._wanted is not None)
-                    wanted, self._wanted = self._wanted, None
-                    if self._closed or wanted is None:
-                        return
-                number, question = wanted
-                send(stream, (number, self._wire.encode(question)))
+            while self._asked.wait() and not self._closed:
+                self._asked.clear()
+                if self._questions:
+                    number, question = self._questions.pop()
+                    send(stream, (number, self._wire.encode(question)))
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -210,8 +200,7 @@ class _Talk:
                         continue
                     if reply.answer is not None:
                         reply = Reply(reply.number, self._wire.decode(reply.answer), reply.trouble)
-                    with self._changed:
-                        self._reply = reply
+                    self.replies.append(reply)
         finally:
             self.ended = True
 
@@ -280,7 +269,12 @@ def serve(service: str) -> None:
         faulthandler.enable()
     with suppress(OSError, AttributeError, TypeError):  # where the kernel can end it with its parent
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
-    line = _PipeLine(*own_streams())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    # code that is called reads nothing, and prints to stderr
+    source, target = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    line = _PipeLine(source, target)
     threading.Thread(target=line.listen, daemon=True).start()
     module, _, name = service.partition(":")
     answering = getattr(importlib.import_module(module), name)()
@@ -327,28 +321,14 @@ def ended(process: subprocess.Popen[bytes]) -> int:
     return process.wait()
 
 
-def own_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes from and to the parent; code that is called reads nothing, and prints to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    source, target = (os.fdopen(os.dup(fd), mode) for fd, mode in ((0, "rb"), (1, "wb")))
-    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file
-        os.dup2(nothing.fileno(), 0)
-    os.dup2(2, 1)
-    return source, target  # type: ignore[return-value]
-
-
 def send(stream: IO[bytes], message: object) -> None:
-    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    stream.write(_LENGTH.pack(len(data)))
-    stream.write(data)
+    pickle.dump(message, stream, protocol=pickle.HIGHEST_PROTOCOL)
     stream.flush()
 
 
 def receive(stream: IO[bytes]) -> Any:
     """Read one message; None at the end, also in the midst of one."""
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
+    try:
+        return pickle.load(stream)
+    except (EOFError, pickle.UnpicklingError):
         return None
-    (length,) = _LENGTH.unpack(head)
-    data = stream.read(length)
-    return pickle.loads(data) if len(data) == length else None

@@ -17,6 +17,7 @@ from robocov_app.editor.ui.panel import TABS
 from robocov_app.editor.ui.window import facts
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
+from robocov_app.toolkit.command import Menu
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.layout import SMALLEST
 
@@ -203,7 +204,7 @@ def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
     center = hands.window.canvas.camera.center
     hands.drag((300, 300), (330, 310), (360, 320), button=3)
     moved = hands.window.canvas.camera.center
-    assert moved[0] < center[0] and hands.window.menu is None
+    assert moved[0] < center[0] and hands.editor.asked is None
     hands.key("f")
     assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
 
@@ -240,30 +241,34 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
 
 def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((3, 3), button=3)
-    menu = hands.window.menu
-    assert menu is not None and hands.editor.selection == Selection.of(0)
+    menu = hands.editor.asked
+    assert isinstance(menu, Menu) and hands.editor.selection == Selection.of(0)
     hands.window.draw()
     names = [action.name if action else "" for action in menu.commands]
     row = names.index("duplicate")
     hands.key("down", times=sum(1 for name in names[: row + 1] if name))
     hands.key("return")
-    assert len(hands.shapes) == 3 and hands.window.menu is None
+    assert len(hands.shapes) == 3 and hands.editor.asked is None
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
     assert not hands.editor.selection
-    assert "paste" in [action.name for action in hands.window.menu.commands if action]
-    hands.click(*hands.window.menu._ui.shown["option:select:all"].rect.center)
-    assert hands.window.menu is None and hands.editor.selection
+    assert "paste" in [action.name for action in hands.editor.asked.commands if action]
+    hands.click(*hands.window.dialogs._ui.shown["option:select:all"].rect.center)
+    assert hands.editor.asked is None and hands.editor.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
-    assert hands.window.menu is None
+    assert hands.editor.asked is None
+    hands.click_at((3, 3), button=3)
+    hands.post(pygame.DROPFILE, file="nowhere.txt")
+    hands.settle()
+    assert hands.editor.asked is None and "nowhere.txt" in hands.said
 
 
 def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((5, 1), (6, 1), (6, 2))
     hands.click_at((6, 2), button=3)
-    assert len(hands.shapes) == 3 and hands.window.menu is None
+    assert len(hands.shapes) == 3 and hands.editor.asked is None
 
 
 # palette, help, look

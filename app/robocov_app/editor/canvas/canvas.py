@@ -13,7 +13,7 @@ from robocov.environment import Point
 from robocov.errors import counted
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.map_layers import Sheet, View, beyond
-from robocov_app.editor.canvas.overlay import accent, legend_entries
+from robocov_app.editor.canvas.overlay import legend_entries
 from robocov_app.editor.edits.paths import goes, moving
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
@@ -35,7 +35,7 @@ from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme, mix
-from robocov_app.toolkit.layout import Box, Layout
+from robocov_app.toolkit.layout import Box, Layout, inside
 
 
 class Strips:
@@ -128,25 +128,17 @@ class EditorCanvas:
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
-        self._camera: Camera | None = None
+        self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
         self._hatched: Latest[tuple[Surface, Rect] | None] = Latest()
         self._carried: Latest[Surface] = Latest()
         self._outlined: Latest[Surface] = Latest()
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
-        if self._camera is not None:
-            self._camera = self._camera.within(self._view_box())
+        self._look(self.camera.within(self._view_box()))
 
     def _view_box(self) -> tuple[float, float, float, float]:
         return self.strips.room(self.layout.arena, self.layout.scale)
-
-    @property
-    def camera(self) -> Camera:
-        if self._camera is None:
-            self.fit()
-        assert self._camera is not None
-        return self._camera
 
     def fit(self) -> None:
         self._show(self._bounds)
@@ -171,12 +163,14 @@ class EditorCanvas:
             return
         spot = where.representative_point()
         x, y = self.to_pixel((spot.x, spot.y))
-        left, top, width, height = self.camera.view
-        edge = 40 * self.layout.scale
-        if not (left + edge < x < left + width - edge and top + edge < y < top + height - edge):
+        edge = round(80 * self.layout.scale)
+        if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(x, y):
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
-    def zoom(self, factor: float, at: Point) -> None:
+    def zoom(self, factor: float, at: Point | None = None) -> None:
+        """Magnify what is under a pixel of the window: by default under the cursor, or in the middle."""
+        if at is None:
+            at = self.at if self.at is not None and self.over(self.at) else self.camera.middle
         low_x, low_y, high_x, high_y = self._bounds
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
@@ -193,12 +187,11 @@ class EditorCanvas:
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
-        self._camera = camera
+        self.camera = camera
         self.editor.pixel = self.layout.scale / camera.zoom
 
     def over(self, pixel: Point) -> bool:
-        left, top, width, height = self.camera.view
-        return left <= pixel[0] < left + width and top <= pixel[1] < top + height
+        return inside(self.camera.view, pixel)
 
     def to_world(self, pixel: Point) -> Point:
         x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
@@ -283,7 +276,7 @@ class EditorCanvas:
 
     @property
     def _lifted_fill(self) -> Colour:
-        return mix(self.theme.obstacle, accent(self.theme), 0.22)
+        return mix(self.theme.obstacle, self.theme.final, 0.22)
 
     def _hatch(self, screen: Surface, view: View, measurement: Measurement) -> None:
         look = view.camera, view.theme.name, view.scale, view.size
@@ -294,7 +287,7 @@ class EditorCanvas:
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
         """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
-        sketch, colour = self.editor.sketch, accent(self.theme)
+        sketch, colour = self.editor.sketch, self.theme.final
 
         def drawn() -> Surface:
             page = Surface(view.size, pygame.SRCALPHA, 32)
@@ -314,7 +307,7 @@ class EditorCanvas:
             path = item.shape.path
             assert path is not None
             chosen = key in self.editor.selection.items
-            colour = accent(theme) if chosen else mix(theme.background, theme.ink, 0.6)
+            colour = theme.final if chosen else mix(theme.background, theme.ink, 0.6)
             overlay.draw_path(canvas, path, colour)
             if since is not None and goes(path):
                 shift = path.shift(self.editor.now - since)
@@ -338,7 +331,7 @@ class EditorCanvas:
     def _draw_selection(
         self, screen: Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
     ) -> None:
-        editor, selector, colour = self.editor, self.editor.selector, accent(self.theme)
+        editor, selector, colour = self.editor, self.editor.selector, self.theme.final
         floor = self.theme.background
         selection = selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}

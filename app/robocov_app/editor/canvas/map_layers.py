@@ -217,14 +217,10 @@ class Sheet:
         return boxes
 
     def _box(self, view: View, item: Item) -> Rect:
-        low_x, low_y, high_x, high_y = self.outlines.of(item).bounds.tolist()
-        if not np.isfinite(low_x):
-            return Rect(0, 0, 0, 0)
-        ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-        (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
-        edge = round(_EDGE * view.scale)
-        box = Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
-        return box.inflate(2 * edge, 2 * edge)
+        bounds, edge = self.outlines.of(item).bounds, 2 * round(_EDGE * view.scale)
+        return (
+            pixel_box(view.camera, bounds).inflate(edge, edge) if np.isfinite(bounds[0]) else Rect(0, 0, 0, 0)
+        )
 
     def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
         page.set_clip(box)
@@ -331,6 +327,14 @@ class Sheet:
             if high * zoom > size + 2 and (words == name or len(words) > LEAST_LETTERS):
                 at = canvas.camera.to_pixels(np.array([x, y])).tolist()
                 canvas.text(words, at, size=canvas.theme.small_text, colour=colour, anchor="middle")
+
+
+def pixel_box(camera: Camera, bounds: Iterable[float]) -> Rect:
+    """Return the pixels that bounds, m, cover, and one or two around them."""
+    low_x, low_y, high_x, high_y = bounds
+    ends = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+    (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
+    return Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
 
 
 def beyond(sketch: Sketch) -> shapely.Geometry:

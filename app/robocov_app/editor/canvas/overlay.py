@@ -12,14 +12,15 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
-from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour
+from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour, pixel_box
 from robocov_app.editor.model.geometry import distance, length_words
 from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import Handle, Preview
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, bounded
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
+from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
@@ -32,10 +33,6 @@ STEM = 17.0  # that it is above its place
 
 MOST_LENGTHS = 40  # edges of what is drawn whose lengths are told
 MOST_BADGES = 200
-
-
-def accent(theme: Theme) -> Colour:
-    return theme.final
 
 
 def problem_colour(theme: Theme, *, grave: bool) -> Colour:
@@ -65,27 +62,25 @@ def _disc(
     canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
 
 
-def _tag(canvas: Canvas, words: str, at: Point) -> None:
-    tag(canvas.surface, words, at, canvas.theme, canvas.scale)
-
-
 def draw_outline(canvas: Canvas, rings: Iterable[Array], colour: Colour, width: float = 2.0) -> None:
     for ring in rings:
         canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))
 
 
 def draw_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Colour) -> None:
-    low_x, low_y, high_x, high_y = box
-    ring = ((low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y), (low_x, low_y))
-    for a, b in pairwise(pixels(canvas, ring).tolist()):
-        canvas.dashes(a, b, colour, canvas.width(1.0), dash=3.0)
+    _dashed(canvas, pixels(canvas, shapely.box(*box).exterior.coords).tolist(), colour, 3.0)
+
+
+def _dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
+    for a, b in pairwise(points):
+        canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 
 
 def draw_grips(
     canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[object], near: Handle | None, stem: float
 ) -> None:
     """Draw the handles; `stem` is how far the knob is from the box, px."""
-    floor, edge = canvas.theme.background, accent(canvas.theme)
+    floor, edge = canvas.theme.background, canvas.theme.final
     places = pixels(canvas, (handle.at for handle in found)).tolist()
     for handle, (x, y) in zip(found, places, strict=True):
         large = handle == near
@@ -104,8 +99,7 @@ def _square(canvas: Canvas, at: Point, fill: Colour, *, large: bool = False, rou
     if canvas.surface.get_rect().colliderect(box):
         radius = round(half) if rounded else 0
         pygame.draw.rect(canvas.surface, fill, box, border_radius=radius)
-        edge = accent(canvas.theme)
-        pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.5), border_radius=radius)
+        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.width(1.5), border_radius=radius)
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
@@ -114,8 +108,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
     last: Point | None = None
     for guide in guides:
         line = pixels(canvas, guide.line).tolist()
-        for a, b in pairwise(line):
-            canvas.dashes(a, b, colour, canvas.width(1.0), dash=4.0)
+        _dashed(canvas, line, colour)
         if line:
             last = line[-1][0], line[-1][1]
             if guide.kind in ("vertex", "middle", "centre", "crossing", "edge"):
@@ -184,11 +177,10 @@ def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
 
 
 def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
-    colour = accent(canvas.theme)
+    colour = canvas.theme.final
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
-        low, high = np.floor(corners.min(axis=0)), np.ceil(corners.max(axis=0))
-        box = Rect(*np.clip([*low, *(high - low + 1)], -30000, 30000).astype(int).tolist())
+        box = pixel_box(canvas.camera, [*ring.min(axis=0), *ring.max(axis=0)])
         box = box.clip(canvas.surface.get_clip())
         if box.width and box.height:
             page = Surface(box.size, pygame.SRCALPHA, 32)
@@ -199,7 +191,7 @@ def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
 
 
 def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
-    floor, scale, colour = canvas.theme.background, canvas.scale, accent(canvas.theme)
+    floor, scale, colour = canvas.theme.background, canvas.scale, canvas.theme.final
     for shape in preview.shapes:
         draw_ghost(canvas, shape.polygon)
     if preview.start is not None:
@@ -220,7 +212,8 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
     if preview.box is not None:
         _draw_selecting(canvas, preview.box, touched=preview.touched)
     if preview.words and at is not None:
-        _tag(canvas, preview.words, (at[0] + 18 * scale, at[1] - 22 * scale))
+        place = at[0] + 18 * scale, at[1] - 22 * scale
+        tag(canvas.surface, preview.words, place, canvas.theme, scale)
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
@@ -245,17 +238,16 @@ def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bo
     ends = pixels(canvas, corners)
     low, high = ends.min(axis=0), ends.max(axis=0)
     box = Rect(*np.rint([*low, *(high - low)]).astype(int).tolist()).clip(canvas.surface.get_clip())
-    colour = canvas.theme.start if touched else accent(canvas.theme)
+    colour = canvas.theme.start if touched else canvas.theme.final
     if box.width and box.height:
         page = Surface(box.size, pygame.SRCALPHA, 32)
         page.fill((*colour, 34))
         canvas.surface.blit(page, box)
-    (left, top), (right, bottom) = low.tolist(), high.tolist()
-    for a, b in pairwise([(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]):
-        if touched:
-            canvas.dashes(a, b, colour, canvas.width(1.0), dash=4.0)
-        else:
-            canvas.line(a, b, colour, canvas.width(1.0))
+    rim = shapely.get_coordinates(shapely.box(*low, *high, ccw=False))
+    if touched:
+        _dashed(canvas, rim.tolist(), colour)
+    else:
+        canvas.outline(rim, colour, canvas.width(1.0), closed=False)
 
 
 def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
@@ -266,7 +258,7 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
     box.topleft = round(at[0] + 14 * scale), round(at[1] + 14 * scale)
     box.clamp_ip(surface.get_rect())
     pygame.draw.rect(surface, theme.panel, box, border_radius=round(5 * scale))
-    pygame.draw.rect(surface, accent(theme), box, canvas.width(1.5), border_radius=round(5 * scale))
+    pygame.draw.rect(surface, theme.final, box, canvas.width(1.5), border_radius=round(5 * scale))
     size, y = canvas.text_size(large) / scale, box.centery
     canvas.text(words, (box.left + 8 * scale, y), size=size, bold=True)
     right = box.right - 8 * scale
@@ -277,14 +269,10 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
     theme = view.theme
     areas = ((measurement.sealed, sealed_colour(theme), 0.5), (measurement.impassable, theme.trajectory, 1.0))
-    parts = [(_polygons(area), colour, strength) for area, colour, strength in areas if _polygons(area)]
+    parts = [(some, colour, strength) for area, colour, strength in areas if (some := _polygons(area))]
     if not parts:
         return None
-    every = [each for polygons, _, _ in parts for each in polygons]
-    low_x, low_y, high_x, high_y = shapely.total_bounds(every)
-    ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    (left, top), (right, bottom) = bounded(ends).tolist()
-    box = Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
+    box = pixel_box(view.camera, shapely.total_bounds([each for some, _, _ in parts for each in some]))
     box = box.clip(view.clip)
     if not (box.width and box.height):
         return None
@@ -359,7 +347,7 @@ def tag_gap(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None = None
         near = beside - canvas.text_width(words) - 20 * scale < x < beside + 200 * scale
         if near and abs(y - level) < 24 * scale:
             y = level - 24 * scale
-    _tag(canvas, words, (x, y))
+    tag(canvas.surface, words, (x, y), canvas.theme, scale)
 
 
 def _gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
@@ -399,7 +387,8 @@ def draw_problems(
             beside = x + (BADGE + 10) * scale
             room = canvas.surface.get_width() - beside - 8 * scale > canvas.text_width(problem.words)
             # where there is no room beside the badge, above it
-            _tag(canvas, problem.words, (beside, y if room else y - (BADGE + 14) * scale))
+            at = beside, y if room else y - (BADGE + 14) * scale
+            tag(canvas.surface, problem.words, at, theme, scale)
             if problem is told:
                 _ring(canvas, (x, y), BADGE + 4, theme.ink, 1.6)
 
@@ -422,7 +411,7 @@ def draw_badge(
 
 def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
     rows: list[tuple[object, str, Glyph]] = [
-        (True, "obstacle", lambda on, x, y: _swatch(on, x, y, on.theme.obstacle, on.theme.obstacle_edge)),
+        (True, "obstacle", lambda on, x, y: on.swatch(x, y, on.theme.obstacle, on.theme.obstacle_edge)),
         (True, "boundary", _boundary_glyph),
         (unfree, "outside, in the robots' hull", _beyond_glyph),
         (starts, "start", lambda canvas, x, y: _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)),
@@ -434,16 +423,9 @@ def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfre
     return [LegendEntry(text, glyph) for is_there, text, glyph in rows if is_there]
 
 
-def _swatch(canvas: Canvas, x: float, y: float, fill: Colour, edge: Colour) -> None:
-    size = 11 * canvas.scale
-    box = Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
-    pygame.draw.rect(canvas.surface, fill, box)
-    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
-
-
 def _beyond_glyph(canvas: Canvas, x: float, y: float) -> None:
     fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
-    _swatch(canvas, x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
+    canvas.swatch(x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
 
 
 def _boundary_glyph(canvas: Canvas, x: float, y: float) -> None:

@@ -73,17 +73,25 @@ GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spaci
 class Editor(Workspace):
     """Editor state and the user's actions on it."""
 
-    def __init__(self, document: Document, readings: Worker[Measurement], folder: Path) -> None:
+    def __init__(
+        self,
+        document: Document,
+        readings: Worker[Measurement],
+        folder: Path,
+        settings: EditorSettings | None = None,
+    ) -> None:
         super().__init__(document)
+        settings = settings or EditorSettings()
         self.readings, self.folder = readings, folder
         self.tools: dict[str, Tool] = {kind.name: kind() for kind in TOOLS}
         self.tool: Tool = self.tools["select"]
-        self.theme = "light"
+        self.theme: str = settings.theme
         self.panel = True
-        self.shown = {name for name in SHOWN if name != "robots"}
-        self.radius, self.robots, self.seed = DEFAULT_RADIUS, 6, 0
+        self.shown, self.snaps = set(settings.shown) & set(SHOWN), set(settings.snaps) & set(SNAPS)
+        self.grid, self.snap_angle, self.wall_width = settings.grid, settings.angle, settings.wall
+        self.radius, self.robots, self.seed = settings.radius, settings.robots, 0
         self.start: str | None = None
-        self.recent: list[str] = []
+        self.recent = list(settings.recent)
         self.measurement: Measurement | None = None
         self.problem: Problem | None = None  # the one that is shown with its words
         self.dialogs = Dialogs()  # with what waits for an answer
@@ -223,7 +231,6 @@ class Editor(Workspace):
             chosen ^= {name}
             title = SHOWN[name] if kind == "show" else SNAPS[name][0]
             self.say(f"{title}: {'on' if name in chosen else 'off'}")
-        self.version += 1
 
     def set_length(self, name: str, length: float) -> None:
         most = 10.0 if name == "radius" else 100.0
@@ -231,8 +238,6 @@ class Editor(Workspace):
             wanted = f"{SMALLEST:g} to {most:g} m was wanted"
             raise MapError(f"{name.replace('_', ' ')}: {length:g} m, but {wanted}")
         setattr(self, name, length)
-        self.version += 1
-        self.ask_readings()
         if name == "grid":
             self.say(f"the grid is {length:g} m")
 
@@ -245,7 +250,6 @@ class Editor(Workspace):
         if not 1 <= count <= 1000:
             raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
-        self.version += 1
 
     def add_robots(self, by: int) -> None:
         self.set_robots(min(max(self.robots + by, 1), 1000))

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
@@ -35,23 +36,6 @@ class FileCommands:
         self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
         self.leaving = False
 
-    def close(self) -> None:
-        if isinstance(self.editor.asked, ImportDialog):
-            self.editor.dialogs.close()
-
-    def commands(self) -> dict[str, Act]:
-        return {
-            "new": lambda: self.leave(self.new),
-            "open": lambda: self._ask_path("Open a map", self.open, _OPENED),
-            "recent": self.ask_recent,
-            "save": self.save,
-            "save:as": self.ask_name,
-            "export": self.ask_export,
-            "reload": self.reload,
-            "background": lambda: self._ask_path("Picture under the map", self.underlay, PICTURES),
-            "quit": lambda: self.leave(lambda: setattr(self, "leaving", True)),
-        }
-
     def leave(self, then: Act) -> None:
         """Put another document in place of this one, after asking what is to become of it."""
         document = self.editor.document
@@ -68,21 +52,29 @@ class FileCommands:
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask("Save the changes?", words, *answers)
 
-    def _put(self, document: Document, words: str = "") -> None:
+    def _put(self, document: Document, words: str) -> None:
         self.editor.put(document)
         self._fit()
         if document.path is not None:
             self.remember(document.path)
         self.editor.say(words)
 
-    def new(self) -> str:
-        self._put(Document.new(self.drafts))
-        return "a new map: 10 x 10 m; B draws another boundary"
+    def quit(self) -> None:
+        self.leave(lambda: setattr(self, "leaving", True))
+
+    def new(self) -> None:
+        words = "a new map: 10 x 10 m; B draws another boundary"
+        self.leave(lambda: self._put(Document.new(self.drafts), words))
+
+    def ask_open(self) -> None:
+        self._ask_path("Open a map", self.open, _OPENED)
+
+    def ask_picture(self) -> None:
+        self._ask_path("Picture under the map", self.underlay, PICTURES)
 
     def _ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
-
         def chosen(path: Path) -> None:
             self.editor.carry_out(lambda: call(path))
 
@@ -111,7 +103,6 @@ class FileCommands:
             self.ask_import(path, found)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
-
         def put(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
@@ -124,8 +115,8 @@ class FileCommands:
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
-        self._put(Document.recovered(draft, self.drafts))
-        self.editor.say(f"recovered: {draft.words()}")
+        words = f"recovered: {draft.words()}"
+        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), words))
 
     def remember(self, path: Path) -> None:
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
@@ -205,8 +196,6 @@ class FileCommands:
             raise MapError("the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
-        self.editor.version += 1
-        self.editor.ask_readings()
         return f"read again: {self.editor.document.title}"
 
     def underlay(self, path: Path) -> None:
@@ -235,12 +224,8 @@ def lay_under(editor: Editor, path: Path) -> None:
 def _from_map(path: Path, of: Path | None) -> str:
     """Return how a map names a picture: from its own folder where that is near, else from the root."""
     path = path.resolve()
-    if of is not None:
-        try:
-            near = os.path.relpath(path, of.resolve().parent)
-        except ValueError:  # on another drive
-            return path.as_posix()
-        if near.count("..") < 2:
+    with suppress(ValueError):  # on another drive
+        if of is not None and (near := os.path.relpath(path, of.resolve().parent)).count("..") < 2:
             return Path(near).as_posix()
     return path.as_posix()
 

@@ -1,14 +1,15 @@
 """The editor's panel: its pages follow the selection, and their fields show and take values."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from types import UnionType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pygame
 
-from robocov.environment import CircleObstacle, DiscStart, Point, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart, WallObstacle
 from robocov.errors import MapError, counted
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits import properties, transform
@@ -20,7 +21,7 @@ from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import Selection, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, KINDS, Owner
 from robocov_app.editor.tools.snapping import SNAPS
-from robocov_app.editor.ui.commands import Edit, fix_problem, move, run_typed, whole
+from robocov_app.editor.ui.commands import TYPED, common_measure, fix_problem, move, rename, run_typed, whole
 from robocov_app.editor.ui.editor import KEPT, SHOWN, Editor
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.overlay import flat_canvas, wrapped
@@ -30,96 +31,60 @@ from robocov_app.toolkit.ui import SMALL, TEXT, SidePanel, Ui
 class Field(NamedTuple):
     """A field of the panel."""
 
-    text: Callable[[Editor], str]  # what it shows
+    text: Callable[[Editor], str]  # what it shows; MapError or LookupError where there is no such value
     take: Callable[[Editor, str], object]  # takes what was typed; MapError where that means nothing
-    tip: str = ""
-
-    def shown(self, editor: Editor) -> str:
-        try:
-            return self.text(editor)
-        except (MapError, LookupError):
-            return ""
+    tip: str
 
 
-def number(value: float) -> str:
+def number(value: float | None) -> str:
     """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros.
 
-    >>> number(2.0), number(0.30004), number(-0.00001)
-    ('2', '0.3', '0')
+    >>> number(2.0), number(0.30004), number(-0.00001), number(None)
+    ('2', '0.3', '0', '')
     """
-    text = f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
+    return "" if value is None else f"{round(value, 4) + 0.0:.12g}"
 
 
-def coordinate(text: str, now: float) -> float:
-    """Return a typed coordinate, m: a number with a unit or without, or a step as ``+0.5``."""
-    text = text.strip()
-    if text.startswith(("+", "@")):
-        return now + length_of(text.lstrip("+@"))
-    # two coordinates are read where only one is typed, so that signs and units mean the same
-    return point_of(f"{text} 0", last=(now, 0.0))[0]
-
-
-def _selected_things(editor: Editor) -> list[Any]:
-    sketch, selection = editor.preview
-    shapes = [sketch.item(key).shape for key in selection.items if key in sketch.places]
-    return [*shapes, *(spec for name, spec in sketch.starts if name in selection.starts)]
-
-
-def _corner(editor: Editor) -> Point:
-    """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
-    sketch, selection = editor.preview
-    if len(selection.vertices) == 1:
-        return place_of(sketch, *selection.vertices)
-    if not selection.vertices and len(selection.owners) == 1:
-        for thing in _selected_things(editor):
-            if isinstance(thing, CircleObstacle | DiscStart):
-                return thing.center
-    x, y, _, _ = _bounds(editor)
-    return x, y
-
-
-def _bounds(editor: Editor) -> tuple[float, float, float, float]:
+def _box(editor: Editor) -> tuple[float, float, float, float]:
+    """Return the place of a vertex, a centre, or a box's lower left corner, and the box's sides, m."""
     sketch, selection = editor.preview
     bounds = bounds_of(sketch, whole(selection))
     if bounds is None:
         raise MapError("nothing is selected")
-    return bounds
+    x, y, high_x, high_y = bounds
+    sides = high_x - x, high_y - y
+    if len(selection.vertices) == 1:
+        x, y = place_of(sketch, *selection.vertices)
+    elif not selection.vertices and len(selection.owners) == 1:
+        shapes = [sketch.item(key).shape for key in selection.items]
+        for thing in (*shapes, *(dict(sketch.starts)[name] for name in selection.starts)):
+            if isinstance(thing, CircleObstacle | DiscStart):
+                x, y = thing.center
+    return x, y, *sides
 
 
 def _put(editor: Editor, text: str, axis: int) -> None:
-    now = _corner(editor)[axis]
-    by = coordinate(text, now) - now
+    """Move what is selected to a coordinate: a number with a unit or without, or a step as ``+0.5``."""
+    now, text = _box(editor)[axis], text.strip()
+    if text.startswith(("+", "@")):
+        by = length_of(text.lstrip("+@"))
+    else:  # two coordinates are read where only one is typed, so that signs and units mean the same
+        by = point_of(f"{text} 0", last=(now, 0.0))[0] - now
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
     editor.change(move(editor, dx, dy, editor.selection))
 
 
-def _size(editor: Editor, axis: int) -> str:
-    bounds = _bounds(editor)
-    return number(bounds[axis + 2] - bounds[axis])
-
-
 def _resize(editor: Editor, text: str, axis: int) -> None:
     """Give what is selected a typed width or height; the other stays, but of circles."""
-    low_x, low_y, high_x, high_y = _bounds(editor)
-    sides = [high_x - low_x, high_y - low_y]
+    sides = list(_box(editor)[2:])
     sides[axis] = length_of(text, now=sides[axis])
     wide, high = (side or None for side in sides)
     editor.change(transform.resized(editor.sketch, whole(editor.selection), wide, high))
 
 
 def _shown_name(editor: Editor) -> str:
-    owners = whole(editor.selection).owners
-    if len(owners) != 1:
-        return ""
-    (owner,) = owners
-    return owner if isinstance(owner, str) else editor.sketch.item(owner).shape.name or ""
-
-
-def _rename(editor: Editor, text: str) -> None:
     (owner,) = whole(editor.selection).owners
-    if text.strip() != _shown_name(editor):
-        editor.change(properties.renamed(editor.sketch, owner, text.strip()))
+    return owner if isinstance(owner, str) else editor.sketch.item(owner).shape.name or ""
 
 
 def _shown_note(editor: Editor) -> str:
@@ -127,24 +92,15 @@ def _shown_note(editor: Editor) -> str:
     return notes.pop() if len(notes) == 1 else ""
 
 
-def _note(editor: Editor, text: str) -> None:
-    editor.change(properties.noted(editor.sketch, whole(editor.selection), text.strip()))
-
-
-def _measure(editor: Editor, name: str, kinds: UnionType | type) -> str:
-    found = {getattr(thing, name) for thing in _selected_things(editor) if isinstance(thing, kinds)}
-    return number(found.pop()) if len(found) == 1 else ""
-
-
-def _set_measure(editor: Editor, text: str, edit: Edit, now: Callable[[Editor], str]) -> None:
-    length = length_of(text, now=float(now(editor)) if now(editor) else None)
-    editor.change(edit(editor.sketch, whole(editor.selection), length))
-
-
 def _picture(editor: Editor) -> Background:
     if editor.sketch.background is None:
         raise MapError("there is no picture under the map: Ctrl B takes one")
     return editor.sketch.background
+
+
+def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
+    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
+    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
 
 
 def _set_scale(editor: Editor, text: str) -> None:
@@ -154,17 +110,15 @@ def _set_scale(editor: Editor, text: str) -> None:
     _lay(editor, scale=scale)
 
 
-def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
-    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
-    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
+def _turn(editor: Editor, text: str) -> None:
+    _lay(editor, turn=angle_of(text))
 
 
 def _typed(word: str, tip: str) -> Field:
-    return Field(
-        lambda editor: number(getattr(editor, KEPT[word])),
-        lambda editor, text: run_typed(editor, word, text),
-        tip,
-    )
+    def take(editor: Editor, text: str) -> None:
+        run_typed(editor, word, text)
+
+    return Field(lambda editor: number(getattr(editor, KEPT[word])), take, tip)
 
 
 def _titled(name: str, tip: str) -> Field:
@@ -174,11 +128,13 @@ def _titled(name: str, tip: str) -> Field:
     return Field(lambda editor: str(getattr(editor.sketch, name)), take, tip)
 
 
-_wall_width = partial(_measure, name="width", kinds=WallObstacle)
-_radius = partial(_measure, name="radius", kinds=CircleObstacle | DiscStart)
-_set_width = partial(_set_measure, edit=properties.widened, now=_wall_width)
-_set_radius = partial(_set_measure, edit=properties.sized, now=_radius)
-_STEP = "; +0.5 moves by half a metre"
+def _measure(name: str, kinds: type | UnionType, word: str, tip: str) -> Field:
+    return Field(lambda editor: number(common_measure(editor, name, kinds)), TYPED[word][1], tip)
+
+
+def _of_box(part: int, take: Callable[..., None], tip: str) -> Field:
+    return Field(lambda editor: number(_box(editor)[part]), partial(take, axis=part % 2), tip)
+
 
 FIELDS: dict[str, Field] = {
     "title": _titled("name", "The map's name, for people"),
@@ -187,24 +143,16 @@ FIELDS: dict[str, Field] = {
     "robots": _typed("robots", "Robots of the team that is shown at a start, and tried with F5"),
     "grid": _typed("grid", "Distance of the grid's lines; arrows move by it"),
     "angle": _typed("angle", "Lines snap to multiples of this"),
-    "name": Field(_shown_name, _rename, "What people call it"),
-    "note": Field(_shown_note, _note, "Whatever is worth remembering of it"),
-    "x": Field(lambda editor: number(_corner(editor)[0]), partial(_put, axis=0), "From the left" + _STEP),
-    "y": Field(lambda editor: number(_corner(editor)[1]), partial(_put, axis=1), "From below" + _STEP),
-    "wide": Field(partial(_size, axis=0), partial(_resize, axis=0), "Also *2, 50% or +0.3"),
-    "high": Field(partial(_size, axis=1), partial(_resize, axis=1), "Also *2, 50% or +0.3"),
-    "width": Field(_wall_width, _set_width, "How thick the wall is"),
-    "size:radius": Field(_radius, _set_radius, "Its radius"),
+    "name": Field(_shown_name, rename, "What people call it"),
+    "note": Field(_shown_note, TYPED["note"][1], "Whatever is worth remembering of it"),
+    "x": _of_box(0, _put, "From the left; +0.5 moves by half a metre"),
+    "y": _of_box(1, _put, "From below; +0.5 moves by half a metre"),
+    "wide": _of_box(2, _resize, "Also *2, 50% or +0.3"),
+    "high": _of_box(3, _resize, "Also *2, 50% or +0.3"),
+    "width": _measure("width", WallObstacle, "width", "How thick the wall is"),
+    "size:radius": _measure("radius", CircleObstacle | DiscStart, "circle", "Its radius"),
     "picture:scale": Field(lambda editor: f"{_picture(editor).scale:.6g}", _set_scale, "Side of a pixel"),
-    "picture:turn": Field(
-        lambda editor: number(_picture(editor).turn),
-        lambda editor, text: _lay(editor, turn=angle_of(text)),
-        "Counter-clockwise",
-    ),
-    "picture:opacity": Field(
-        lambda editor: number(_picture(editor).opacity),
-        lambda editor, text: _lay(editor, drag="opacity", opacity=round(min(max(float(text), 0.0), 1.0), 2)),
-    ),
+    "picture:turn": Field(lambda editor: number(_picture(editor).turn), _turn, "Counter-clockwise"),
 }
 """All fields by name."""
 
@@ -289,14 +237,10 @@ class Panel(SidePanel):
         for tool in self.editor.tools.values():
             self._does(ui, tool.title, f"tool:{tool.name}", chosen=tool is self.editor.tool)
         count = len(self.editor.problems)
-        titles = {name: name.capitalize() for name in TABS}
-        titles["problems"] += f" {min(count, 99)}" if count else ""
         ui.space(6)
-        ui.row(44, 56, 46, 72, 0, below=8)
-        for name, title in titles.items():
-            if ui.button(title, key=f"tab:{name}", chosen=name == self.tab, small=True):
-                self.show_tab(name)
-        ui.row()
+        titles = {"problems": f"Problems {min(count, 99)}"} if count else {}
+        if (tab := ui.tabs("tab", TABS, self.tab, 44, 56, 46, 72, 0, titles=titles)) is not None:
+            self.show_tab(tab)
         pages = (self._map, self._object, self._snap, self._problems, self._history)
         pages[TABS.index(self.tab)](ui)
 
@@ -322,7 +266,10 @@ class Panel(SidePanel):
     def _field(self, ui: Ui, name: str, word: str, unit: str = "") -> None:
         editor, field = self.editor, FIELDS[name]
         ui.label(word, key=f"word:{name}", tip=field.tip)
-        given = ui.text_entry(name, field.shown(editor), tip=field.tip)
+        text = ""
+        with suppress(MapError, LookupError):
+            text = field.text(editor)
+        given = ui.text_entry(name, text, tip=field.tip)
         if unit:
             ui.label(unit, key=f"unit:{name}", style="unit")
         if given is not None:
@@ -411,8 +358,7 @@ class Panel(SidePanel):
             why = "" if picture is not None else "there is no picture under the map"
             part = ui.slider("opacity", picture.opacity if picture is not None else 0.5, 0.0, 1.0, why=why)
             if part is not None:
-                text = f"{part:.2f}"
-                self.editor.attempt(lambda: FIELDS["picture:opacity"].take(self.editor, text))
+                self.editor.attempt(lambda: _lay(self.editor, "opacity", opacity=round(part, 2)))
 
     def _problems(self, ui: Ui) -> None:
         editor, problems = self.editor, self.editor.problems

@@ -43,21 +43,17 @@ class Pointer:
         self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
         self.at = (0, 0)
         self.held = False  # whether the left button pans, for as long as a key is held
-        self._drag = ""
+        self.drag = ""  # what a button that is held down drags: "tool", "pan"
         self._button = 0
         self._pressed_at = (0, 0)
         self._last_click = -1.0, (0, 0)
         self._moved_off = False
         self._shape = -1
 
-    @property
-    def dragging(self) -> bool:
-        return bool(self._drag)
-
     def take(self, event: pygame.event.Event, now: float) -> None:
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
-        taken = not self._drag and self._panel.take(event)
+        taken = not self.drag and self._panel.take(event)
         if event.type == pygame.MOUSEMOTION:
             self._moved(event)
         elif event.type == pygame.MOUSEBUTTONUP:
@@ -86,11 +82,11 @@ class Pointer:
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         editor = self._editor
-        if self._drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
+        if self.drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
             return
         self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
         if event.button != 1 or editor.tool.name == "pan" or self.held:
-            self._drag = "pan"
+            self.drag = "pan"
             return
         problem = self._canvas.problem_at(event.pos)
         if problem is not None and not editor.tool.busy:
@@ -101,7 +97,7 @@ class Pointer:
         then, where = self._last_click
         double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self._canvas.layout.scale
         self._last_click = (-1.0 if double else now), event.pos
-        self._drag = "tool"
+        self.drag = "tool"
         aim = self.aim(event.pos)
         act = editor.tool.twice if double else editor.tool.press
         editor.attempt(lambda: act(editor, aim))
@@ -109,13 +105,13 @@ class Pointer:
     def _moved(self, event: pygame.event.Event) -> None:
         editor, canvas = self._editor, self._canvas
         over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
-        aimed = over or self._drag == "tool"
+        aimed = over or self.drag == "tool"
         editor.cursor = canvas.to_world(event.pos) if aimed else None
         canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
-        canvas.hovered = canvas.problem_at(event.pos) if over and not self._drag else None
+        canvas.hovered = canvas.problem_at(event.pos) if over and not self.drag else None
         far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
-        self._moved_off = self._moved_off or (bool(self._drag) and far)
-        if self._drag == "pan":
+        self._moved_off = self._moved_off or (bool(self.drag) and far)
+        if self.drag == "pan":
             if self._moved_off:
                 canvas.pan(*event.rel)
         elif aimed:
@@ -126,10 +122,10 @@ class Pointer:
             editor.tool.guides = ()
 
     def _released(self, event: pygame.event.Event) -> None:
-        editor, drag = self._editor, self._drag
+        editor, drag = self._editor, self.drag
         if event.button != self._button or not drag:
             return
-        self._drag, self._button = "", 0
+        self.drag, self._button = "", 0
         if drag == "tool":
             aim = self.aim(event.pos)
             editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
@@ -147,14 +143,11 @@ class Pointer:
             return
         shape = "arrow"
         if canvas.over(self.at):
-            panned = self._drag == "pan" or self.held
+            panned = self.drag == "pan" or self.held
             shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
         if _SHAPES[shape] != self._shape:
             self._shape = _SHAPES[shape]
             show_cursor(self._shape)
-
-
-_STATUS_HINT = "F5 try it · F1 keys"
 
 
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
@@ -179,9 +172,6 @@ def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
     said.append(f"{frames:.0f} fps")
     return [each for each in said if each]
 
-
-_PAN = 60  # pixels that a key pans
-_CAPTION = "robocov edit"
 
 # what numbers are typed with, and what may follow in one
 _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
@@ -208,10 +198,20 @@ class EditorWindow(BaseWindow):
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
         self.dialogs = editor.dialogs
-        listed = editor_commands(editor, {**self.documents.commands(), **self._what_to_do()})
+        of_window: dict[str, Callable[[], object]] = {
+            "try": self.try_it,
+            "screenshot": lambda: self.save_screenshot(editor.folder),
+            "name": self._name,
+            "menu": lambda: self.open_menu(self.pointer.at),
+            "pan:hold": lambda: setattr(self.pointer, "held", True),
+            "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
+            "fullscreen": self.toggle_fullscreen,
+            "help": lambda: setattr(self, "help", not self.help),
+            "palette": self.open_palette,
+        }
+        listed = editor_commands(editor, self.canvas, self.documents, of_window)
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
         self.panel = Panel(editor, self.commands, self.do, self._show_problem)
-        self.menu: Menu | None = None
         self.pointer = Pointer(editor, self.canvas, self.panel, self.open_menu)
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
@@ -226,7 +226,7 @@ class EditorWindow(BaseWindow):
         if self.trial is not None:
             self.trial.close()
         self.team.close()
-        self.documents.close()
+        self.dialogs.close()
         self.editor.snapper.close()
 
     def look(self) -> object:
@@ -258,14 +258,14 @@ class EditorWindow(BaseWindow):
             return
         editor = self.editor
         editor.pass_time(seconds)
-        if not self.pointer.dragging:
+        if not self.pointer.drag:
             self.documents.look()
             if "robots" in editor.shown:
                 self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
                 if (team := self.team.poll()) is not None:
                     self.canvas.team = team
                     editor.say(team.words, trouble=True)
-        if not (self.pointer.dragging and editor.readings.busy):
+        if not (self.pointer.drag and editor.readings.busy):
             editor.ask_readings()
         if editor.document.trouble:
             editor.say(editor.document.trouble, trouble=True)
@@ -273,10 +273,10 @@ class EditorWindow(BaseWindow):
             self.closed = True
             return
         self._arrange()
-        self.panel.covered = self.dialogs.open or self.menu is not None
+        self.panel.covered = self.dialogs.open
         self.panel.update()
         self.pointer.show()
-        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · {_CAPTION}"
+        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · robocov edit"
         if caption != self._caption:
             self._caption = caption
             pygame.display.set_caption(caption)
@@ -299,19 +299,16 @@ class EditorWindow(BaseWindow):
         layout, theme, editor = self.layout, self.theme, self.editor
         self.canvas.draw(self.screen)
         told = facts(editor, self.rate, self.canvas.team)
-        draw_status(self.screen, layout.status, theme, layout.scale, told, _STATUS_HINT)
+        draw_status(self.screen, layout.status, theme, layout.scale, told, "F5 try it · F1 keys")
         if layout.panel[2]:
             self.panel.draw(self.screen)
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, editor.trouble)
-        if self.menu is not None:
-            self.menu.draw(self.screen, theme, layout.scale)
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
 
     def do(self, name: str) -> None:
-        self.menu = None
         if name == "cancel" and self.help:
             self.help = False
         else:
@@ -327,45 +324,12 @@ class EditorWindow(BaseWindow):
         if self.editor.problem is not None:
             self.canvas.go_to(self.editor.problem)
 
-    def open_palette(self, text: str = "") -> None:
-
+    def open_palette(self) -> None:
         def told(words: str) -> None:
             self.editor.version += 1
             self.editor.say(words)
 
-        asked = palette(self.commands, GHOST, told)
-        asked.text = text
-        self.dialogs.ask(asked)
-
-    def _what_to_do(self) -> dict[str, Callable[[], object]]:
-        editor, canvas = self.editor, self.canvas
-        return {
-            "fit": canvas.fit,
-            "fit:selection": canvas.fit_selection,
-            "zoom:in": lambda: canvas.zoom(1.25, self._middle()),
-            "zoom:out": lambda: canvas.zoom(0.8, self._middle()),
-            "pan:left": lambda: canvas.pan(_PAN, 0),
-            "pan:right": lambda: canvas.pan(-_PAN, 0),
-            "pan:up": lambda: canvas.pan(0, _PAN),
-            "pan:down": lambda: canvas.pan(0, -_PAN),
-            "pan:hold": lambda: setattr(self.pointer, "held", True),
-            "theme": lambda: setattr(editor, "theme", "dark" if editor.theme == "light" else "light"),
-            "panel": lambda: setattr(editor, "panel", not editor.panel),
-            "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
-            "name": self._name,
-            "menu": lambda: self.open_menu(self.pointer.at),
-            "fullscreen": self.toggle_fullscreen,
-            "screenshot": lambda: self.save_screenshot(editor.folder),
-            "help": lambda: setattr(self, "help", not self.help),
-            "palette": self.open_palette,
-            "try": self.try_it,
-        }
-
-    def _middle(self) -> tuple[float, float]:
-        if self.canvas.over(self.pointer.at):
-            return self.pointer.at
-        left, top, width, height = self.canvas.camera.view
-        return left + width / 2, top + height / 2
+        self.dialogs.ask(palette(self.commands, GHOST, told))
 
     def _name(self) -> None:
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
@@ -383,7 +347,7 @@ class EditorWindow(BaseWindow):
             if not near:
                 editor.select(Selection.of(*there[:1]))
         found = [self.commands[name] if name else None for name in offered(editor)]
-        self.menu = Menu(found, pixel, self.do)
+        self.dialogs.ask(Menu(found, pixel, self.do))
 
     def try_it(self) -> None:
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
@@ -436,7 +400,7 @@ class EditorWindow(BaseWindow):
         if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
             self.pointer.at = event.pos
         if kind == pygame.QUIT:
-            if isinstance(self.editor.asked, ImportDialog):
+            if isinstance(self.editor.asked, ImportDialog | Menu):
                 self.dialogs.close()
             if not self.dialogs.open:
                 self.do("quit")
@@ -444,8 +408,6 @@ class EditorWindow(BaseWindow):
             return
         elif kind == pygame.DROPFILE:
             self.editor.attempt(lambda: self.documents.open(Path(event.file)))
-        elif self.menu is not None and self._menu_takes(self.menu, event):
-            return
         elif kind == pygame.KEYDOWN:
             self._press(event)
             if self.trial is not None:
@@ -459,12 +421,6 @@ class EditorWindow(BaseWindow):
             self.pointer.leave()
         else:
             self.panel.take(event)
-
-    def _menu_takes(self, menu: Menu, event: pygame.event.Event) -> bool:
-        taken = menu.take(event)
-        if not menu.open and self.menu is menu:
-            self.menu = None
-        return taken
 
     def _press(self, event: pygame.event.Event) -> None:
         """Take a key: for a field, for a number while something is drawn, else for a command."""
