@@ -188,9 +188,10 @@ class Menu(Dialog):
             if ui.option(command.title, _keys(command), key=command.name, chosen=chosen, why=why):
                 self._choose(command)
 
-    def _choose(self, command: Command) -> None:
+    def _choose(self, command: Command | None) -> None:
         self.done = True
-        self._do(command.name)
+        if command is not None:
+            self._do(command.name)
 
     def key(self, name: str, ui: Ui) -> bool:
         usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
@@ -199,9 +200,7 @@ class Menu(Dialog):
             k = usable.index(self.chosen) + by if self.chosen in usable else (0 if by > 0 else -1)
             self.chosen = usable[k % len(usable)]
         elif name in ("return", "enter") and self.chosen in usable:
-            command = self.commands[self.chosen]
-            assert command is not None
-            self._choose(command)
+            self._choose(self.commands[self.chosen])
         return True
 
     def place(self, box: Rect, screen: Rect, scale: float) -> None:
@@ -217,12 +216,7 @@ def _keys(command: Command) -> str:
 
 
 def draw_keys(
-    screen: Surface,
-    theme: Theme,
-    scale: float,
-    commands: Iterable[Command],
-    groups: Sequence[str],
-    words: str,
+    screen: Surface, theme: Theme, scale: float, commands: list[Command], groups: Sequence[str], words: str
 ) -> None:
     dim(screen, theme)
     keyed = [each for each in commands if each.keys and not each.hidden]

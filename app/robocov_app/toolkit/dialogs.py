@@ -1,6 +1,5 @@
 """Dialogs over a window: questions with answers, lists to choose from by typing, files."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -24,7 +23,7 @@ _MOST_LINES = 14
 _NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 
 
-class Dialog(ABC):
+class Dialog:
     """Something that is asked, in a card over the window."""
 
     width = 560.0
@@ -33,7 +32,6 @@ class Dialog(ABC):
     closes_beside = False  # whether a press beside it gives it up
     done = False
 
-    @abstractmethod
     def page(self, ui: Ui) -> None:
         """Show it."""
 
@@ -47,14 +45,14 @@ class Dialog(ABC):
         self.page(ui)
         ui.space(above)
 
-    @abstractmethod
     def key(self, name: str, ui: Ui) -> bool:
         """Take a key; return whether it meant something."""
+        return False
 
-    def wheel(self, notches: float) -> None:  # noqa: B027 - most have nothing to scroll
+    def wheel(self, notches: float) -> None:
         """Take a turn of the wheel."""
 
-    def cancelled(self) -> None:  # noqa: B027 - most need not know
+    def cancelled(self) -> None:
         """Take note that it was given up."""
 
 
@@ -80,8 +78,7 @@ class Question(Dialog):
     def page(self, ui: Ui) -> None:
         ui.words(self.title, size=16, bold=True)
         ui.space(6)
-        size = ui.px(TEXT + 1)
-        wide = ui.px(ui.wide)
+        size, wide = ui.px(TEXT + 1), ui.px(ui.wide)
         lines = [line for part in self.words.split("\n") for line in wrapped(part, size, wide) or [""]]
         for line in lines[:_MOST_LINES]:
             ui.words(line, size=TEXT + 1)
@@ -145,15 +142,13 @@ class Choice(Dialog):
     trouble: str = ""
 
     def page(self, ui: Ui) -> None:
-        if self.title:
-            ui.words(self.title, colour=ui.theme.faint, bold=True)
+        ui.words(self.title, colour=ui.theme.faint, bold=True)
         if ui.edit is None or ui.focus != "text":
             ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
         ui.row(height=32, below=8)
         ui.text_entry("text", self.text, ghost=self.ghost)
         self.typed(ui)
-        if self.trouble:
-            ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
+        ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
         found = list(self.options(self.text))
         self.chosen = min(self.chosen, max(len(found) - 1, 0))
         ui.row(height=26, below=1)
@@ -215,7 +210,7 @@ class Choice(Dialog):
 
 
 def list_choice(
-    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
+    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object]
 ) -> Choice:
     def found(typed: str) -> list[Option]:
         words = typed.lower().split()
@@ -227,7 +222,7 @@ def list_choice(
             raise InputError(f"{typed!r}, but one of the list was wanted")
         accept(option)
 
-    return Choice(title, found, chosen, ghost or "type to find")
+    return Choice(title, found, chosen, "type to find")
 
 
 def file_choice(

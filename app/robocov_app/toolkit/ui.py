@@ -13,7 +13,6 @@ this run: a button True, others the new value, None where nothing happened::
 Keys of widgets are unique within a page. Where `why` is given a widget is disabled, and says so in its tip.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -785,7 +784,7 @@ class Ui:
         return self.shown.get(f"{kind}:{key}")
 
 
-class SidePanel(ABC):
+class SidePanel:
     """A panel beside the arena whose page is drawn anew when the layout, or what it shows, is different."""
 
     def __init__(self, tab: str) -> None:
@@ -795,7 +794,6 @@ class SidePanel(ABC):
         self.ui = Ui(self._page, LIGHT)
         self._drawn: object = None  # what the page showed when it was drawn
 
-    @abstractmethod
     def _page(self, ui: Ui) -> None:
         """Show it."""
 

@@ -4,7 +4,6 @@ import gc
 import os
 import sys
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -40,7 +39,7 @@ class Remote(Protocol):
         """Show what is in the window now."""
 
 
-class BaseWindow(ABC):
+class BaseWindow:
     """A window that is drawn while something moves, and otherwise only when something is different."""
 
     def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
@@ -53,27 +52,23 @@ class BaseWindow(ABC):
         self._touched = False
         self._drawn: object = None
 
-    @abstractmethod
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
 
-    @abstractmethod
     def update(self, seconds: float) -> None:
         """Let so many seconds pass."""
 
-    @abstractmethod
     def draw(self) -> None:
         """Draw everything, and show it."""
 
-    @abstractmethod
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
+        return None
 
-    @abstractmethod
     def close(self) -> None:
         """End what is going on beside the window."""
 
-    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:  # noqa: B027 - some have one look
+    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
         """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
 
     def run(self) -> None:

@@ -17,9 +17,8 @@ from robocov_app.editor.canvas.overlay import legend_entries
 from robocov_app.editor.edits.paths import goes, moving
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.select import Moving
 from robocov_app.editor.tools.tool import KNOB, frame_of, handles
@@ -59,7 +58,7 @@ class Strips:
 
     def update(self, canvas: Canvas, team: Team | None) -> None:
         editor = self._editor
-        self._entries = self._found(team)
+        self._entries = self._found(team) if "legend" in editor.shown else []
         rows = max(len(annotations.legend_rows(canvas, self._entries)), 1)
         key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
         # while things come and go the legend does not become lower again: the map is not to jump
@@ -68,8 +67,6 @@ class Strips:
 
     def _found(self, team: Team | None) -> list[LegendEntry]:
         sketch, shown = self._editor.sketch, self._editor.shown
-        if "legend" not in shown:
-            return []
         unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
         standing = "robots" in shown and team is not None and bool(team.places)
         measurement = self._editor.measurement if "impassable" in shown else None
@@ -158,10 +155,9 @@ class EditorCanvas:
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
 
     def go_to(self, problem: Problem) -> None:
-        where = problem.where
-        if where is None or where.is_empty:
+        if problem.where is None or problem.where.is_empty:
             return
-        spot = where.representative_point()
+        spot = problem.where.representative_point()
         x, y = self.to_pixel((spot.x, spot.y))
         edge = round(80 * self.layout.scale)
         if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(x, y):
@@ -207,12 +203,9 @@ class EditorCanvas:
         return REACH * self.layout.scale / self.camera.zoom
 
     def problem_at(self, pixel: Point) -> Problem | None:
-        if "problems" not in self.editor.shown:
-            return None
-        for problem, at in overlay.badge_places(self.editor.problems, self._view()):
-            if distance(at, pixel) < 10 * self.layout.scale:
-                return problem
-        return None
+        found = self.editor.problems if "problems" in self.editor.shown else ()
+        places, reach = overlay.badge_places(found, self._view()), 10 * self.layout.scale
+        return next((problem for problem, at in places if distance(at, pixel) < reach), None)
 
     def _view(self) -> View:
         editor, layout = self.editor, self.layout
@@ -232,9 +225,12 @@ class EditorCanvas:
         weighed = getattr(editor.tool, "change", None)
         drag = editor.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
-        lifted = _changed(base, now)
-        if carried is not None:
-            lifted = frozenset() if carried.copies else carried.moving.items
+        lifted: frozenset[int] = frozenset()
+        if carried is not None and not carried.copies:
+            lifted = carried.moving.items
+        elif carried is None and now is not base:  # those that are others by now, or gone
+            items = {item.key: item for item in now.obstacles}
+            lifted = frozenset(item.key for item in base.obstacles if items.get(item.key) is not item)
         under = now if now.boundary is not base.boundary else base
         if moved is not None:
             under = replace(under, background=moved)
@@ -252,12 +248,16 @@ class EditorCanvas:
             self._carry(screen, view, carried)
         elif now is not base:
             there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
-            self.sheet.draw_items(canvas, there, self._lifted_fill)
+            self.sheet.draw_items(canvas, there, mix(theme.obstacle, theme.final, 0.22))
         measurement = editor.measurement if "impassable" in shown else None
+        gap = measurement.gap if measurement is not None else None
         if measurement is not None:
-            self._hatch(screen, view, measurement)
-            if measurement.gap is not None:
-                overlay.draw_gap(canvas, measurement.gap, measurement.radius)
+            look = view.camera, theme.name, view.scale, view.size
+            patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
+            if patch is not None:
+                screen.blit(*patch, special_flags=_BLEND)
+        if measurement is not None and gap is not None:
+            overlay.draw_gap(canvas, gap, measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         for k, (name, spec) in enumerate(now.starts):
             overlay.draw_start(canvas, spec, name, chosen=name in editor.selection.starts, first=k == 0)
@@ -265,34 +265,30 @@ class EditorCanvas:
             self._draw_team(canvas, self.team)
         if carried is None:
             self._draw_selection(screen, view, canvas, now, chosen)
-        if measurement is not None and measurement.gap is not None:
+        if measurement is not None and gap is not None:
             busy = editor.tool is not editor.selector or drag is not None
-            overlay.tag_gap(canvas, measurement.gap, measurement.radius, self.at if busy else None)
+            overlay.tag_gap(canvas, gap, measurement.radius, self.at if busy else None)
         if "problems" in shown:
             overlay.draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
-        self._draw_tool(canvas)
+        overlay.draw_guides(canvas, editor.tool.guides)
+        preview = editor.tool.preview(editor)
+        if preview is not None:
+            overlay.draw_preview(canvas, preview, self.at)
+        if editor.typed:
+            overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
         screen.set_clip(None)
         self.strips.draw(screen, canvas, self.layout.arena)
-
-    @property
-    def _lifted_fill(self) -> Colour:
-        return mix(self.theme.obstacle, self.theme.final, 0.22)
-
-    def _hatch(self, screen: Surface, view: View, measurement: Measurement) -> None:
-        look = view.camera, view.theme.name, view.scale, view.size
-        patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
-        if patch is not None:
-            screen.blit(*patch, special_flags=_BLEND)
 
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
         """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
         sketch, colour = self.editor.sketch, self.theme.final
+        fill = mix(self.theme.obstacle, colour, 0.22)
 
         def drawn() -> Surface:
             page = Surface(view.size, pygame.SRCALPHA, 32)
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
-            self.sheet.draw_items(view.canvas(page), there, self._lifted_fill, colour)
+            self.sheet.draw_items(view.canvas(page), there, fill, colour)
             for owner in drag.moving.owners - drag.moving.items:
                 self._draw_owner(view.canvas(page), sketch, owner, colour, 2.0)
             return page
@@ -336,7 +332,7 @@ class EditorCanvas:
         selection = selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
         hovered = selector.hovered if editor.tool is selector and not selector.busy and self.at else None
-        if hovered is not None and hovered not in owners:
+        if hovered is not None and hovered not in owners and Selection.of(hovered).within(sketch):
             self._draw_owner(canvas, sketch, hovered, mix(floor, colour, 0.7), 1.5)
 
         def outline(canvas: Canvas) -> None:
@@ -355,37 +351,15 @@ class EditorCanvas:
             outline(canvas)
         if "handles" not in editor.shown or editor.tool is not selector or not selection:
             return
-        box = frame_of(sketch, selection, editor.pixel)
-        if box is not None:
+        if (box := frame_of(sketch, selection, editor.pixel)) is not None:
             overlay.draw_box(canvas, box, mix(floor, colour, 0.6))
         found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
-        chosen = frozenset(selection.vertices)
-        overlay.draw_grips(canvas, found, chosen, selector.near, KNOB * canvas.scale)
+        overlay.draw_grips(canvas, found, selection.vertices, selector.near, KNOB * canvas.scale)
 
     def _draw_owner(self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: Colour, width: float) -> None:
         if isinstance(owner, str):
-            if owner in dict(sketch.starts):
-                overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
+            overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
         elif owner == BOUNDARY:
-            if sketch.boundary is not None:
-                ring = np.asarray(sketch.boundary, dtype=float)
-                overlay.draw_outline(canvas, [ring], colour, width + 0.5)
-        elif owner in sketch.places:
+            overlay.draw_outline(canvas, [np.asarray(sketch.boundary, dtype=float)], colour, width + 0.5)
+        else:
             overlay.draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
-
-    def _draw_tool(self, canvas: Canvas) -> None:
-        editor = self.editor
-        overlay.draw_guides(canvas, editor.tool.guides)
-        preview = editor.tool.preview(editor)
-        if preview is not None:
-            overlay.draw_preview(canvas, preview, self.at)
-        if editor.typed:
-            overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
-
-
-def _changed(base: Sketch, now: Sketch) -> frozenset[int]:
-    """Return the obstacles of a sketch that are others, or gone, in another."""
-    if now is base:
-        return frozenset()
-    there: dict[int, Item] = {item.key: item for item in now.obstacles}
-    return frozenset(item.key for item in base.obstacles if there.get(item.key) is not item)

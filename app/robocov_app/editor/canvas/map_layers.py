@@ -86,18 +86,15 @@ class Outlines:
             known = self._known[id(item)] = (item, outline_of(item.geometry))
         return known[1]
 
-    def bounds(self, sketch: Sketch) -> Array:
-        """Return the bounds of all obstacles of a sketch, (n, 4) m, in their order."""
-        return self._bounds.of(sketch, None, lambda: self._all_bounds(sketch))
-
-    def _all_bounds(self, sketch: Sketch) -> Array:
-        if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
-            self._known = {}
-        return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
-
     def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
         """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
-        low_x, low_y, high_x, high_y = self.bounds(sketch).T
+
+        def bounds() -> Array:
+            if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
+                self._known = {}
+            return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
+
+        low_x, low_y, high_x, high_y = self._bounds.of(sketch, None, bounds).T
         there = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
         return [sketch.obstacles[k] for k in np.flatnonzero(there) if not sketch.obstacles[k].hidden]
 
@@ -161,50 +158,52 @@ class Sheet:
             *(sketch.boundary, sketch.density),
         )
         items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
-        page = self._page
-        if page is None or look != self._look or self._camera is None:
-            return self._all(view, sketch, items, look)
-        boxes: list[Rect] = []
-        if view.camera.center != self._camera.center:
-            moved = self._scroll(page, view)
-            if moved is None:
-                return self._all(view, sketch, items, look)
-            boxes += moved
-        drawn, self._drawn = self._drawn, items
-        boxes += [self._box(view, item) for key, item in drawn.items() if items.get(key) is not item]
-        boxes += [self._box(view, item) for key, item in items.items() if drawn.get(key) is not item]
-        boxes = [box for box in (each.clip(view.clip) for each in boxes) if box.width and box.height]
-        whole = view.clip
-        if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
-            return self._all(view, sketch, items, look)
-        for box in _merged(boxes):
-            self._paint(page, view, sketch, items, box)
-            self.patched += 1
-        return page
-
-    def _all(self, view: View, sketch: Sketch, items: dict[int, Item], look: object) -> Surface:
+        boxes = self._boxes(view, items) if look == self._look else None
         if self._page is None or self._page.get_size() != view.size:
             self._page = Surface(view.size, 0, 32)
+        if boxes is None:
+            boxes = [view.clip]
+            self.full += 1
+        else:
+            self.patched += len(boxes)
         self._look, self._camera, self._drawn = look, view.camera, items
-        self._paint(self._page, view, sketch, items, view.clip)
-        self.full += 1
+        for box in boxes:
+            self._paint(self._page, view, sketch, items, box)
         return self._page
 
-    def _scroll(self, page: Surface, view: View) -> list[Rect] | None:
+    def _boxes(self, view: View, items: dict[int, Item]) -> list[Rect] | None:
+        """Return what is to be painted anew, after the page was moved with the camera; None where all is."""
+        boxes: list[Rect] = []
+        if self._camera is not None and view.camera.center != self._camera.center:
+            moved = self._scroll(self._camera, view)
+            if moved is None:
+                return None
+            boxes += moved
+        changed = [item for key, item in self._drawn.items() if items.get(key) is not item]
+        changed += [item for key, item in items.items() if self._drawn.get(key) is not item]
+        edge = 2 * round(_EDGE * view.scale)
+        bounds = [self.outlines.of(item).bounds for item in changed]
+        boxes += [pixel_box(view.camera, b).inflate(edge, edge) for b in bounds if np.isfinite(b[0])]
+        whole = view.clip
+        boxes = [box for box in (each.clip(whole) for each in boxes) if box.width and box.height]
+        if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
+            return None
+        return _merged(boxes)
+
+    def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
         """Move the page with the camera; return what came into sight, None where it cannot be moved."""
-        assert self._camera is not None
-        before = self._camera.to_pixels(np.array(view.camera.center))
+        before = camera.to_pixels(np.array(view.camera.center))
         dx, dy = (np.array(view.camera.middle) - before).tolist()
         whole_x, whole_y = round(dx), round(dy)
         clip = view.clip
         far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
         if far or abs(dx - whole_x) > 0.02 or abs(dy - whole_y) > 0.02:
             return None
-        self._camera = view.camera
+        assert self._page is not None
         self.scrolled += 1
-        page.set_clip(clip)
-        page.scroll(whole_x, whole_y)
-        page.set_clip(None)
+        self._page.set_clip(clip)
+        self._page.scroll(whole_x, whole_y)
+        self._page.set_clip(None)
         boxes = []
         if whole_x:
             left = clip.left if whole_x > 0 else clip.right + whole_x
@@ -215,12 +214,6 @@ class Sheet:
             left = clip.left + max(whole_x, 0)
             boxes.append(Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
         return boxes
-
-    def _box(self, view: View, item: Item) -> Rect:
-        bounds, edge = self.outlines.of(item).bounds, 2 * round(_EDGE * view.scale)
-        return (
-            pixel_box(view.camera, bounds).inflate(edge, edge) if np.isfinite(bounds[0]) else Rect(0, 0, 0, 0)
-        )
 
     def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
         page.set_clip(box)
@@ -238,9 +231,15 @@ class Sheet:
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
             draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
-        self._draw_beyond(canvas, sketch)
-        corners = np.array([box.bottomleft, box.topright], dtype=float)
-        (low_x, low_y), (high_x, high_y) = camera.to_world(corners).tolist()
+        # what robots take for free although it lies outside the boundary: it is in their hull
+        fill = mix(outside_colour(theme), theme.obstacle, 0.55)
+        for part in shapely.get_parts(self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))):
+            if isinstance(part, shapely.Polygon):
+                corners = camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+                canvas.polygon(corners, fill)
+                canvas.outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
+        ends = np.array([box.bottomleft, box.topright], dtype=float)
+        (low_x, low_y), (high_x, high_y) = camera.to_world(ends).tolist()
         edge = _EDGE * view.scale / camera.zoom
         wanted = (low_x - edge, low_y - edge, high_x + edge, high_y + edge)
         there = [item for item in self.outlines.touching(sketch, wanted) if items.get(item.key) is item]
@@ -249,7 +248,7 @@ class Sheet:
         else:
             over = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = camera.within((camera.view[0] - box.x, camera.view[1] - box.y, *camera.view[2:]))
-            self.draw_items(Canvas(over, shifted, theme, view.scale, robot_hues(0)), there)
+            self.draw_items(replace(canvas, surface=over, camera=shifted), there)
             over.set_alpha(round(255 * SEEN_THROUGH))
             page.blit(over, box)
         if ring is not None:
@@ -260,11 +259,9 @@ class Sheet:
 
     def _grid(self, page: Surface, view: View, box: Rect, *, fine: bool) -> None:
         """Draw the grid: lines where it snaps if they are far enough apart, strong ones at round places."""
-        zoom, theme = view.camera.zoom, view.theme
-        close, wide = grid_steps(view.grid, zoom, view.scale)
-        floor = theme.background
-        parts = (0.32, 0.75) if theme is LIGHT else (0.2, 0.5)
-        soft, strong = (mix(floor, theme.grid, part) for part in parts)
+        theme, parts = view.theme, (0.32, 0.75) if view.theme is LIGHT else (0.2, 0.5)
+        close, wide = grid_steps(view.grid, view.camera.zoom, view.scale)
+        soft, strong = (mix(theme.background, theme.grid, part) for part in parts)
         low_x, low_y, high_x, high_y = view.camera.visible()
         width = max(1, round(view.scale))
         for step, colour in ((close, soft), (wide, strong))[0 if fine else 1 :]:
@@ -277,32 +274,21 @@ class Sheet:
             for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
                 page.fill(colour, Rect(box.left, round(y - width / 2), box.width, width))
 
-    def _draw_beyond(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw what robots take for free although it lies outside the boundary: it is in their hull."""
-        geometry = self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))
-        fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
-        for part in shapely.get_parts(geometry):
-            if isinstance(part, shapely.Polygon):
-                corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
-                canvas.polygon(corners, fill)
-                canvas.outline(corners, mix(fill, canvas.theme.obstacle_edge, 0.5), 1)
-
     def draw_items(
         self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
     ) -> None:
         """Draw obstacles: first what they cover, then their edges, so that each can be told apart."""
         fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
         plain = [self.outlines.of(item) for item in items]
-        rings = [ring for each in plain if all(each.outer) for ring in each.rings]
-        if rings:
-            corners, ends = _joined(canvas, rings)
-            canvas.polygons(corners, ends, [fill] * len(ends))
-        for each in plain:
-            if not all(each.outer):
-                _draw_holed(canvas, each, fill)
         rings = [ring for each in plain for ring in each.rings]
         if rings:
-            corners, ends = _joined(canvas, rings)
+            ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
+            corners = canvas.camera.to_pixels(np.concatenate(rings))
+            fills = [fill if all(each.outer) else None for each in plain for _ in each.rings]
+            canvas.polygons(corners, ends, fills)
+            for each in plain:
+                if not all(each.outer):
+                    _draw_holed(canvas, each, fill)
             _draw_rings(canvas, corners, ends, edge)
         for each in plain:
             for line in each.lines:
@@ -314,13 +300,9 @@ class Sheet:
         size = canvas.text_size(canvas.theme.small_text)
         colour = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
         for item in items:
-            name = item.shape.name
-            if not name:
-                continue
-            outline = self.outlines.of(item)
+            name, outline, zoom = item.shape.name, self.outlines.of(item), canvas.camera.zoom
             low_x, low_y, high_x, high_y = outline.bounds.tolist()
-            zoom = canvas.camera.zoom
-            if (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
+            if not name or (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
                 continue
             x, y, room, high = outline.name_place
             words = shortened(name, size, room * zoom - _ROOM * canvas.scale)
@@ -359,11 +341,6 @@ def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
     return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
 
 
-def _joined(canvas: Canvas, rings: list[Array]) -> tuple[Array, list[int]]:
-    ends = np.cumsum([len(ring) for ring in rings]).tolist()
-    return canvas.camera.to_pixels(np.concatenate(rings)), ends
-
-
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
@@ -389,7 +366,7 @@ def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
     clip = canvas.surface.get_clip()
     page = Surface(clip.size, pygame.SRCALPHA, 32)
     shift = np.array(clip.topleft, dtype=float)
-    own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
+    own = replace(canvas, surface=page)
     for ring, outer in zip(outline.rings, outline.outer, strict=True):
         own.polygon(canvas.camera.to_pixels(ring) - shift, (*fill, 255) if outer else (0, 0, 0, 0))
     canvas.surface.blit(page, clip, special_flags=pygame.BLEND_PREMULTIPLIED)

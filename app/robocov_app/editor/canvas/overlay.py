@@ -1,6 +1,6 @@
 """Overlay of the sheet: selection and its handles, guides, what is drawn; what validation found."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart
 from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour, pixel_box
 from robocov_app.editor.model.geometry import distance, length_words
 from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import Handle, Preview
@@ -33,6 +34,7 @@ STEM = 17.0  # that it is above its place
 
 MOST_LENGTHS = 40  # edges of what is drawn whose lengths are told
 MOST_BADGES = 200
+SEALED = "repulsion_robots"  # the force with the colour of what no robot comes to from the largest part
 
 
 def problem_colour(theme: Theme, *, grave: bool) -> Colour:
@@ -49,12 +51,7 @@ def _ring(canvas: Canvas, at: Point, radius: float, colour: Colour, width: float
 
 
 def _disc(
-    canvas: Canvas,
-    at: Point,
-    radius: float,
-    colours: tuple[Colour, Colour, Colour],
-    width: float,
-    text: str = "",
+    canvas: Canvas, at: Point, radius: float, colours: Sequence[Colour], width: float, text: str = ""
 ) -> None:
     """Draw a disc: colours of its inside, of the ring around it, of what is around that."""
     fill, ring, edge = colours
@@ -77,7 +74,7 @@ def _dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float
 
 
 def draw_grips(
-    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[object], near: Handle | None, stem: float
+    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[Vertex], near: Handle | None, stem: float
 ) -> None:
     """Draw the handles; `stem` is how far the knob is from the box, px."""
     floor, edge = canvas.theme.background, canvas.theme.final
@@ -268,7 +265,7 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
 def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
     theme = view.theme
-    areas = ((measurement.sealed, sealed_colour(theme), 0.5), (measurement.impassable, theme.trajectory, 1.0))
+    areas = ((measurement.sealed, theme.forces[SEALED], 0.5), (measurement.impassable, theme.trajectory, 1.0))
     parts = [(some, colour, strength) for area, colour, strength in areas if (some := _polygons(area))]
     if not parts:
         return None
@@ -294,10 +291,6 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
 def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
     parts = shapely.get_parts(area)
     return [each for each in parts if isinstance(each, shapely.Polygon) and not each.is_empty]
-
-
-def sealed_colour(theme: Theme) -> Colour:
-    return theme.forces["repulsion_robots"]
 
 
 def _stencil(canvas: Canvas, area: shapely.Polygon, corner: tuple[int, int]) -> None:
@@ -373,8 +366,13 @@ def draw_problems(
 ) -> None:
     theme, scale = canvas.theme, canvas.scale
     for problem in found[:MOST_BADGES]:
-        if problem.where is not None and (problem.grave or problem in (told, hovered)):
-            _draw_place(canvas, problem)
+        colour = problem_colour(theme, grave=problem.grave)
+        shown = problem.grave or problem in (told, hovered)
+        for part in shapely.get_parts(problem.where) if problem.where is not None and shown else ():
+            for ring in [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]:
+                points = canvas.camera.to_pixels(shapely.get_coordinates(ring))
+                if len(points) > 1:
+                    canvas.outline(points, colour, canvas.width(2), closed=False)
     places = badge_places(found, view)
     for problem, (x, y) in reversed(places):
         colour, foot = problem_colour(theme, grave=problem.grave), y + STEM * scale
@@ -393,15 +391,6 @@ def draw_problems(
                 _ring(canvas, (x, y), BADGE + 4, theme.ink, 1.6)
 
 
-def _draw_place(canvas: Canvas, problem: Problem) -> None:
-    colour = problem_colour(canvas.theme, grave=problem.grave)
-    for part in shapely.get_parts(problem.where):
-        for ring in [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]:
-            points = shapely.get_coordinates(ring)
-            if len(points) > 1:
-                canvas.outline(canvas.camera.to_pixels(points), colour, canvas.width(2), closed=False)
-
-
 def draw_badge(
     canvas: Canvas, x: float, y: float, *, grave: bool, radius: float = BADGE, rim: float = 1.4
 ) -> None:
@@ -410,37 +399,38 @@ def draw_badge(
 
 
 def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
-    rows: list[tuple[object, str, Glyph]] = [
-        (True, "obstacle", lambda on, x, y: on.swatch(x, y, on.theme.obstacle, on.theme.obstacle_edge)),
-        (True, "boundary", _boundary_glyph),
-        (unfree, "outside, in the robots' hull", _beyond_glyph),
-        (starts, "start", lambda canvas, x, y: _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)),
-        (team, "robot", _robot_glyph),
-        (found and found.impassable, "too narrow for a robot", partial(_hatch_glyph, narrow=True)),
-        (found and found.sealed, "cut off", partial(_hatch_glyph, narrow=False)),
+    def obstacle(canvas: Canvas, x: float, y: float) -> None:
+        canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
+
+    def boundary(canvas: Canvas, x: float, y: float) -> None:
+        half, width = 9 * canvas.scale, canvas.width(canvas.theme.boundary_line)
+        canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, width)
+
+    def beyond(canvas: Canvas, x: float, y: float) -> None:
+        fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
+        canvas.swatch(x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
+
+    def start(canvas: Canvas, x: float, y: float) -> None:
+        _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)
+
+    def robot(canvas: Canvas, x: float, y: float) -> None:
+        edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
+        _disc(canvas, (x, y), 6.5, (canvas.theme.robots[0], canvas.theme.robot_ring, edge), 1.4)
+
+    def hatch(canvas: Canvas, x: float, y: float, *, narrow: bool) -> None:
+        size = round(12 * canvas.scale)
+        colour = canvas.theme.trajectory if narrow else canvas.theme.forces[SEALED]
+        page = _lines((size, size), colour, canvas.scale, (0, 0))
+        canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))
+
+    rows: tuple[tuple[object, str, Glyph], ...] = (
+        (True, "obstacle", obstacle),
+        (True, "boundary", boundary),
+        (unfree, "outside, in the robots' hull", beyond),
+        (starts, "start", start),
+        (team, "robot", robot),
+        (found and found.impassable, "too narrow for a robot", partial(hatch, narrow=True)),
+        (found and found.sealed, "cut off", partial(hatch, narrow=False)),
         (found and found.problems, "problem", partial(draw_badge, grave=True, radius=6.5, rim=1.0)),
-    ]
+    )
     return [LegendEntry(text, glyph) for is_there, text, glyph in rows if is_there]
-
-
-def _beyond_glyph(canvas: Canvas, x: float, y: float) -> None:
-    fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
-    canvas.swatch(x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
-
-
-def _boundary_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 9 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))
-
-
-def _robot_glyph(canvas: Canvas, x: float, y: float) -> None:
-    theme = canvas.theme
-    edge = mix(theme.background, theme.ink, 0.55)
-    _disc(canvas, (x, y), 6.5, (theme.robots[0], theme.robot_ring, edge), 1.4)
-
-
-def _hatch_glyph(canvas: Canvas, x: float, y: float, *, narrow: bool) -> None:
-    size = round(12 * canvas.scale)
-    colour = canvas.theme.trajectory if narrow else sealed_colour(canvas.theme)
-    page = _lines((size, size), colour, canvas.scale, (0, 0))
-    canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))

@@ -1,17 +1,14 @@
 """The picture under the map, as large as the camera asks."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
+from PIL import Image, ImageOps
 from pygame import Rect, Surface
 
 from robocov_app.editor.model.background import Background
 from robocov_app.render.camera import Camera
-
-if TYPE_CHECKING:
-    from PIL import Image
 
 LARGEST = 4096  # pixels of a side that are kept of a larger picture
 _LARGEST_SHOWN = 8192  # of a side of what is made of it at most
@@ -47,14 +44,12 @@ class ReferenceImage:
             first_y = max(int((clip.top - top) / factor) - 1, 0)
             last_x = min(int((clip.right - left) / factor) + 2, width)
             last_y = min(int((clip.bottom - top) / factor) + 2, height)
-            if last_x <= first_x or last_y <= first_y:
-                return
-            part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
             at = Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
             to_x, to_y = round(left + last_x * factor), round(top + last_y * factor)
             size = max(to_x - at.x, 1), max(to_y - at.y, 1)
-            if max(size) > _LARGEST_SHOWN:
+            if last_x <= first_x or last_y <= first_y or max(size) > _LARGEST_SHOWN:
                 return
+            part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
             shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
         shown.set_alpha(round(255 * background.opacity))
         page.blit(shown, at)
@@ -62,8 +57,6 @@ class ReferenceImage:
     def _load(self, path: Path) -> None:
         if path == self._of:
             return
-        from PIL import Image, ImageOps
-
         self._of, self._picture, self.trouble = path, None, ""
         try:
             with Image.open(path) as opened:
@@ -78,17 +71,14 @@ class ReferenceImage:
         self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
 
 
-def _on_white(picture: "Image.Image") -> "Image.Image":
+def _on_white(picture: Image.Image) -> Image.Image:
     """Return a picture in colours, what is clear in it white."""
-    from PIL import Image
-
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         clear = picture.convert("RGBA")
         page = Image.new("RGBA", clear.size, (255, 255, 255, 255))
         return Image.alpha_composite(page, clear).convert("RGB")
     if picture.mode.startswith("I") or picture.mode == "F":
         values = np.asarray(picture, dtype=float)
-        low, high = float(values.min()), float(values.max())
-        grey = (values - low) * (255.0 / max(high - low, 1e-9))
+        grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
         return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
     return picture.convert("RGB")

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
+from PIL import Image, UnidentifiedImageError
+
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
 from robocov_app.editor.edits.properties import underlaid
@@ -206,8 +208,6 @@ class FileCommands:
 
 def lay_under(editor: Editor, path: Path) -> None:
     """Put a picture under the map, as wide as the map is, or 20 m."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
         with Image.open(path) as picture:
             pixels = picture.size

@@ -1,7 +1,7 @@
 """The import dialog: options at the left, the map before and after at the right, the report below."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Theme
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
@@ -30,8 +30,6 @@ from robocov_app.toolkit.worker import Worker
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
 
 _FEWEST_LINES = 7  # of the report; more below maps that are wide
-_MARK = 150  # opacity of what is marked, of 255
-
 _HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
 _DEFAULT = "default"
 
@@ -73,8 +71,8 @@ class ImportDialog(Dialog):
         given = self.given
         values = {each.name: each.value(given[each.name]) for each in self.options if each.name in given}
         of_reading = {field.name for field in fields(ReadOptions)}
-        read = {name: value for name, value in values.items() if name in of_reading}
-        return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
+        read = {name: values.pop(name) for name in values.keys() & of_reading}
+        return ReadOptions(**read), Shaping(**values)
 
     def _ask(self) -> None:
         self.accepted = False
@@ -254,32 +252,27 @@ def _maps(
 ) -> Surface:
     compared = imported.comparison
     picture = Surface(size, pygame.SRCALPHA)
-    before = (compared.before, compared.lost, theme.trajectory)
-    after = (compared.after, compared.opened, theme.start)
-    for camera, (free, marked, colour) in zip(cameras, (before, after), strict=True):
+    before, after = (compared.before, compared.lost), (compared.after, compared.opened)
+    colours = theme.trajectory, theme.start
+    for camera, (free, marked), colour in zip(cameras, (before, after), colours, strict=True):
         _fill(picture, camera, compared.region, theme.obstacle, theme.obstacle)
         _fill(picture, camera, free, theme.background, theme.obstacle)
         for ring in shapely.get_rings(shapely.get_parts(free)):
             points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
             pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
         marks = Surface(size, pygame.SRCALPHA)
-        _fill(marks, camera, marked, (*colour, _MARK), (0, 0, 0, 0))
+        _fill(marks, camera, marked, (*colour, 150), (0, 0, 0, 0))
         picture.blit(marks, (0, 0))
     if compared.gap is not None:
         ends = cameras[1].to_pixels(np.array(compared.gap.between))
         pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), round(2 * scale))
-        reach = float(np.hypot(*(ends[1] - ends[0]))) / 2
-        if reach < 10 * scale:
+        if math.dist(*ends) < 20 * scale:
             pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, round(2 * scale))
     return picture
 
 
 def _fill(
-    surface: Surface,
-    camera: Camera,
-    area: BaseGeometry,
-    inside: Colour | tuple[int, int, int, int],
-    holes: Colour | tuple[int, int, int, int],
+    surface: Surface, camera: Camera, area: BaseGeometry, inside: Sequence[int], holes: Sequence[int]
 ) -> None:
     """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
     parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]

@@ -19,8 +19,6 @@ from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-BACK = ("f5",)
-
 
 class PlayPresenter(Presenter):
     """The viewer's presenter, which knows whether the map is still the one that is tried."""
@@ -57,12 +55,12 @@ class PlayWindow(Window):
     def take(self, event: pygame.event.Event) -> None:
         if event.type == pygame.WINDOWFOCUSLOST or (event.type == pygame.KEYUP and event.key == self.held):
             self.held = None
-        if event.type == pygame.KEYDOWN and self.held is not None and event.key == self.held:
+        if event.type == pygame.KEYDOWN and event.key == self.held:
             return
-        if event.type == pygame.KEYDOWN and key_of(event) in BACK:
+        if event.type == pygame.KEYDOWN and key_of(event) == "f5":
             self.ended = True
-            return
-        super().take(event)
+        else:
+            super().take(event)
 
     def do(self, name: str) -> None:
         """Do the action of this name; Escape leads back where it would do nothing."""

@@ -13,7 +13,6 @@ class Team:
 
     start: str | None  # None for anywhere in the free space
     robots: int
-    seed: int
     radius: float  # m
     places: tuple[Point, ...] = ()  # m; empty where it cannot stand there
     words: str = ""  # why not
@@ -23,8 +22,8 @@ def placed(sketch: Sketch, start: str | None, robots: int, seed: int, radius: fl
     try:
         points = sketch.environment().start(start).sample(robots, seed=seed, radius=radius)
     except Exception as error:  # what nobody has foreseen must not end the window either
-        return Team(start, robots, seed, radius, words=str(error).removeprefix("map: "))
-    return Team(start, robots, seed, radius, tuple((x, y) for x, y in points.tolist()))
+        return Team(start, robots, radius, words=str(error).removeprefix("map: "))
+    return Team(start, robots, radius, tuple((x, y) for x, y in points.tolist()))
 
 
 class TeamThread:
@@ -32,19 +31,15 @@ class TeamThread:
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(1, "team")
-        self._asked: tuple[Sketch | None, tuple[object, ...]] = (None, ())
+        self._asked: tuple[object, ...] = ()
         self._answer: Future[Team] | None = None
-
-    @property
-    def busy(self) -> bool:
-        return self._answer is not None
 
     def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
         """Ask where a team would stand; asking the same again does nothing."""
         team = start, robots, seed, radius
-        if self._asked[0] is sketch and self._asked[1] == team:
+        if self._asked == (sketch, *team):
             return
-        self._asked = sketch, team
+        self._asked = sketch, *team
         if self._answer is not None:
             self._answer.cancel()
         self._answer = self._pool.submit(placed, sketch, *team)

@@ -51,8 +51,6 @@ class Pointer:
         self._shape = -1
 
     def take(self, event: pygame.event.Event, now: float) -> None:
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
         taken = not self.drag and self._panel.take(event)
         if event.type == pygame.MOUSEMOTION:
             self._moved(event)
@@ -76,9 +74,6 @@ class Pointer:
             point, tool.guides = snap.point, snap.guides
         shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
         return PointerEvent(point, raw, reach, shift, alt, ctrl)
-
-    def leave(self) -> None:
-        self._editor.cursor = self._canvas.at = self._canvas.hovered = None
 
     def _pressed(self, event: pygame.event.Event, now: float) -> None:
         editor = self._editor
@@ -152,24 +147,21 @@ class Pointer:
 
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
     """Return what the line says, the most important first."""
-    said = [f"{editor.tool.title}: {editor.tool.hint}" if editor.tool is not editor.selector else ""]
-    if editor.cursor is not None:
-        said.insert(0, point_words(editor.cursor))
-    owner = editor.selector.hovered
-    if editor.tool is editor.selector and isinstance(owner, int) and owner in editor.sketch.places:
-        item = editor.sketch.item(owner)
-        said.append(f"{item.shape.name or 'note'}: {item.note}" if item.note else "")
-    if editor.selection and editor.tool is editor.selector:
-        said.append(editor.selection.words(editor.sketch))
-    if "robots" in editor.shown and team is not None:
-        said.append(team.words or f"{len(team.places)} robots at {team.start or 'anywhere'}")
-    if editor.tool is editor.selector and not editor.selection:
-        said.append(editor.tool.hint)
+    sketch, idle, owner = editor.sketch, editor.tool is editor.selector, editor.selector.hovered
+    item = sketch.item(owner) if idle and isinstance(owner, int) and owner in sketch.places else None
+    standing = team if "robots" in editor.shown else None
     grid = f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"
-    said.append(grid if editor.snaps else "no snapping")
-    if editor.readings.busy:
-        said.append("measuring …")
-    said.append(f"{frames:.0f} fps")
+    said = (
+        point_words(editor.cursor) if editor.cursor is not None else "",
+        "" if idle else f"{editor.tool.title}: {editor.tool.hint}",
+        f"{item.shape.name or 'note'}: {item.note}" if item is not None and item.note else "",
+        editor.selection.words(sketch) if idle and editor.selection else "",
+        standing and (standing.words or f"{len(standing.places)} robots at {standing.start or 'anywhere'}"),
+        editor.tool.hint if idle and not editor.selection else "",
+        grid if editor.snaps else "no snapping",
+        "measuring …" if editor.readings.busy else "",
+        f"{frames:.0f} fps",
+    )
     return [each for each in said if each]
 
 
@@ -183,13 +175,7 @@ class EditorWindow(BaseWindow):
     """Shows the editor and lets it be touched."""
 
     def __init__(
-        self,
-        editor: Editor,
-        size: tuple[int, int],
-        scale: float,
-        drafts: Path | None,
-        *,
-        patient: bool = False,
+        self, editor: Editor, size: tuple[int, int], scale: float, drafts: Path | None, patient: bool = False
     ) -> None:
         super().__init__(size)
         self.editor, self.scale = editor, scale
@@ -207,7 +193,7 @@ class EditorWindow(BaseWindow):
             "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
             "fullscreen": self.toggle_fullscreen,
             "help": lambda: setattr(self, "help", not self.help),
-            "palette": self.open_palette,
+            "palette": lambda: self.dialogs.ask(palette(self.commands, GHOST, editor.say)),
         }
         listed = editor_commands(editor, self.canvas, self.documents, of_window)
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
@@ -324,13 +310,6 @@ class EditorWindow(BaseWindow):
         if self.editor.problem is not None:
             self.canvas.go_to(self.editor.problem)
 
-    def open_palette(self) -> None:
-        def told(words: str) -> None:
-            self.editor.version += 1
-            self.editor.say(words)
-
-        self.dialogs.ask(palette(self.commands, GHOST, told))
-
     def _name(self) -> None:
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
         self.editor.panel = True
@@ -361,15 +340,13 @@ class EditorWindow(BaseWindow):
         trial.update(seconds)
         if not (trial.ended or trial.closed):
             return
-        leaving = trial.closed and not trial.ended
         trial.close()
         trial.keeper.finish()
         self.trial = None
         self.screen = pygame.display.get_surface() or self.screen
         self.windowed = trial.windowed
-        editor = self.editor
-        editor.theme = trial.viewer.theme
-        viewer = trial.viewer
+        editor, viewer = self.editor, trial.viewer
+        editor.theme = viewer.theme
         change = brought_back(editor.sketch, viewer.tried, viewer.session.environment)
         if change is not None and not viewer.elsewhere:
             editor.change(change)
@@ -378,10 +355,10 @@ class EditorWindow(BaseWindow):
             self.commands.hold(pygame.K_F5)
         self._arrange()
         editor.version += 1
-        if leaving:
-            self.do("quit")
-        else:
+        if trial.ended:
             self.draw()
+        else:
+            self.do("quit")
 
     def take(self, event: pygame.event.Event) -> None:
         if self.trial is not None:
@@ -418,7 +395,7 @@ class EditorWindow(BaseWindow):
         elif kind in OF_THE_MOUSE:
             self.pointer.take(event, self.editor.now)
         elif kind == pygame.WINDOWLEAVE:
-            self.pointer.leave()
+            self.editor.cursor = self.canvas.at = self.canvas.hovered = None
         else:
             self.panel.take(event)
 
