@@ -73,7 +73,6 @@ class Autosaver:
                 self._changed.notify_all()
 
     def settle(self, path: Path | None) -> None:
-        """Forget what was kept: the document was saved, or opened anew."""
         self._path = path
         self.keep(None)
 

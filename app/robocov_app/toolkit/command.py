@@ -90,7 +90,6 @@ class Commands:
         return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}
 
     def typed(self, text: str) -> object:
-        """Do what was typed: a command's name and what it takes; RobocovError where that cannot be done."""
         word, rest = parted(text)
         known = self._typable()
         if word not in known:

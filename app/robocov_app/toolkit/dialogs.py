@@ -39,7 +39,6 @@ class Dialog:
         box.midtop = screen.width // 2, max(round((screen.height - box.height) * 0.42), 0)
 
     def framed(self, ui: Ui) -> None:
-        """Show it, and leave its margin around it: the page of its `Ui`."""
         side, above = self.margin
         ui.inset(side, above, side)
         self.page(ui)
@@ -304,7 +303,6 @@ class Dialogs:
             asked.cancelled()
 
     def take(self, event: pygame.event.Event) -> bool:
-        """Take an event; return whether something is asked, which takes all of mouse and keyboard."""
         asked = self.asked
         if asked is None:
             return False

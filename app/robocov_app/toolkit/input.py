@@ -16,8 +16,7 @@ OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION
 def key_of(event: pygame.event.Event) -> str:
     """Return the name of a pressed key with its modifiers, as in ``ctrl+shift+z``."""
     name = pygame.key.name(event.key)
-    if name.startswith("[") and name.endswith("]") and len(name) > 2:
-        name = name[1:-1]  # of the key pad
+    name = name.strip("[]") or name  # those of the key pad stand in brackets
     ctrl = pygame.KMOD_CTRL | pygame.KMOD_META
     modifiers = {"ctrl": ctrl, "alt": pygame.KMOD_ALT, "shift": pygame.KMOD_SHIFT}
     return "+".join([*(held for held, mask in modifiers.items() if event.mod & mask), name])

@@ -71,7 +71,6 @@ def dim(screen: Surface, theme: Theme) -> None:
 
 
 def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
-    """Write words on a small card that begins at a pixel, and stays on the surface."""
     size = round(theme.text * scale)
     box = Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
     box.midleft = round(at[0] - 6 * scale), round(at[1])
@@ -82,7 +81,6 @@ def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scal
 
 
 def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: list[str], hint: str) -> None:
-    """Draw the status line; what there is no room for is left out, from the end."""
     left, top, width, height = box
     screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
     canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2

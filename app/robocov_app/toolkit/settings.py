@@ -38,7 +38,6 @@ def changed_settings(before: Kept, opened: Kept, closed: Kept) -> Kept:
 
 
 def save_settings(settings: BaseModel, file: Path | None) -> str:
-    """Write the settings, whole or not at all; return what to tell if that failed."""
     if file is None:
         return ""
     try:

@@ -24,7 +24,7 @@ from pygame import Rect, Surface
 
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix
-from robocov_app.toolkit.input import DOUBLE, key_of, wheel_notches
+from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
@@ -129,9 +129,8 @@ class Ui:
     @property
     def _order(self) -> list[str]:
         """Keys of what can have the focus, in the order of Tab."""
-        return [
-            each.key for each in self.shown.values() if each.enabled and each.kind not in ("label", "bar")
-        ]
+        shown = self.shown.values()
+        return [each.key for each in shown if each.enabled and each.kind not in ("label", "bar")]
 
     def run(self, event: pygame.event.Event | None, surface: Surface | None) -> None:
         """Run the page for an event, for a drawing, or to learn how high it is."""
@@ -149,8 +148,14 @@ class Ui:
         if kind in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
             self.at = event.pos
         if kind == pygame.MOUSEMOTION:
-            return self._moved(event)
-        if kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
+            if self.open_list is not None and (k := self.open_list.at(event.pos)) is not None:
+                self.open_list.chosen = k
+            if held is None:
+                under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
+                if under != self._hot:
+                    self._hot, self._rested, self.stale = under, perf_counter(), True
+                return self.box.collidepoint(event.pos)
+        elif kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
             return self.box.collidepoint(event.pos)
         if kind in (pygame.MOUSEBUTTONDOWN, pygame.KEYDOWN):
             self._rested = perf_counter()
@@ -161,7 +166,9 @@ class Ui:
             if self.focus is None or (self.edit is not None and _is_function_key(name)):
                 return False
             if name in ("tab", "shift+tab"):
-                self.move_focus(-1 if "shift" in name else 1)
+                order, by = self._order, -1 if "shift" in name else 1
+                k = order.index(self.focus) + by if self.focus in order else 0
+                self.set_focus(order[k % len(order)] if order else self.focus)
             elif name == "escape":
                 self.stop_typing()
             elif self.edit is None and name not in (*_ENTER, "space", "left", "right", "up", "down"):
@@ -175,7 +182,7 @@ class Ui:
                 self.edit.type(event.text)
             self.stale = True
             return True
-        if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
+        if kind not in (*OF_THE_MOUSE, pygame.KEYDOWN):
             return False
         if kind == pygame.MOUSEBUTTONDOWN and self.focus is not None:
             shown = self.shown.values()
@@ -186,18 +193,6 @@ class Ui:
         if kind == pygame.MOUSEBUTTONUP:
             self.active = None
         return held is not None or kind == pygame.KEYDOWN or self.box.collidepoint(self.at)
-
-    def _moved(self, event: pygame.event.Event) -> bool:
-        if self.open_list is not None and (k := self.open_list.at(event.pos)) is not None:
-            self.open_list.chosen = k
-        if self.active is not None:
-            self.stale = True
-            self.run(event, None)
-            return True
-        under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
-        if under != self._hot:
-            self._hot, self._rested, self.stale = under, perf_counter(), True
-        return self.box.collidepoint(event.pos)
 
     def _under(self) -> Iterator[Shown]:
         if self.open_list is None and self.box.collidepoint(self.at):
@@ -251,13 +246,6 @@ class Ui:
         self.focus = self.edit = self.open_list = None
         self.stale = True
 
-    def move_focus(self, by: int) -> None:
-        order = self._order
-        if not order:
-            return
-        k = order.index(self.focus) + by if self.focus in order else (0 if by > 0 else -1)
-        self.set_focus(order[k % len(order)])
-
     def set_focus(self, key: str) -> None:
         self.focus, self.open_list, self.stale = key, None, True
         entry = self.shown.get(f"entry:{key}")
@@ -309,7 +297,6 @@ class Ui:
 
     @contextmanager
     def scroll(self, key: str) -> Iterator[None]:
-        """Scroll what is within, where it needs more height than there is."""
         self.end_row()
         room = self.rest.height / self.scale
         before = self.x, self.y, self.wide, self._clip
@@ -336,7 +323,6 @@ class Ui:
             self.surface.set_clip(None)
 
     def visible_rows(self, count: int, height: float) -> Iterator[int]:
-        """Yield the numbers of those of many equal rows that are in sight."""
         self.end_row()
         top = self._clip.top - self.box.top - self.px(self.y)
         first = min(max(int(top / self.px(height)), 0), count)
@@ -348,7 +334,6 @@ class Ui:
         self.y += (count - last) * height
 
     def _bar(self, key: str, rect: Rect, needed: float, top: float) -> float:
-        """Show a scroll bar, and take wheel and drags for it; return how far it is scrolled."""
         room = rect.height / self.scale
         event, name = self._event, f"bar:{key}"
         track = Rect(rect.right - self.px(BAR + 1), rect.top, self.px(BAR), rect.height)
@@ -400,7 +385,6 @@ class Ui:
     def _clicks(
         self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
     ) -> bool:
-        """Show a widget; return whether it was clicked in this run, or pressed by a key."""
         self._note(kind, key, rect, text, value, tip, why)
         if why:
             return False
@@ -421,7 +405,6 @@ class Ui:
             rounded(self.surface, rect, fill, edge or fill, self.px(radius), width)
 
     def _face(self, rect: Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
-        """Draw the box of something to press; return the colour of what is on it."""
         theme, hovered = self.theme, self._hovers(rect)
         held = self.active == key and rect.collidepoint(self.at)
         if why:
@@ -498,7 +481,6 @@ class Ui:
         return clicked
 
     def option(self, text: str, aside: str = "", *, key: str, chosen: bool = False, why: str = "") -> bool:
-        """Show a line of a list, with words at its right end; return whether it was clicked."""
         rect = self.cell()
         clicked = self._clicks("option", key, rect, text, chosen, "", why)
         if self._draws(rect):
@@ -521,7 +503,6 @@ class Ui:
     def tabs(
         self, key: str, names: Sequence[str], now: str, *widths: float, titles: Mapping[str, str] = {}
     ) -> str | None:
-        """Show buttons side by side of which one is chosen; return another one that was."""
         self.row(*(widths or [0.0] * len(names)), below=8)
         found = None
         for name in names:
@@ -532,7 +513,6 @@ class Ui:
         return found
 
     def section(self, title: str, *, key: str = "") -> bool:
-        """Show a heading that folds what belongs to it; return whether that is to be shown."""
         key = f"section:{key or title}"
         self.row(height=20, below=4)
         rect = self.cell()
@@ -723,7 +703,6 @@ class Ui:
         return picked if picked != now else None
 
     def _list_takes(self, event: pygame.event.Event) -> bool:
-        """Give an event to the open list; it takes all presses, and keys but the function keys."""
         found = self.open_list
         assert found is not None
         self.stale = True

@@ -131,7 +131,6 @@ class BaseWindow:
         self.screen = open_window(windowed) if windowed else pygame.display.set_mode((0, 0), full)
 
     def save_screenshot(self, folder: Path) -> str:
-        """Save what is in the window as a PNG in a folder; return words for it."""
         target, picture = free_name(folder, "robocov", ".png"), BytesIO()
         pygame.image.save(self.screen, picture, ".png")
         with written(target) as part:
@@ -177,7 +176,6 @@ def fitting(size: tuple[int, int]) -> tuple[int, int]:
 
 
 def open_window(size: tuple[int, int]) -> Surface:
-    """Show a window of a size, or give the one that is there another; return its surface."""
     screen = pygame.display.set_mode(size, pygame.RESIZABLE)
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
         # pygame-ce has no other way yet to give a window of the display module a least size

@@ -242,7 +242,6 @@ class _PipeLine(Line):
         return questions
 
     def listen(self) -> None:
-        """Take questions in; end the process when the parent's end of the pipe is closed."""
         while (question := receive(self._source)) is not None:
             with self._asked:
                 self._questions.append(question)
@@ -313,7 +312,6 @@ def asked(process: subprocess.Popen[bytes], question: object) -> Reply | None:
 
 
 def ended(process: subprocess.Popen[bytes]) -> int:
-    """Let a process end, which it does without its streams; return its status."""
     for stream in (process.stdin, process.stdout):
         assert stream is not None
         with suppress(OSError):

@@ -174,7 +174,6 @@ class EditorCanvas:
         self._look(self.camera.zoomed(factor, at))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the sheet by so many pixels; the map stays within reach."""
         camera = self.camera.panned(dx, dy)
         low_x, low_y, high_x, high_y = self._bounds
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])

@@ -258,7 +258,6 @@ class Sheet:
         page.set_clip(None)
 
     def _grid(self, page: Surface, view: View, box: Rect, *, fine: bool) -> None:
-        """Draw the grid: lines where it snaps if they are far enough apart, strong ones at round places."""
         theme, parts = view.theme, (0.32, 0.75) if view.theme is LIGHT else (0.2, 0.5)
         close, wide = grid_steps(view.grid, view.camera.zoom, view.scale)
         soft, strong = (mix(theme.background, theme.grid, part) for part in parts)
@@ -277,7 +276,6 @@ class Sheet:
     def draw_items(
         self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
     ) -> None:
-        """Draw obstacles: first what they cover, then their edges, so that each can be told apart."""
         fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
         plain = [self.outlines.of(item) for item in items]
         rings = [ring for each in plain for ring in each.rings]

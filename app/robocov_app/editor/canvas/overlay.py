@@ -132,7 +132,6 @@ def draw_circle(canvas: Canvas, center: Array, radius: float, colour: Colour, wi
 def draw_start(
     canvas: Canvas, spec: StartSpec, name: str, *, chosen: bool, first: bool = False, dots: float = 1.0
 ) -> None:
-    """Draw where a team may start, with its name; `dots` enlarges its places."""
     theme, scale, width = canvas.theme, canvas.scale, 2.2 if chosen else 1.6
     if isinstance(spec, DiscStart):
         (center,) = pixels(canvas, (spec.center,))
@@ -153,7 +152,6 @@ def draw_start(
 
 
 def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
-    """Draw the way of an obstacle: dashed, with an arrow in each leg; the last one of a loop is fainter."""
     points = pixels(canvas, path.points)
     legs = list(pairwise(points))
     if path.repeat == "loop" and len(points) > 2:
@@ -214,7 +212,6 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
-    """Write the length of each edge beside it, but of the last, which stands beside the cursor."""
     ink, size = mix(canvas.theme.background, canvas.theme.ink, 0.85), canvas.theme.small_text
     for a, b in list(pairwise(line[:-1]))[-MOST_LENGTHS:]:
         ends = pixels(canvas, (a, b))
@@ -264,44 +261,32 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
 
 def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
-    theme = view.theme
+    theme, white = view.theme, (255, 255, 255)
     areas = ((measurement.sealed, theme.forces[SEALED], 0.5), (measurement.impassable, theme.trajectory, 1.0))
-    parts = [(some, colour, strength) for area, colour, strength in areas if (some := _polygons(area))]
+    parts = [(outline_of(area), colour, strength) for area, colour, strength in areas]
+    parts = [part for part in parts if part[0].rings]
     if not parts:
         return None
-    box = pixel_box(view.camera, shapely.total_bounds([each for some, _, _ in parts for each in some]))
+    box = pixel_box(view.camera, shapely.total_bounds([outline.geometry for outline, _, _ in parts]))
     box = box.clip(view.clip)
     if not (box.width and box.height):
         return None
     patch = Surface(box.size, pygame.SRCALPHA, 32)
     edged = view.canvas(patch)
-    for polygons, colour, strength in parts:
-        mask = Surface(box.size, pygame.SRCALPHA, 32)
-        for each in polygons:
-            _stencil(view.canvas(mask), each, box.topleft)
+    for outline, colour, strength in parts:
+        mask = view.canvas(Surface(box.size, pygame.SRCALPHA, 32))
+        rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
+        for ring, outer in zip(rings, outline.outer, strict=True):
+            mask.polygon(ring, (*white, 255) if outer else (0, 0, 0, 0))
+            if outer:  # what is thinner than a pixel is a line
+                mask.outline(ring, white, 1)
         lines = _lines(box.size, colour, view.scale, box.topleft, strength)
-        mask.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
-        patch.blit(mask.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        for each in polygons:
-            ring = view.camera.to_pixels(np.asarray(each.exterior.coords)[:-1]) - np.array(box.topleft)
-            edged.outline(ring, colour, edged.width(1.0))
+        mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
+        patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        for ring, outer in zip(rings, outline.outer, strict=True):
+            if outer:
+                edged.outline(ring, colour, edged.width(1.0))
     return patch, box
-
-
-def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
-    parts = shapely.get_parts(area)
-    return [each for each in parts if isinstance(each, shapely.Polygon) and not each.is_empty]
-
-
-def _stencil(canvas: Canvas, area: shapely.Polygon, corner: tuple[int, int]) -> None:
-    """Paint an area white, its holes clear; what is thinner than a pixel as a line."""
-    white = (255, 255, 255, 255)
-    rings = [np.asarray(each.coords)[:-1] for each in (area.exterior, *area.interiors)]
-    ring, *holes = (canvas.camera.to_pixels(each) - np.array(corner, dtype=float) for each in rings)
-    canvas.polygon(ring, white)
-    for hole in holes:
-        canvas.polygon(hole, (0, 0, 0, 0))
-    canvas.outline(ring, white[:3], 1)
 
 
 def _lines(
@@ -351,7 +336,6 @@ def _gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
 
 
 def badge_places(found: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
-    """Return where the badges of problems are, px: above the place, which can be seen then."""
     places = []
     for problem in found[:MOST_BADGES]:
         if problem.where is not None and not problem.where.is_empty:

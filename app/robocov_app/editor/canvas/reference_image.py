@@ -72,7 +72,6 @@ class ReferenceImage:
 
 
 def _on_white(picture: Image.Image) -> Image.Image:
-    """Return a picture in colours, what is clear in it white."""
     if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
         clear = picture.convert("RGBA")
         page = Image.new("RGBA", clear.size, (255, 255, 255, 255))

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
-from types import UnionType
-from typing import Any, TypeVar
+from typing import TypeVar
 
-from robocov.environment import CircleObstacle, DiscStart, Point, PolygonObstacle, WallObstacle
+from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
 from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
@@ -39,10 +38,16 @@ Row = tuple[str, str, str, Run]  # name, title and keys of a command, separated 
 _Number = TypeVar("_Number", int, float)
 
 
+def require(there: object, words: str) -> None:
+    """Raise MapError with these words where something is missing."""
+    if not there:
+        raise MapError(words)
+
+
 def selected(editor: Editor) -> Selection:
-    if selection := whole(editor.selection):
-        return selection
-    raise MapError("nothing is selected: click something first, or press Ctrl A")
+    selection = whole(editor.selection)
+    require(selection, "nothing is selected: click something first, or press Ctrl A")
+    return selection
 
 
 def align(editor: Editor, side: transform.Side) -> None:
@@ -63,22 +68,19 @@ def play(editor: Editor) -> str:
     if editor.moves_since is not None:
         editor.moves_since = None
         return "obstacles stand as they are at time zero"
-    if not paths.moving(editor.sketch):
-        raise MapError("no obstacle moves: the tool Path gives one a path")
+    require(paths.moving(editor.sketch), "no obstacle moves: the tool Path gives one a path")
     editor.moves_since = editor.now
     return "obstacles move as they will; L ends it"
 
 
 def back(editor: Editor) -> None:
-    """Take the last point back, else delete what is selected."""
     if not editor.tool.back(editor) and not editor.tool.busy and editor.selection:
         delete(editor)
 
 
 def delete(editor: Editor) -> None:
     selection = editor.selection
-    if not selection:
-        raise MapError("nothing is selected: click something first")
+    require(selection, "nothing is selected: click something first")
     act = vertices.deleted if selection.vertices else properties.deleted
     editor.change(act(editor.sketch, vertices_or_things(selection)))
 
@@ -96,8 +98,7 @@ def cut(editor: Editor) -> None:
 
 def paste(editor: Editor, at: Point | None) -> None:
     text = clipboard.get()
-    if not text.strip():
-        raise MapError("the clipboard is empty")
+    require(text.strip(), "the clipboard is empty")
     editor.change(pasted(editor.sketch, text, at, editor.grid if "grid" in editor.snaps else None))
 
 
@@ -107,20 +108,16 @@ def duplicate(editor: Editor) -> None:
 
 
 def level(editor: Editor) -> None:
-    """Turn the whole map so that the line that was measured is level or upright."""
     tape = editor.tools["measure"]
     assert isinstance(tape, MeasureTool)
-    if len(tape.measured) != 2:
-        raise MapError("measure along a wall first: the tool Measure, two clicks")
+    require(len(tape.measured) == 2, "measure along a wall first: the tool Measure, two clicks")
     editor.change(transform.levelled(editor.sketch, *tape.measured))
     tape.cancel(editor)
 
 
 def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
-    """Move the selection by so many spacings of the grid, along an axis or against it."""
     selection = editor.selection
-    if not selection:
-        raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
+    require(selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
     by = steps * editor.grid
     moved = move(editor, x * by, y * by, vertices_or_things(selection))
     editor.change(moved, drag=("nudge", selection))
@@ -132,7 +129,6 @@ def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
 
 
 def cancel(editor: Editor) -> None:
-    """Give up what is half done, else put the tool away, else select nothing."""
     if editor.typed:
         editor.typed = ""
     elif not editor.tool.cancel(editor) and editor.tool is not editor.selector:
@@ -150,21 +146,24 @@ def select_next(editor: Editor, by: int) -> None:
 
 
 def one_vertex(editor: Editor) -> Vertex:
-    if len(editor.selection.vertices) != 1:
-        raise MapError("select one vertex first: click an obstacle, then one of its corners")
+    require(
+        len(editor.selection.vertices) == 1,
+        "select one vertex first: click an obstacle, then one of its corners",
+    )
     (vertex,) = editor.selection.vertices
     return vertex
 
 
 def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
     """Cut the selected corners off, or round them, by twice the grid unless a length is given, m."""
-    if not editor.selection.vertices:
-        raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
+    require(
+        editor.selection.vertices,
+        "select corners first: click an obstacle, then its corners, or drag a box around them",
+    )
     editor.change(edit(editor.sketch, vertices_or_things(editor.selection), length or 2 * editor.grid))
 
 
 def extend(editor: Editor) -> None:
-    """Go on with a wall from the vertex that is selected, to where the cursor is."""
     if editor.cursor is None:
         raise MapError("move the mouse to where the wall is to go on to")
     vertex = one_vertex(editor)
@@ -194,8 +193,7 @@ def widen(editor: Editor, factor: float) -> None:
 
 def next_start(editor: Editor) -> None:
     names = editor.start_names
-    if not names:
-        raise MapError("the map has no start yet: S draws one")
+    require(names, "the map has no start yet: S draws one")
     now = editor.start_name
     name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
     editor.start = name
@@ -204,8 +202,7 @@ def next_start(editor: Editor) -> None:
 
 
 def make_default(editor: Editor) -> None:
-    if len(editor.selection.starts) != 1:
-        raise MapError("select one start first")
+    require(len(editor.selection.starts) == 1, "select one start first")
     (name,) = editor.selection.starts
     editor.change(properties.start_first(editor.sketch, name))
 
@@ -217,7 +214,6 @@ def make_areas(editor: Editor) -> None:
 
 
 def fix_problem(editor: Editor) -> None:
-    """Mend the problem that is shown, or the first that can be."""
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
         change = fixed(editor.sketch, problem, editor.radius)
         if change is not None:
@@ -247,8 +243,7 @@ def _number(word: str, text: str, kind: type[_Number]) -> _Number:
 
 def _set_angle(editor: Editor, text: str) -> None:
     angle = angle_of(text)
-    if not 0.1 <= angle <= 90.0:
-        raise MapError(f"angle: {angle:g}°, but 0.1° to 90° was wanted")
+    require(0.1 <= angle <= 90.0, f"angle: {angle:g}°, but 0.1° to 90° was wanted")
     editor.snap_angle = angle
     editor.say(f"angles snap to multiples of {angle:g}°")
 
@@ -258,8 +253,6 @@ def _set_length(name: str) -> RunWith:
 
 
 def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
-    """Return what edits the selected things to a typed value, or to several."""
-
     def run(editor: Editor, text: str) -> None:
         value = read(text)
         values = value if isinstance(value, tuple) else (value,)
@@ -268,18 +261,18 @@ def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
     return run
 
 
-def common_measure(editor: Editor, name: str, kinds: type | UnionType) -> float | None:
-    """Return the width or radius that all selected things of these kinds have; None where they differ."""
+def common_measure(editor: Editor, name: str) -> float | None:
+    """Return the width or radius of all selected things that have one; None where they differ."""
     sketch, selection = editor.preview
-    things: list[Any] = [sketch.item(key).shape for key in selection.items if key in sketch.places]
-    things += [spec for name, spec in sketch.starts if name in selection.starts]
-    found = {getattr(thing, name) for thing in things if isinstance(thing, kinds)}
+    things: list[object] = [sketch.item(key).shape for key in selection.items if key in sketch.places]
+    things += [spec for start, spec in sketch.starts if start in selection.starts]
+    found = {getattr(thing, name) for thing in things if hasattr(thing, name)}
     return found.pop() if len(found) == 1 else None
 
 
-def _set_measure(edit: Edit, name: str, kinds: type | UnionType) -> RunWith:
+def _set_measure(edit: Edit, name: str) -> RunWith:
     def run(editor: Editor, text: str) -> None:
-        length = length_of(text, now=common_measure(editor, name, kinds))
+        length = length_of(text, now=common_measure(editor, name))
         editor.change(edit(editor.sketch, selected(editor), length))
 
     return run
@@ -299,16 +292,14 @@ def _place(editor: Editor, text: str) -> None:
 
 def _scale(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    if bounds_of(editor.sketch, selection) is None:
-        raise MapError("there is nothing to scale")
+    require(bounds_of(editor.sketch, selection), "there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
     editor.change(transform.scaled(editor.sketch, selection, factor))
 
 
 def rename(editor: Editor, text: str) -> None:
     owners = whole(editor.selection).owners
-    if len(owners) != 1:
-        raise MapError("select one obstacle or start first")
+    require(len(owners) == 1, "select one obstacle or start first")
     (owner,) = owners
     editor.change(properties.renamed(editor.sketch, owner, text))
 
@@ -318,23 +309,21 @@ def _signed(text: str) -> float:
 
 
 def _set_density(editor: Editor, text: str) -> None:
-    if text != "none":
-        raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
+    require(
+        text == "none", f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density"
+    )
     editor.change(density.density_removed(editor.sketch))
 
 
 def _array_of(text: str) -> tuple[int, int, float, float]:
     parts = text.replace("x", " ").split()
-    if len(parts) != 4:
-        raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
+    require(len(parts) == 4, "array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
     columns, rows = (_number("array", each, int) for each in parts[:2])
     return columns, rows, _signed(parts[2]), _signed(parts[3])
 
 
+# headings of the help, and keys of the tools and of what is shown, in their order
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
-"""Headings of the help, in their order."""
-
-# of the tools and of what is shown, in their order
 _TOOL_KEYS = ("v", "g", "p", "r", "c", "w", "k", "b", "m", "s", "shift+s", "d", "o", "i")
 _SHOWN_KEYS = ("alt+3", "alt+2", "alt+1", "alt+5", "a", "alt+6", "alt+7", "alt+4")
 
@@ -350,7 +339,6 @@ _REPEATED = (
 def editor_commands(
     editor: Editor, canvas: EditorCanvas, documents: FileCommands, of_window: Mapping[str, Run]
 ) -> list[Command]:
-    """Return every command, those of the tools and of what is snapped to or shown among them."""
 
     def does(act: Callable[..., object], *rest: object) -> Run:
         return partial(act, editor, *rest)
@@ -538,11 +526,8 @@ TYPED: dict[str, tuple[str, RunWith]] = {
     "rotate": ("30: by degrees", _edit_to(transform.rotated, angle_of)),
     "scale": ("150%: what is selected", _scale),
     "size": ("3 x 2: width and height", _edit_to(transform.resized, size_of)),
-    "width": ("0.2: of walls", _set_measure(properties.widened, "width", WallObstacle)),
-    "circle": (
-        "0.5: radius of circles",
-        _set_measure(properties.sized, "radius", CircleObstacle | DiscStart),
-    ),
+    "width": ("0.2: of walls", _set_measure(properties.widened, "width")),
+    "circle": ("0.5: radius of circles", _set_measure(properties.sized, "radius")),
     "bevel": ("0.3: cut corners off", lambda editor, text: trim(editor, vertices.bevelled, length_of(text))),
     "round": ("0.3: round corners", lambda editor, text: trim(editor, vertices.rounded_off, length_of(text))),
     "simplify": ("0.05: leave vertices out, to a tolerance", _edit_to(vertices.simplified, length_of)),
@@ -574,8 +559,7 @@ def typed_commands(editor: Editor) -> list[Command]:
 
 def run_typed(editor: Editor, word: str, text: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
-    if not text.strip():
-        raise MapError(f"{word}: a value was wanted after it")
+    require(text.strip(), f"{word}: a value was wanted after it")
     TYPED[word][1](editor, text.strip())
 
 
@@ -588,9 +572,8 @@ def offered(editor: Editor) -> list[str]:
 def _offered_groups(editor: Editor) -> list[list[str]]:
     selection = editor.selection
     if not selection:
-        drawn = ["polygon", "rectangle", "circle", "wall", "boundary", "disc"]
-        tools = [f"tool:{name}" for name in drawn]
-        return [["paste", "select:all"], tools, ["fit", "background", "try"]]
+        drawn = ("polygon", "rectangle", "circle", "wall", "boundary", "disc")
+        return [["paste", "select:all"], [f"tool:{name}" for name in drawn], ["fit", "background", "try"]]
     if selection.vertices:
         return _of_vertices(editor)
     shapes = [editor.sketch.item(key).shape for key in selection.items if key in editor.sketch.places]
@@ -616,7 +599,7 @@ def _offered_groups(editor: Editor) -> list[list[str]]:
         ["rotate:left", "rotate:right", "mirror:x", "mirror:y"],
         ["unite", "subtract", "intersect", "divide"] if several else [],
         ["align:left", "align:bottom", *spread] if several else [],
-        [*(["group"] if several else []), "lock", "hide"] if shapes else [],
+        ["group", "lock", "hide"] if several else ["lock", "hide"],
         [name for name, means_something in of_shapes.items() if means_something],
     ]
 

@@ -58,13 +58,6 @@ class EditorSettings(BaseModel):
     recent: tuple[str, ...] = ()
 
 
-TOOLS: tuple[type[Tool], ...] = (
-    *(SelectTool, PanTool, draw.PolygonTool, draw.RectangleTool, draw.CircleTool, draw.WallTool),
-    *(draw.DoorTool, draw.BoundaryTool, draw.MeasureTool, draw.DiscTool, draw.PlacesTool),
-    *(DensityTool, MotionPathTool, ReferenceImageTool),
-)
-"""All tools, in the order in which they are shown."""
-
 SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong
 FEW = 1500  # vertices up to which a map is measured while something is dragged
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spacings to choose from
@@ -83,7 +76,12 @@ class Editor(Workspace):
         super().__init__(document)
         settings = settings or EditorSettings()
         self.readings, self.folder = readings, folder
-        self.tools: dict[str, Tool] = {kind.name: kind() for kind in TOOLS}
+        tools = (  # in the order in which they are shown
+            *(SelectTool(), PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
+            *(draw.WallTool(), draw.DoorTool(), draw.BoundaryTool(), draw.MeasureTool(), draw.DiscTool()),
+            *(draw.PlacesTool(), DensityTool(), MotionPathTool(), ReferenceImageTool()),
+        )
+        self.tools: dict[str, Tool] = {tool.name: tool for tool in tools}
         self.tool: Tool = self.tools["select"]
         self.theme: str = settings.theme
         self.panel = True
@@ -107,8 +105,7 @@ class Editor(Workspace):
     @property
     def pending(self) -> Change | None:
         """Change that letting go of the mouse would make."""
-        drag = self.selector.drag
-        return drag.change if drag is not None else None
+        return self.selector.drag.change if self.selector.drag is not None else None
 
     @property
     def preview(self) -> tuple[Sketch, Selection]:
@@ -127,9 +124,8 @@ class Editor(Workspace):
     @property
     def start_name(self) -> str | None:
         """The start at which the team is shown: the selected one, the chosen one, or the first."""
-        names = self.start_names
-        wanted = (*sorted(self.selection.starts), self.start, *names)
-        return next((name for name in wanted if name in names), None)
+        wanted = (*sorted(self.selection.starts), self.start, *self.start_names)
+        return next((name for name in wanted if name in self.start_names), None)
 
     def _changed(self) -> None:
         super()._changed()
@@ -139,10 +135,9 @@ class Editor(Workspace):
 
     def ask_readings(self) -> None:
         """Ask what the map is like, also one of few vertices that is being dragged; not the same again."""
-        sketch, pending = self.sketch, self.pending
-        if pending is not None and vertex_count(pending.sketch) < FEW:
-            sketch = pending.sketch
-        about = self._about
+        sketch, about = self.preview[0], self._about
+        if sketch is not self.sketch and vertex_count(sketch) >= FEW:
+            sketch = self.sketch
         if about is None or about[0] is not sketch or about[1] != self.radius:
             self._about = sketch, self.radius
             self.readings.put(self._about)
@@ -167,7 +162,7 @@ class Editor(Workspace):
 
     def put(self, document: Document) -> None:
         self.document = document
-        self.measurement, self._about = None, None
+        self.measurement = self._about = None
         self.selector.cancel(self)
         self.choose("select", tell=False)
         self._changed()
@@ -208,8 +203,7 @@ class Editor(Workspace):
         self.now += seconds
         if self.message and self.now - self.said > (TROUBLE_FOR if self.trouble else SAID_FOR):
             self.message = ""
-        answer = self.readings.poll()
-        if answer is not None:
+        if (answer := self.readings.poll()) is not None:
             self.measurement = answer
             self.version += 1
 
@@ -227,16 +221,15 @@ class Editor(Workspace):
         if kind == "snap" and name == "all":
             self.snaps = set() if self.snaps else set(SNAPS)
             self.say("snaps to everything" if self.snaps else "snaps to nothing")
-        else:
-            chosen ^= {name}
-            title = SHOWN[name] if kind == "show" else SNAPS[name][0]
-            self.say(f"{title}: {'on' if name in chosen else 'off'}")
+            return
+        chosen ^= {name}
+        title = SHOWN[name] if kind == "show" else SNAPS[name][0]
+        self.say(f"{title}: {'on' if name in chosen else 'off'}")
 
     def set_length(self, name: str, length: float) -> None:
-        most = 10.0 if name == "radius" else 100.0
+        most, what = 10.0 if name == "radius" else 100.0, name.replace("_", " ")
         if not SMALLEST <= length <= most:
-            wanted = f"{SMALLEST:g} to {most:g} m was wanted"
-            raise MapError(f"{name.replace('_', ' ')}: {length:g} m, but {wanted}")
+            raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
         setattr(self, name, length)
         if name == "grid":
             self.say(f"the grid is {length:g} m")

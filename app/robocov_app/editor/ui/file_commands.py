@@ -39,7 +39,6 @@ class FileCommands:
         self.leaving = False
 
     def leave(self, then: Act) -> None:
-        """Put another document in place of this one, after asking what is to become of it."""
         document = self.editor.document
 
         def discard() -> None:

@@ -12,7 +12,7 @@ from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
-from robocov_app.editor.ui.importing import Continuation, Imported, options_of
+from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.base import square_metres
 from robocov_app.render.camera import Camera
@@ -55,7 +55,6 @@ class ImportDialog(Dialog):
         self._ask()
 
     def set(self, name: str, text: str) -> None:
-        """Give an option a text; the default's or none takes it back."""
         option = next(each for each in self.options if each.name == name)
         if not text or text in (option.default, _DEFAULT):
             self.given.pop(name, None)
@@ -82,10 +81,9 @@ class ImportDialog(Dialog):
             self._mistake = str(error)
         else:
             self._mistake = ""
-            self._worker.put(Continuation(self.path, self.importer.name, options, shaping))
+            self._worker.put((self.path, self.importer.name, options, shaping))
 
     def poll(self) -> Imported | None:
-        """Take what was imported, if it is there; return it if it is accepted."""
         answer = self._worker.poll()
         if answer is not None and not self._worker.busy:
             self.imported = answer

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
@@ -16,6 +16,9 @@ from robocov_app.toolkit.worker import Line
 Kind = Literal["number", "place", "words", "text", "choice"]
 
 ON = "yes"  # a switch that is on
+
+Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
+"""A file, its format, and the options to import it with."""
 
 
 @dataclass(frozen=True)
@@ -73,16 +76,6 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
 
 
 @dataclass(frozen=True, eq=False)
-class Continuation:
-    """Request: a file and the options to import it with."""
-
-    path: Path
-    format: str
-    options: ReadOptions
-    shaping: Shaping
-
-
-@dataclass(frozen=True, eq=False)
 class Imported:
     """Answer: the imported map, with its report and what walls changed sides."""
 
@@ -99,12 +92,12 @@ class Importing:
     def __init__(self) -> None:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
 
-    def __call__(self, questions: list[Continuation], line: Line) -> Imported:
-        last = questions[-1]
-        key = last.path, last.format, last.options
+    def __call__(self, questions: list[Wanted], line: Line) -> Imported:
+        path, name, options, shaping = questions[-1]
+        key = path, name, options
         if self._read is None or self._read[0] != key:
             self._read = None
-            self._read = key, read_map(last.path, format=last.format, options=last.options)
+            self._read = key, read_map(path, format=name, options=options)
         foreign = self._read[1]
-        environment, report = shaped(foreign, last.shaping, one_line(last.path.name))
+        environment, report = shaped(foreign, shaping, one_line(path.name))
         return Imported(environment, report, compare(foreign, environment, report))

@@ -4,12 +4,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from types import UnionType
 from typing import NamedTuple
 
 import pygame
 
-from robocov.environment import CircleObstacle, DiscStart, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart
 from robocov.errors import MapError, counted
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits import properties, transform
@@ -128,8 +127,8 @@ def _titled(name: str, tip: str) -> Field:
     return Field(lambda editor: str(getattr(editor.sketch, name)), take, tip)
 
 
-def _measure(name: str, kinds: type | UnionType, word: str, tip: str) -> Field:
-    return Field(lambda editor: number(common_measure(editor, name, kinds)), TYPED[word][1], tip)
+def _measure(name: str, word: str, tip: str) -> Field:
+    return Field(lambda editor: number(common_measure(editor, name)), TYPED[word][1], tip)
 
 
 def _of_box(part: int, take: Callable[..., None], tip: str) -> Field:
@@ -149,8 +148,8 @@ FIELDS: dict[str, Field] = {
     "y": _of_box(1, _put, "From below; +0.5 moves by half a metre"),
     "wide": _of_box(2, _resize, "Also *2, 50% or +0.3"),
     "high": _of_box(3, _resize, "Also *2, 50% or +0.3"),
-    "width": _measure("width", WallObstacle, "width", "How thick the wall is"),
-    "size:radius": _measure("radius", CircleObstacle | DiscStart, "circle", "Its radius"),
+    "width": _measure("width", "width", "How thick the wall is"),
+    "size:radius": _measure("radius", "circle", "Its radius"),
     "picture:scale": Field(lambda editor: f"{_picture(editor).scale:.6g}", _set_scale, "Side of a pixel"),
     "picture:turn": Field(lambda editor: number(_picture(editor).turn), _turn, "Counter-clockwise"),
 }
@@ -183,14 +182,15 @@ _STARTS = "Disc tool:disc|Points tool:places|Anywhere start:uniform|Next start:n
 _PICTURE = "Choose… background|Scale, move tool:picture|Remove background:none"
 _PROBLEMS = "Next problem:next|Repair repair|Clip clip|Mend problem:fix"
 _TURNS = "Turn ↺ rotate:left|Turn ↻ rotate:right|Flip ↔ mirror:x|Flip ↕ mirror:y"
-_ONE = (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none")
-_START = ("Delete delete|Copy duplicate|Default start:default",)
 _BUTTONS = {
     "vertex": ("Delete delete|Cut off bevel|Round round|Split split",),
     "vertices": ("Delete delete|Cut off bevel|Round round|Align align:left",),
     "boundary": ("Simplify simplify|Straighten straighten|Repair repair",),
-    **dict.fromkeys(("disc", "start"), _START),
-    **dict.fromkeys(("polygon", "circle", "wall"), _ONE),
+    **dict.fromkeys(("disc", "start"), ("Delete delete|Copy duplicate|Default start:default",)),
+    **dict.fromkeys(
+        ("polygon", "circle", "wall"),
+        (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none"),
+    ),
     "several": (
         _TURNS,
         "Unite unite|Subtract subtract|Intersect intersect|Divide divide",
@@ -254,7 +254,6 @@ class Panel(SidePanel):
         ui.row(*[0.0] * len(buttons), below=4)
         for text, action in buttons:
             self._does(ui, text, action)
-        ui.row()
 
     def _check(self, ui: Ui, kind: str, name: str, title: str) -> None:
         editor = self.editor
@@ -281,12 +280,10 @@ class Panel(SidePanel):
         ui.row(*(width for _ in range(2) for width in (word, 0.0, 16.0)))
         for name, words, unit in fields:
             self._field(ui, name, words, unit or " ")
-        ui.row()
 
     def _whole_row(self, ui: Ui, name: str, word: str) -> None:
         ui.row(_NAME, 0)
         self._field(ui, name, word)
-        ui.row()
 
     def _map(self, ui: Ui) -> None:
         with ui.scroll("map"):
@@ -315,7 +312,10 @@ class Panel(SidePanel):
             ui.space(6)
             self._things(ui)
             return
-        ui.header(object_words(editor))
+        words = editor.selection.words(editor.sketch)
+        if editor.selection.vertices:
+            words += f" of {whole(editor.selection).words(editor.sketch)}"
+        ui.header(words.upper())
         if kind in ("polygon", "circle", "wall", "disc", "start"):
             self._whole_row(ui, "name", "Name")
         if kind in ("polygon", "circle", "wall", "several"):
@@ -366,14 +366,14 @@ class Panel(SidePanel):
         with ui.scroll("problems"):
             if not problems:
                 seen = editor.measurement is not None
-                said = "Nothing is wrong with the map." if seen else "Being looked at …"
-                ui.words(said, colour=ui.theme.faint)
+                ui.words(
+                    "Nothing is wrong with the map." if seen else "Being looked at …", colour=ui.theme.faint
+                )
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
-                room = ui.wide - 26 - (66 if mends else 0)
-                lines = wrapped(problem.words, ui.px(TEXT), ui.px(room - 18))
-                high = (TEXT + 5) * len(lines) + 8
-                ui.row(20, 0, *([54] if mends else []), height=high, below=2)
+                room = ui.wide - 44 - (66 if mends else 0)
+                lines = wrapped(problem.words, ui.px(TEXT), ui.px(room))
+                ui.row(20, 0, *([54] if mends else []), height=(TEXT + 5) * len(lines) + 8, below=2)
                 badge = ui.cell()
                 if ui.surface is not None:
                     canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
@@ -400,8 +400,7 @@ class Panel(SidePanel):
         with ui.scroll("history"):
             for k in ui.visible_rows(len(steps), ROW + 2):
                 done, count = steps[k]
-                aside = "undone" if count < 0 else ""
-                if ui.option(done, aside, key=f"step:{k}", chosen=count == 0):
+                if ui.option(done, "undone" if count < 0 else "", key=f"step:{k}", chosen=count == 0):
                     self.editor.travel(count)
 
     def _things(self, ui: Ui) -> None:
@@ -437,37 +436,21 @@ class Panel(SidePanel):
 
 
 def object_kind(editor: Editor) -> str:
-    selection = editor.selection
-    if not selection:
-        return "nothing"
+    sketch, selection = editor.sketch, editor.selection
     if selection.vertices:
         return "vertex" if len(selection.vertices) == 1 else "vertices"
     if len(selection.owners) > 1:
         return "several"
     if selection.boundary:
         return "boundary"
-    if selection.starts:
-        (name,) = selection.starts
-        spec = dict(editor.sketch.starts).get(name)
-        return "disc" if isinstance(spec, DiscStart) else "start"
-    (key,) = selection.items
-    if key not in editor.sketch.places:
-        return "nothing"
-    shape = editor.sketch.item(key).shape
-    return KINDS[type(shape)]
-
-
-def object_words(editor: Editor) -> str:
-    selection = editor.selection
-    if selection.vertices:
-        return f"{selection.words(editor.sketch)} of {whole(selection).words(editor.sketch)}".upper()
-    if selection.owners == {BOUNDARY}:
-        return "BOUNDARY"
-    return selection.words(editor.sketch).upper()
+    for name in selection.starts:
+        return "disc" if isinstance(dict(sketch.starts).get(name), DiscStart) else "start"
+    for key in selection.items & sketch.places.keys():
+        return KINDS[type(sketch.item(key).shape)]
+    return "nothing"
 
 
 def facts(editor: Editor) -> tuple[str, ...]:
-    """Return what the map page says of the map, in the order of its words."""
     sketch, measurement = editor.sketch, editor.measurement
     size, ring = "no boundary yet: B draws one", sketch.boundary
     if ring:

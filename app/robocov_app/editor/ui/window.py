@@ -146,7 +146,6 @@ class Pointer:
 
 
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
-    """Return what the line says, the most important first."""
     sketch, idle, owner = editor.sketch, editor.tool is editor.selector, editor.selector.hovered
     item = sketch.item(owner) if idle and isinstance(owner, int) and owner in sketch.places else None
     standing = team if "robots" in editor.shown else None
@@ -318,7 +317,6 @@ class EditorWindow(BaseWindow):
         self.panel.focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the menu for what is at a pixel; what is not selected yet is selected then."""
         editor = self.editor
         if self.canvas.over(pixel):
             there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
@@ -408,7 +406,6 @@ class EditorWindow(BaseWindow):
             self.do(command.name)
 
     def _number(self, event: pygame.event.Event) -> bool:
-        """Take a key for the number that is typed while something is drawn; say whether it was one."""
         editor, name, sign = self.editor, key_of(event), event.unicode
         if not editor.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
             return False
