@@ -1,5 +1,6 @@
 """Dialogs over a window: questions with answers, lists to choose from by typing, files."""
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -237,15 +238,13 @@ def file_choice(
     saves = bool(text)
 
     def path_of(typed: str) -> Path:
-        try:
-            return folder / Path(typed).expanduser()
-        except RuntimeError:  # a user who is not there
-            return folder / typed
+        return folder / os.path.expanduser(typed)  # noqa: PTH111 - raises nothing where there is no such user
 
     @cache
     def options(typed: str) -> list[Option]:
-        before, slash, begun = typed.rpartition("/")
-        place, prefix = path_of(before + slash), before + slash
+        begun = typed.rpartition("/")[2]
+        prefix = typed.removesuffix(begun)
+        place = path_of(prefix)
         try:
             there = [(not each.is_dir(), each) for each in islice(place.iterdir(), MOST_LISTED)]
         except (OSError, ValueError):
@@ -272,7 +271,7 @@ def file_choice(
             accept(path_of(typed.strip()))
         return None
 
-    none = "Enter saves it there" if saves else "nothing of that name"
+    none = "Enter saves it there" if saves else Choice.none
     hint = "↑ ↓ choose · Tab completes · Enter accepts · Esc closes"
     return Choice(title, options, chosen, f"a path from {folder.absolute()}", hint, none, text)
 

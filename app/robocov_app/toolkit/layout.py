@@ -59,11 +59,10 @@ def laid_out(
     rows = -(-panes // columns)
     pane_width = (left - GAP * (columns - 1)) // columns
     pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
-    places = [divmod(k, columns) for k in range(panes)]
-    boxes: list[Box] = [
-        (k * (pane_width + GAP), legend + row * (pane_height + GAP), pane_width, max(pane_height, 1))
-        for row, k in places
-    ]
+    boxes: list[Box] = []
+    for row, k in (divmod(k, columns) for k in range(panes)):
+        top = legend + row * (pane_height + GAP)
+        boxes.append((k * (pane_width + GAP), top, pane_width, max(pane_height, 1)))
     return Layout(
         size=size,
         scale=scale,
