@@ -80,11 +80,9 @@ class Commands:
     def release(self, event: pygame.event.Event) -> None:
         self._down.discard(event.key)
 
-    def hold(self, key: int) -> None:
-        self._down.add(key)
-
-    def forget_keys(self) -> None:
-        self._down.clear()
+    def forget_keys(self, *held: int) -> None:
+        """Take note of the keys that are held down still, whatever was before."""
+        self._down = set(held)
 
     def _typable(self) -> dict[str, Command]:
         return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}

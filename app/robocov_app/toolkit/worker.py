@@ -69,14 +69,22 @@ class LatestWorker(Generic[_Answer]):
 
     def __init__(self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
         self.trouble = ""
+        self.process: subprocess.Popen[bytes] | None = (
+            None  # with a thread that writes to it and one that reads
+        )
         self._service, self._doing, self._wire, self._patience = service, doing, wire, patience
         self._since = 0.0
         self._number = self._answered = 0
-        self._talk: _Talk | None = None
+        self._ended = False
+        self._told: Reply | None = None
+        self._replies: deque[Reply] = deque(maxlen=1)
+        self._questions: deque[tuple[int, object]] = deque(maxlen=1)
+        self._asked = threading.Event()
+        self._threads: list[threading.Thread] = []
 
     @property
     def lives(self) -> bool:
-        return self._talk is not None and not self._talk.ended
+        return self.process is not None and not self._ended
 
     @property
     def busy(self) -> bool:
@@ -85,7 +93,7 @@ class LatestWorker(Generic[_Answer]):
     @property
     def progress(self) -> Any:
         """Progress of the newest question, as the service tells; None if it has not told yet."""
-        told = None if self._talk is None else self._talk.progress
+        told = self._told
         return told.answer if told is not None and told.number == self._number else None
 
     def put(self, question: object) -> None:
@@ -93,20 +101,24 @@ class LatestWorker(Generic[_Answer]):
         now = time.monotonic()
         if not self.busy:
             self._since = now
-        talk = self._talk
-        if talk is None or talk.ended or now - self._since > self._patience:
+        if not self.lives or now - self._since > self._patience:
             self.close()
             self._since = now
-            talk = self._talk = _Talk(self._service, self._wire())
+            self.process, self._ended = started(self._service), False
+            known = self.process, self._wire()
+            calls = self._write, self._read
+            self._threads = [threading.Thread(target=call, args=known, daemon=True) for call in calls]
+            for thread in self._threads:
+                thread.start()
         self._number += 1
-        talk.ask(self._number, question)
+        self._questions.append((self._number, question))
+        self._asked.set()
 
     def poll(self) -> _Answer | None:
         """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
-        if self._talk is None:
+        if self.process is None:
             return None
-        ended, replies = self._talk.ended, self._talk.replies
-        reply = replies.pop() if replies else None
+        ended, reply = self._ended, self._replies.pop() if self._replies else None
         if reply is not None:
             self._answered, self.trouble, self._since = reply.number, reply.trouble, time.monotonic()
         if ended and self.busy:
@@ -115,9 +127,40 @@ class LatestWorker(Generic[_Answer]):
         return None if reply is None else reply.answer
 
     def close(self) -> None:
-        if self._talk is not None:
-            self._talk.close()
-            self._talk = None
+        if self.process is not None:
+            process, self.process = self.process, None
+            self._asked.set()
+            process.kill()
+            process.wait()
+            for thread in self._threads:
+                thread.join()
+            self._questions.clear()
+            self._replies.clear()
+
+    def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+        assert process.stdin is not None
+        # when the process has ended, reading says so
+        with suppress(OSError), process.stdin as stream:
+            while self._asked.wait() and self.process is process:
+                self._asked.clear()
+                if self._questions:
+                    number, question = self._questions.pop()
+                    send(stream, (number, wire.encode(question)))
+
+    def _read(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+        assert process.stdout is not None
+        try:
+            with process.stdout as stream:
+                receive(stream)  # READY
+                while (reply := receive(stream)) is not None:
+                    if not reply.final:
+                        self._told = reply
+                        continue
+                    if reply.answer is not None:
+                        reply = Reply(reply.number, wire.decode(reply.answer), reply.trouble)
+                    self._replies.append(reply)
+        finally:
+            self._ended = True
 
 
 class DirectWorker(Generic[_Answer]):
@@ -149,60 +192,6 @@ class DirectWorker(Generic[_Answer]):
 
 Worker: TypeAlias = LatestWorker[_Answer] | DirectWorker[_Answer]
 """Worker that answers a window's questions."""
-
-
-class _Talk:
-    """One process, with a thread that writes to it and one that reads."""
-
-    def __init__(self, service: str, wire: Wire) -> None:
-        self.process = started(service)
-        self.ended = False
-        self.progress: Reply | None = None
-        self.replies: deque[Reply] = deque(maxlen=1)
-        self._wire = wire
-        self._questions: deque[tuple[int, object]] = deque(maxlen=1)
-        self._asked = threading.Event()
-        self._closed = False
-        self._threads = [threading.Thread(target=call, daemon=True) for call in (self._write, self._read)]
-        for thread in self._threads:
-            thread.start()
-
-    def ask(self, number: int, question: object) -> None:
-        self._questions.append((number, question))
-        self._asked.set()
-
-    def close(self) -> None:
-        self._closed = True
-        self._asked.set()
-        self.process.kill()
-        self.process.wait()
-        for thread in self._threads:
-            thread.join()
-
-    def _write(self) -> None:
-        assert self.process.stdin is not None
-        # when the process has ended, reading says so
-        with suppress(OSError), self.process.stdin as stream:
-            while self._asked.wait() and not self._closed:
-                self._asked.clear()
-                if self._questions:
-                    number, question = self._questions.pop()
-                    send(stream, (number, self._wire.encode(question)))
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        try:
-            with self.process.stdout as stream:
-                receive(stream)  # READY
-                while (reply := receive(stream)) is not None:
-                    if not reply.final:
-                        self.progress = reply
-                        continue
-                    if reply.answer is not None:
-                        reply = Reply(reply.number, self._wire.decode(reply.answer), reply.trouble)
-                    self.replies.append(reply)
-        finally:
-            self.ended = True
 
 
 class Line:

@@ -34,65 +34,7 @@ from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme, mix
-from robocov_app.toolkit.layout import Box, Layout, inside
-
-
-class Strips:
-    """Draws the strips, and says what they leave to the sheet."""
-
-    def __init__(self, editor: Editor) -> None:
-        self._editor = editor
-        self._entries: list[LegendEntry] = []
-        self._rows = 1
-        self._rows_for: object = None
-        self._unfree: Latest[bool] = Latest()
-        self._legend: Latest[Surface] = Latest()
-
-    def room(self, box: Box, scale: float) -> tuple[float, float, float, float]:
-        """Return what of a box is left: left, top, width and height, px."""
-        left, top, width, height = box
-        has_legend = "legend" in self._editor.shown
-        above = round((10 + annotations.LEGEND_ROW * self._rows) * scale) if has_legend else 0
-        below = max(height - above - round(annotations.STRIP * scale), 1)
-        return float(left), float(top + above), float(width), float(below)
-
-    def update(self, canvas: Canvas, team: Team | None) -> None:
-        editor = self._editor
-        self._entries = self._found(team) if "legend" in editor.shown else []
-        rows = max(len(annotations.legend_rows(canvas, self._entries)), 1)
-        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
-        # while things come and go the legend does not become lower again: the map is not to jump
-        self._rows = max(rows, self._rows) if key == self._rows_for else rows
-        self._rows_for = key
-
-    def _found(self, team: Team | None) -> list[LegendEntry]:
-        sketch, shown = self._editor.sketch, self._editor.shown
-        unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
-        standing = "robots" in shown and team is not None and bool(team.places)
-        measurement = self._editor.measurement if "impassable" in shown else None
-        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=unfree)
-        density = sketch.density
-        if density is not None and not density.uniform and sketch.boundary:
-            x, y = zip(*sketch.boundary, strict=True)
-            span = value_range(density, (min(x), min(y), max(x), max(y)))
-            found.append(density_entry(range_label(span)))
-        return found
-
-    def draw(self, screen: Surface, canvas: Canvas, box: Box) -> None:
-        left, top, width, height = box
-        if self._entries:
-            key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
-            wide = replace(canvas, surface=Surface((width, 1)))
-            legend = self._legend.of(None, key, lambda: annotations.legend_strip(self._entries, wide))
-            screen.blit(legend, (left, top))
-        high = round(annotations.STRIP * canvas.scale)
-        foot = screen.subsurface(Rect(left, top + height - high, width, high))
-        own = replace(canvas, surface=foot)
-        annotations.draw_scale_bar(own)
-        taken = (annotations.EDGE + 90) * canvas.scale + annotations.bar_length(own) * canvas.camera.zoom
-        size = canvas.text_size(canvas.theme.text)
-        words = shortened(map_words(self._editor), size, width - taken - annotations.EDGE * canvas.scale)
-        own.text(words, (width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
+from robocov_app.toolkit.layout import Layout, inside
 
 
 def map_words(editor: Editor) -> str:
@@ -121,7 +63,11 @@ class EditorCanvas:
     def __init__(self, editor: Editor) -> None:
         self.editor = editor
         self.sheet = Sheet()
-        self.strips = Strips(editor)
+        self.entries: list[LegendEntry] = []  # of the legend
+        self._rows = 1
+        self._rows_for: object = None
+        self._unfree: Latest[bool] = Latest()
+        self._legend: Latest[Surface] = Latest()
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
@@ -135,7 +81,30 @@ class EditorCanvas:
         self._look(self.camera.within(self._view_box()))
 
     def _view_box(self) -> tuple[float, float, float, float]:
-        return self.strips.room(self.layout.arena, self.layout.scale)
+        """Return what the legend and the strip at the foot leave: left, top, width and height, px."""
+        (left, top, width, height), scale = self.layout.arena, self.layout.scale
+        has_legend = "legend" in self.editor.shown
+        above = round((10 + annotations.LEGEND_ROW * self._rows) * scale) if has_legend else 0
+        below = max(height - above - round(annotations.STRIP * scale), 1)
+        return float(left), float(top + above), float(width), float(below)
+
+    def _update_legend(self, canvas: Canvas) -> None:
+        editor, sketch, density = self.editor, self.editor.sketch, self.editor.sketch.density
+        self.entries = []
+        if "legend" in editor.shown:
+            unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
+            standing = "robots" in editor.shown and self.team is not None and bool(self.team.places)
+            found = editor.measurement if "impassable" in editor.shown else None
+            self.entries = legend_entries(found, starts=bool(sketch.starts), team=standing, unfree=unfree)
+            if density is not None and not density.uniform and sketch.boundary:
+                x, y = zip(*sketch.boundary, strict=True)
+                span = value_range(density, (min(x), min(y), max(x), max(y)))
+                self.entries.append(density_entry(range_label(span)))
+        rows = max(len(annotations.legend_rows(canvas, self.entries)), 1)
+        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
+        # while things come and go the legend does not become lower again: the map is not to jump
+        self._rows = max(rows, self._rows) if key == self._rows_for else rows
+        self._rows_for = key
 
     def fit(self) -> None:
         self._show(self._bounds)
@@ -215,7 +184,7 @@ class EditorCanvas:
     def draw(self, screen: Surface) -> None:
         editor, shown, theme = self.editor, self.editor.shown, self.theme
         box = Rect(self.layout.arena)
-        self.strips.update(self._view().canvas(Surface((box.width, 1))), self.team)
+        self._update_legend(self._view().canvas(Surface((box.width, 1))))
         if self.camera.view != self._view_box():
             self._look(self.camera.within(self._view_box()))
         view = self._view()
@@ -276,7 +245,21 @@ class EditorCanvas:
         if editor.typed:
             overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
         screen.set_clip(None)
-        self.strips.draw(screen, canvas, self.layout.arena)
+        self._draw_strips(screen, canvas, box)
+
+    def _draw_strips(self, screen: Surface, canvas: Canvas, box: Rect) -> None:
+        if self.entries:
+            key = (tuple(entry.text for entry in self.entries), box.width, canvas.theme.name, canvas.scale)
+            wide = replace(canvas, surface=Surface((box.width, 1)))
+            legend = self._legend.of(None, key, lambda: annotations.legend_strip(self.entries, wide))
+            screen.blit(legend, box)
+        high = round(annotations.STRIP * canvas.scale)
+        own = replace(canvas, surface=screen.subsurface(Rect(box.left, box.bottom - high, box.width, high)))
+        annotations.draw_scale_bar(own)
+        taken = (annotations.EDGE + 90) * canvas.scale + annotations.bar_length(own) * canvas.camera.zoom
+        size = canvas.text_size(canvas.theme.text)
+        words = shortened(map_words(self.editor), size, box.width - taken - annotations.EDGE * canvas.scale)
+        own.text(words, (box.width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
 
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
         """Draw many things that are being moved: once, and then the picture of them."""
@@ -351,7 +334,8 @@ class EditorCanvas:
         if "handles" not in editor.shown or editor.tool is not selector or not selection:
             return
         if (box := frame_of(sketch, selection, editor.pixel)) is not None:
-            overlay.draw_box(canvas, box, mix(floor, colour, 0.6))
+            rim = overlay.pixels(canvas, shapely.box(*box).exterior.coords).tolist()
+            overlay.dashed(canvas, rim, mix(floor, colour, 0.6), 3.0)
         found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
         overlay.draw_grips(canvas, found, selection.vertices, selector.near, KNOB * canvas.scale)
 
@@ -359,6 +343,8 @@ class EditorCanvas:
         if isinstance(owner, str):
             overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
         elif owner == BOUNDARY:
-            overlay.draw_outline(canvas, [np.asarray(sketch.boundary, dtype=float)], colour, width + 0.5)
+            ring = overlay.pixels(canvas, sketch.boundary or ())
+            canvas.outline(ring, colour, canvas.width(width + 0.5))
         else:
-            overlay.draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
+            for ring in self.sheet.outlines.of(sketch.item(owner)).rings:
+                canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))

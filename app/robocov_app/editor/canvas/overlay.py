@@ -27,7 +27,7 @@ from robocov_app.toolkit.overlay import tag
 
 # pixels at scale 1
 SQUARE = 3.5  # half the side of a handle
-MOST_RADIUS = 300.0  # up to which circles are sprites
+MOST_RADIUS = 300.0  # up to which circles are sprites, which are smoother than many short lines
 HATCH = 7  # from one slanted line to the next
 BADGE = 8.0  # radius of a problem's badge
 STEM = 17.0  # that it is above its place
@@ -59,16 +59,7 @@ def _disc(
     canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
 
 
-def draw_outline(canvas: Canvas, rings: Iterable[Array], colour: Colour, width: float = 2.0) -> None:
-    for ring in rings:
-        canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))
-
-
-def draw_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Colour) -> None:
-    _dashed(canvas, pixels(canvas, shapely.box(*box).exterior.coords).tolist(), colour, 3.0)
-
-
-def _dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
+def dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
     for a, b in pairwise(points):
         canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 
@@ -105,7 +96,7 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
     last: Point | None = None
     for guide in guides:
         line = pixels(canvas, guide.line).tolist()
-        _dashed(canvas, line, colour)
+        dashed(canvas, line, colour)
         if line:
             last = line[-1][0], line[-1][1]
             if guide.kind in ("vertex", "middle", "centre", "crossing", "edge"):
@@ -117,27 +108,21 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         canvas.text(" · ".join(words), at, size=canvas.theme.small_text, colour=colour)
 
 
-def draw_circle(canvas: Canvas, center: Array, radius: float, colour: Colour, width: float) -> None:
-    """Draw a circle's line; as a sprite, which is smoother than many short lines, unless it is huge."""
-    if radius < MOST_RADIUS:
-        rounded = round(2 * radius) / 2
-        canvas.stamp(partial(sprites.ring, rounded, colour, width * canvas.scale), center.tolist())
-        return
-    sides = int(min(radius, 720))
-    angle = np.arange(sides) * (2 * np.pi / sides)
-    ring = center + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    canvas.outline(ring, colour, canvas.width(width))
-
-
 def draw_start(
     canvas: Canvas, spec: StartSpec, name: str, *, chosen: bool, first: bool = False, dots: float = 1.0
 ) -> None:
     theme, scale, width = canvas.theme, canvas.scale, 2.2 if chosen else 1.6
     if isinstance(spec, DiscStart):
-        (center,) = pixels(canvas, (spec.center,))
+        ((x, y),) = pixels(canvas, (spec.center,)).tolist()
         radius = spec.radius * canvas.camera.zoom
-        draw_circle(canvas, center, radius, theme.start, width)
-        x, y = center.tolist()
+        if radius < MOST_RADIUS:
+            ring = partial(sprites.ring, round(2 * radius) / 2, theme.start, width * scale)
+            canvas.stamp(ring, (x, y))
+        else:
+            sides = int(min(radius, 720))
+            angle = np.arange(sides) * (2 * np.pi / sides)
+            rim = (x, y) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+            canvas.outline(rim, theme.start, canvas.width(width))
         at, anchor = (x, y - radius - 10 * scale), "middle"  # above, where no robot stands
     elif isinstance(spec, PointsStart) and spec.positions:
         places = pixels(canvas, spec.positions).tolist()
@@ -239,7 +224,7 @@ def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bo
         canvas.surface.blit(page, box)
     rim = shapely.get_coordinates(shapely.box(*low, *high, ccw=False))
     if touched:
-        _dashed(canvas, rim.tolist(), colour)
+        dashed(canvas, rim.tolist(), colour)
     else:
         canvas.outline(rim, colour, canvas.width(1.0), closed=False)
 
@@ -383,9 +368,6 @@ def draw_badge(
 
 
 def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
-    def obstacle(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
-
     def boundary(canvas: Canvas, x: float, y: float) -> None:
         half, width = 9 * canvas.scale, canvas.width(canvas.theme.boundary_line)
         canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, width)
@@ -393,9 +375,6 @@ def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfre
     def beyond(canvas: Canvas, x: float, y: float) -> None:
         fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
         canvas.swatch(x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
-
-    def start(canvas: Canvas, x: float, y: float) -> None:
-        _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)
 
     def robot(canvas: Canvas, x: float, y: float) -> None:
         edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
@@ -408,10 +387,10 @@ def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfre
         canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))
 
     rows: tuple[tuple[object, str, Glyph], ...] = (
-        (True, "obstacle", obstacle),
+        (True, "obstacle", lambda on, x, y: on.swatch(x, y, on.theme.obstacle, on.theme.obstacle_edge)),
         (True, "boundary", boundary),
         (unfree, "outside, in the robots' hull", beyond),
-        (starts, "start", start),
+        (starts, "start", lambda on, x, y: _ring(on, (x, y), 5.0, on.theme.start, 1.6)),
         (team, "robot", robot),
         (found and found.impassable, "too narrow for a robot", partial(hatch, narrow=True)),
         (found and found.sealed, "cut off", partial(hatch, narrow=False)),

@@ -142,22 +142,15 @@ class Editor(Workspace):
             self._about = sketch, self.radius
             self.readings.put(self._about)
 
-    def undo(self) -> None:
-        change = self.document.history.undo()
-        self.say(f"undone: {change.words}" if change else "nothing to undo")
-        self._changed()
-
-    def redo(self) -> None:
-        change = self.document.history.redo()
-        self.say(f"done again: {change.words}" if change else "nothing to do again")
-        self._changed()
-
     def travel(self, steps: int) -> None:
-        """Undo so many changes, or with a negative number do them again."""
+        """Undo so many changes, or with a negative number do them again; tell of a single one."""
         history = self.document.history
+        change = None
         for _ in range(abs(steps)):
-            if (history.undo if steps > 0 else history.redo)() is None:
-                break
+            change = history.undo() if steps > 0 else history.redo()
+        if abs(steps) == 1:
+            done, none = ("undone", "undo") if steps > 0 else ("done again", "do again")
+            self.say(f"{done}: {change.words}" if change else f"nothing to {none}")
         self._changed()
 
     def put(self, document: Document) -> None:

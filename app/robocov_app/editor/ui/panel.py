@@ -162,15 +162,6 @@ ROW = 20.0  # height of a line of a list, px at scale 1
 MOST_PROBLEMS = 200  # that are listed
 _NAME = 62.0
 
-_FACTS = {
-    "Size": "Width and height of the boundary",
-    "Free": "Area where robots can be, of that inside the boundary",
-    "Parts": "Connected parts of the free space, and those that a robot can sweep",
-    "Gap": "The narrowest passage, against a robot's diameter",
-    "Holds": "Obstacles and their vertices",
-    "Density": "How much each place counts: the tool Density; floor 0.5 and density none are commands",
-}
-
 _NOTHING = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab goes on to the next; Ctrl A takes all."
@@ -290,7 +281,7 @@ class Panel(SidePanel):
             self._whole_row(ui, "title", "Name")
             self._whole_row(ui, "description", "About")
             ui.row(_NAME, 0, height=18, below=2)
-            for (word, tip), said in zip(_FACTS.items(), facts(self.editor), strict=True):
+            for word, said, tip in facts(self.editor):
                 ui.label(word, style="unit", tip=tip)
                 ui.label(said, key=f"fact:{word}")
             ui.space(4)
@@ -450,23 +441,27 @@ def object_kind(editor: Editor) -> str:
     return "nothing"
 
 
-def facts(editor: Editor) -> tuple[str, ...]:
+def facts(editor: Editor) -> tuple[tuple[str, str, str], ...]:
+    """Return what the map page says of the map: a word, what is said, and a tip."""
     sketch, measurement = editor.sketch, editor.measurement
-    size, ring = "no boundary yet: B draws one", sketch.boundary
-    if ring:
-        xs, ys = zip(*ring, strict=True)
+    size, free, parts, narrowest, holds = "no boundary yet: B draws one", "…", "…", "…", "…"
+    if sketch.boundary:
+        xs, ys = zip(*sketch.boundary, strict=True)
         size = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
-    if measurement is None:
-        return (size, "…", "…", "…", "…", density_label(sketch.density))
-    parts, reached = len(measurement.components), len(measurement.reached)
-    narrowest, gap, diameter = "none", measurement.gap, 2 * measurement.radius
-    if gap is not None:
-        narrowest = f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m"
+    if measurement is not None:
+        count, reached = len(measurement.components), len(measurement.reached)
+        gap, diameter = measurement.gap, 2 * measurement.radius
+        free = f"{measurement.free_area:.2f} m²"
+        parts = f"{count}" if count == reached else f"{count}; {reached} for a robot"
+        holds = f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices"
+        sign = "≥" if gap is not None and gap.width >= diameter else "<"
+        narrowest = "none" if gap is None else f"{gap.width:.3f} m {sign} {diameter:.2f} m"
+    counts = "How much each place counts: the tool Density; floor 0.5 and density none are commands"
     return (
-        size,
-        f"{measurement.free_area:.2f} m²",
-        f"{parts}" if parts == reached else f"{parts}; {reached} for a robot",
-        narrowest,
-        f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices",
-        density_label(sketch.density),
+        ("Size", size, "Width and height of the boundary"),
+        ("Free", free, "Area where robots can be, of that inside the boundary"),
+        ("Parts", parts, "Connected parts of the free space, and those that a robot can sweep"),
+        ("Gap", narrowest, "The narrowest passage, against a robot's diameter"),
+        ("Holds", holds, "Obstacles and their vertices"),
+        ("Density", density_label(sketch.density), counts),
     )

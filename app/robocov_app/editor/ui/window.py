@@ -348,9 +348,8 @@ class EditorWindow(BaseWindow):
         change = brought_back(editor.sketch, viewer.tried, viewer.session.environment)
         if change is not None and not viewer.elsewhere:
             editor.change(change)
-        self.commands.forget_keys()
-        if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
-            self.commands.hold(pygame.K_F5)
+        held = pygame.key.get_pressed()[pygame.K_F5]  # its repeated presses would begin anew
+        self.commands.forget_keys(*([pygame.K_F5] if held else ()))
         self._arrange()
         editor.version += 1
         if trial.ended:
