@@ -131,11 +131,7 @@ def _done(command: Command, *typed: str) -> object:
 
 
 def parted(text: str) -> tuple[str, str]:
-    """Return the word and what follows it, after a blank or an equals sign.
-
-    >>> parted("k_rep = 0.5"), parted("map a=b.json"), parted("robots")
-    (('k_rep', '0.5'), ('map', 'a=b.json'), ('robots', ''))
-    """
+    """Return the word and what follows it, after a blank or an equals sign: ``k_rep = 0.5``."""
     word, *rest = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
     return word, "".join(rest)
 

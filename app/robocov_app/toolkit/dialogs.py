@@ -86,8 +86,7 @@ class Question(Dialog):
             ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, colour=ui.theme.faint)
         ui.space(12)
         widths = [text_width(each.text, ui.px(TEXT), True) / ui.scale + 36 for each in self.answers]
-        room = ui.wide - sum(widths) - 8 * len(widths)
-        ui.row(max(room, 1.0), *widths, height=30, gap=8, below=0)
+        ui.row(max(ui.wide - sum(widths) - 8 * len(widths), 1.0), *widths, height=30, gap=8, below=0)
         ui.cell()
         for k, answer in enumerate(self.answers):
             tip = f"Key {answer.key.upper()}" if answer.key else ""

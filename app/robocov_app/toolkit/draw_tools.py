@@ -50,5 +50,4 @@ class Outline:
         return points
 
     def cancel(self) -> bool:
-        """Forget what was drawn; return whether there was something."""
         return bool(self.take())

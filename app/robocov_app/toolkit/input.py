@@ -8,9 +8,7 @@ KEY_REPEAT = (350, 40)  # milliseconds until a held key is pressed again, the fi
 DOUBLE = 0.35  # seconds between the two clicks of a double click, at most
 SLIP = 5.0  # pixels that a click may move
 WHEEL = 1.15  # magnification of one notch of the wheel
-
 OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
-"""Types of events that the mouse makes."""
 
 
 def key_of(event: pygame.event.Event) -> str:
@@ -23,11 +21,7 @@ def key_of(event: pygame.event.Event) -> str:
 
 
 def key_words(key: str) -> str:
-    """Return a key as people write it.
-
-    >>> [key_words(key) for key in ("ctrl+shift+z", "page down", "f1", "space", "`", "left")]
-    ['Ctrl Shift Z', 'Page down', 'F1', 'Space', '`', '←']
-    """
+    """Return a key as people write it: Ctrl Shift Z."""
     arrows = {"left": "←", "right": "→", "up": "↑", "down": "↓", "return": "Enter"}
     parts = [*key[:-1].split("+")[:-1], "+"] if key.endswith("++") or key == "+" else key.split("+")
     return " ".join(arrows.get(part, part[:1].upper() + part[1:]) for part in parts)

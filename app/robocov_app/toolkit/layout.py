@@ -39,12 +39,7 @@ def laid_out(
     legend_rows: int = 1,  # of the legend that several panes share
     plot: bool = True,  # whether it is shown
 ) -> Layout:
-    """Lay a window out, for panes of a map whose width by height is `aspect`, at a scale of text and lines.
-
-    >>> layout = laid_out((1280, 720), 1.0, 1, 4 / 3)
-    >>> layout.arena, layout.panel
-    ((0, 0, 960, 518), (960, 0, 320, 720))
-    """
+    """Lay a window out, for panes of a map whose width by height is `aspect`."""
     width, height = size
     scale = min(scale, largest_scale(size))
     wide = min(round(PANEL * scale), width - 1) if panel else 0
@@ -77,20 +72,11 @@ def laid_out(
 
 
 def largest_scale(size: tuple[int, int]) -> float:
-    """Return the largest scale that a window has room for: in steps, so that text does not tremble.
-
-    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480), (1170, 2532))]
-    [1.0, 1.125, 3.5, 0.625, 2.5]
-    """
+    """Return the largest scale that a window has room for: in steps, so that text does not tremble."""
     least = SMALLEST if size[0] >= size[1] else UPRIGHT
     return max(floor(8 * min(size[0] / least[0], size[1] / least[1])) / 8, 0.25)
 
 
 def inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
-    """Return whether a pixel is in a box.
-
-    >>> inside((10, 10, 5, 5), (14, 10)), inside((10, 10, 5, 5), (15, 10))
-    (True, False)
-    """
     left, top, width, height = box
     return left <= pixel[0] < left + width and top <= pixel[1] < top + height

@@ -262,8 +262,7 @@ class Ui:
         """Lay the next widgets side by side, again and again; a width of 0 shares what is left."""
         self.end_row()
         widths = widths or (0.0,)
-        free = self.wide - sum(widths) - gap * (len(widths) - 1)
-        share = free / max(widths.count(0), 1)
+        share = (self.wide - sum(widths) - gap * (len(widths) - 1)) / max(widths.count(0), 1)
         self._cells, x = [], self.x
         for width in widths:
             self._cells.append((x, width or share))
@@ -324,8 +323,8 @@ class Ui:
 
     def visible_rows(self, count: int, height: float) -> Iterator[int]:
         self.end_row()
-        top = self._clip.top - self.box.top - self.px(self.y)
-        first = min(max(int(top / self.px(height)), 0), count)
+        first = int((self._clip.top - self.box.top - self.px(self.y)) / self.px(height))
+        first = min(max(first, 0), count)
         last = min(first + self._clip.height // self.px(height) + 2, count)
         self.y += first * height
         self.row(height=height, below=0)
@@ -630,9 +629,8 @@ class Ui:
         return given
 
     def _caret_at(self, edit: TextEdit, rect: Rect) -> int:
-        size = self.px(TEXT)
         x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
-        widths = [text_width(edit.text[:k], size) for k in range(len(edit.text) + 1)]
+        widths = [text_width(edit.text[:k], self.px(TEXT)) for k in range(len(edit.text) + 1)]
         return min(range(len(widths)), key=lambda k: abs(widths[k] - x))
 
     def _shifted(self, edit: TextEdit, rect: Rect) -> int:
@@ -643,14 +641,12 @@ class Ui:
     def _draw_field(self, rect: Rect, edit: TextEdit | None, text: str, ghost: str) -> None:
         screen, theme, size = self.surface, self.theme, self.px(TEXT)
         assert screen is not None
-        stands_out = edit is not None or self._hovers(rect)
-        edge = theme.final if stands_out else self._shade(0.24)
+        edge = theme.final if edit is not None or self._hovers(rect) else self._shade(0.24)
         width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
         self._round(rect, field_colour(theme), edge, width=width)
         inner = rect.inflate(-self.px(12), -self.px(4))
         if edit is None:
-            ink = theme.ink if text else theme.faint
-            self._write(text or ghost, inner, ink, TEXT)
+            self._write(text or ghost, inner, theme.ink if text else theme.faint, TEXT)
             return
         clip = screen.get_clip()
         screen.set_clip(inner.inflate(self.px(4), 0).clip(clip))

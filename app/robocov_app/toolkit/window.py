@@ -80,8 +80,7 @@ class BaseWindow:
                     self.frame(now - before)
                     before = now
                     if self.remote is not None:
-                        pause = PAUSE if self.resting else 1.0 / FPS
-                        self.remote.wait(now + pause - perf_counter())
+                        self.remote.wait(now + (PAUSE if self.resting else 1.0 / FPS) - perf_counter())
                         continue
                     clock.tick(FPS)
                     # SDL's own way to wait for events looks for them a thousand times a second

@@ -191,7 +191,6 @@ class DirectWorker(Generic[_Answer]):
 
 
 Worker: TypeAlias = LatestWorker[_Answer] | DirectWorker[_Answer]
-"""Worker that answers a window's questions."""
 
 
 class Line:

@@ -176,6 +176,7 @@ def test_a_picture_that_cannot_be_read_is_told_and_all_else_is_drawn(tmp_path: P
 
 
 def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
+    assert grid_steps(0.1, 60.0, 1.0) == (0.2, 1.0)
     for grid in (0.01, 0.1, 0.25, 1.0, 5.0):
         for zoom in (0.5, 3.0, 28.0, 400.0, 9000.0):
             fine, coarse = grid_steps(grid, zoom, 1.0)

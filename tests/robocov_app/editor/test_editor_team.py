@@ -6,7 +6,7 @@ import numpy as np
 from driven_editor import of_map, sheet
 
 from robocov.environment import PolygonObstacle
-from robocov_app.editor.ui.team import Team, TeamThread, placed
+from robocov_app.editor.ui.editor import Team, TeamThread, placed
 
 
 def test_the_team_stands_where_a_run_would_begin() -> None:

@@ -13,7 +13,7 @@ from robocov_app.editor.canvas import canvas
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.panel import TABS, number
 from robocov_app.editor.ui.window import facts
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
@@ -63,6 +63,10 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
     assert hands.editor.robots == 7
     hands.tick("show:robots")
     assert "robots" in hands.editor.shown
+
+
+def test_numbers_stand_in_fields_without_needless_zeros() -> None:
+    assert [number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
 
 
 def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
@@ -369,7 +373,7 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
             window.frame(1 / 60)
-        assert hands.editor.pending is not None
+        assert hands.editor.preview[0] is not hands.sketch
         assert sheet.full == full
 
 

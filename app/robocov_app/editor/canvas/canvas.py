@@ -22,8 +22,7 @@ from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.select import Moving
 from robocov_app.editor.tools.tool import KNOB, frame_of, handles
-from robocov_app.editor.ui.editor import Editor
-from robocov_app.editor.ui.team import Team
+from robocov_app.editor.ui.editor import Editor, Team
 from robocov_app.render import annotations, sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
@@ -118,8 +117,7 @@ class EditorCanvas:
 
     def _show(self, bounds: tuple[float, float, float, float]) -> None:
         low_x, low_y, high_x, high_y = bounds
-        least = 0.2
-        grow_x, grow_y = max(least - (high_x - low_x), 0) / 2, max(least - (high_y - low_y), 0) / 2
+        grow_x, grow_y = max(0.2 - (high_x - low_x), 0) / 2, max(0.2 - (high_y - low_y), 0) / 2  # m
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
 
@@ -204,10 +202,9 @@ class EditorCanvas:
             under = replace(under, background=moved)
         if isinstance(weighed, Change):
             under = replace(under, density=weighed.sketch.density)
-        page = self.sheet.page(view, under, lifted)
         screen.fill(theme.background, box)
         clip = view.clip
-        screen.blit(page, clip, clip)
+        screen.blit(self.sheet.page(view, under, lifted), clip, clip)
         screen.set_clip(clip)
         # words keep to the canvas
         canvas = view.canvas(screen.subsurface(box))
@@ -251,8 +248,7 @@ class EditorCanvas:
         if self.entries:
             key = (tuple(entry.text for entry in self.entries), box.width, canvas.theme.name, canvas.scale)
             wide = replace(canvas, surface=Surface((box.width, 1)))
-            legend = self._legend.of(None, key, lambda: annotations.legend_strip(self.entries, wide))
-            screen.blit(legend, box)
+            screen.blit(self._legend.of(None, key, lambda: annotations.legend_strip(self.entries, wide)), box)
         high = round(annotations.STRIP * canvas.scale)
         own = replace(canvas, surface=screen.subsurface(Rect(box.left, box.bottom - high, box.width, high)))
         annotations.draw_scale_bar(own)
@@ -285,8 +281,7 @@ class EditorCanvas:
             path = item.shape.path
             assert path is not None
             chosen = key in self.editor.selection.items
-            colour = theme.final if chosen else mix(theme.background, theme.ink, 0.6)
-            overlay.draw_path(canvas, path, colour)
+            overlay.draw_path(canvas, path, theme.final if chosen else mix(theme.background, theme.ink, 0.6))
             if since is not None and goes(path):
                 shift = path.shift(self.editor.now - since)
                 moved = shapely.transform(item.geometry, lambda places, by=shift: places + by)

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pygame
 import shapely
+from PIL import Image, ImageOps
 from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov_app.editor.canvas.reference_image import ReferenceImage
+from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
@@ -108,6 +109,8 @@ BIAS = 1e-4  # pixels by which all is shifted: round numbers would else lie betw
 PATCHES = 0.5  # part of the page from which on it is drawn anew as a whole
 LEAST_LETTERS = 6  # of a shortened name
 SEEN_THROUGH = 0.62  # opacity of obstacles over a picture
+LARGEST = 4096  # pixels of a side that are kept of a larger picture
+_LARGEST_SHOWN = 8192  # of a side of what is made of it at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +136,75 @@ class View:
 
 def outside_colour(theme: Theme) -> Colour:
     return mix(theme.panel, theme.ink, 0.05) if theme is LIGHT else mix(theme.background, (0, 0, 0), 0.28)
+
+
+class ReferenceImage:
+    """Keeps the picture that was loaded last, and draws it."""
+
+    def __init__(self) -> None:
+        self._of: Path | None = None
+        self._picture: Surface | None = None
+        self._shrunk = 1.0
+        self.trouble = ""
+
+    def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
+        """Draw the picture on a page; `folder` is where its path counts from."""
+        self._load(folder / background.path)
+        picture = self._picture
+        if picture is None or not background.shown or background.opacity <= 0.0:
+            return
+        factor = background.scale * camera.zoom * self._shrunk
+        if background.turn % 360.0:
+            if factor * max(picture.get_size()) > _LARGEST_SHOWN:
+                return
+            shown = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
+            corners = camera.to_pixels(np.array(background.corners))
+            x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+            at = shown.get_rect(center=(round(x), round(y)))
+        else:  # the part that can be seen: magnified, the whole may be huge
+            left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
+            width, height = picture.get_size()
+            first_x = max(int((clip.left - left) / factor) - 1, 0)
+            first_y = max(int((clip.top - top) / factor) - 1, 0)
+            last_x = min(int((clip.right - left) / factor) + 2, width)
+            last_y = min(int((clip.bottom - top) / factor) + 2, height)
+            at = Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
+            to_x, to_y = round(left + last_x * factor), round(top + last_y * factor)
+            size = max(to_x - at.x, 1), max(to_y - at.y, 1)
+            if last_x <= first_x or last_y <= first_y or max(size) > _LARGEST_SHOWN:
+                return
+            part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
+            shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
+        shown.set_alpha(round(255 * background.opacity))
+        page.blit(shown, at)
+
+    def _load(self, path: Path) -> None:
+        if path == self._of:
+            return
+        self._of, self._picture, self.trouble = path, None, ""
+        try:
+            with Image.open(path) as opened:
+                full = ImageOps.exif_transpose(opened)
+                width = full.size[0]
+                rgb = _on_white(full)
+        except Exception as error:  # whatever a broken picture makes its decoder raise
+            self.trouble = f"the picture {path.name} cannot be shown: {error}"
+            return
+        rgb.thumbnail((LARGEST, LARGEST))
+        self._shrunk = width / rgb.size[0]
+        self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
+
+
+def _on_white(picture: Image.Image) -> Image.Image:
+    if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
+        clear = picture.convert("RGBA")
+        page = Image.new("RGBA", clear.size, (255, 255, 255, 255))
+        return Image.alpha_composite(page, clear).convert("RGB")
+    if picture.mode.startswith("I") or picture.mode == "F":
+        values = np.asarray(picture, dtype=float)
+        grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
+        return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+    return picture.convert("RGB")
 
 
 class Sheet:
@@ -192,8 +264,7 @@ class Sheet:
 
     def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
         """Move the page with the camera; return what came into sight, None where it cannot be moved."""
-        before = camera.to_pixels(np.array(view.camera.center))
-        dx, dy = (np.array(view.camera.middle) - before).tolist()
+        dx, dy = (np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))).tolist()
         whole_x, whole_y = round(dx), round(dy)
         clip = view.clip
         far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
@@ -324,11 +395,7 @@ def beyond(sketch: Sketch) -> shapely.Geometry:
 
 
 def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
-    """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear.
-
-    >>> grid_steps(0.1, 60.0, 1.0)
-    (0.2, 1.0)
-    """
+    """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear."""
     least = FINE * scale / zoom
     fine = grid
     if fine < least:

@@ -69,8 +69,7 @@ def draw_grips(
 ) -> None:
     """Draw the handles; `stem` is how far the knob is from the box, px."""
     floor, edge = canvas.theme.background, canvas.theme.final
-    places = pixels(canvas, (handle.at for handle in found)).tolist()
-    for handle, (x, y) in zip(found, places, strict=True):
+    for handle, (x, y) in zip(found, pixels(canvas, (each.at for each in found)).tolist(), strict=True):
         large = handle == near
         if handle.kind == "turn":
             canvas.line((x, y), (x, y + stem), edge, canvas.width(1.0))
@@ -240,8 +239,7 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
     pygame.draw.rect(surface, theme.final, box, canvas.width(1.5), border_radius=round(5 * scale))
     size, y = canvas.text_size(large) / scale, box.centery
     canvas.text(words, (box.left + 8 * scale, y), size=size, bold=True)
-    right = box.right - 8 * scale
-    canvas.text(hint, (right, y), size=theme.small_text, colour=theme.faint, anchor="right")
+    canvas.text(hint, (box.right - 8 * scale, y), size=theme.small_text, colour=theme.faint, anchor="right")
 
 
 def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:

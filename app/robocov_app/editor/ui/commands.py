@@ -119,8 +119,7 @@ def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
     selection = editor.selection
     require(selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
     by = steps * editor.grid
-    moved = move(editor, x * by, y * by, vertices_or_things(selection))
-    editor.change(moved, drag=("nudge", selection))
+    editor.change(move(editor, x * by, y * by, vertices_or_things(selection)), drag=("nudge", selection))
 
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
@@ -185,8 +184,7 @@ def widen(editor: Editor, factor: float) -> None:
     widths = [shape.width for shape in shapes if isinstance(shape, WallObstacle)]
     width = round(max((widths[0] if widths else editor.wall_width) * factor, 0.01), 3)
     if widths and not editor.tool.busy:
-        change = properties.widened(editor.sketch, selection, width)
-        editor.change(change, drag=("width", editor.selection))
+        editor.change(properties.widened(editor.sketch, selection, width), drag=("width", editor.selection))
     editor.set_length("wall_width", width)
     editor.say(f"walls are {width:g} m wide")
 
@@ -552,55 +550,50 @@ def run_typed(editor: Editor, word: str, text: str) -> None:
 
 
 def offered(editor: Editor) -> list[str]:
-    """Return the names of the actions that apply to what is selected, with an empty one between groups."""
-    names = [name for group in _offered_groups(editor) if group for name in ("", *group)]
-    return names[1:]
+    """Return the names of the commands that apply to what is selected, with an empty one between groups."""
+    groups = _of_vertices(editor) if editor.selection.vertices else _of_things(editor)
+    return [name for group in groups if group for name in ("", *group.split())][1:]
 
 
-def _offered_groups(editor: Editor) -> list[list[str]]:
+def _of_things(editor: Editor) -> list[str]:
     selection = editor.selection
-    if not selection:
-        drawn = ("polygon", "rectangle", "circle", "wall", "boundary", "disc")
-        return [["paste", "select:all"], [f"tool:{name}" for name in drawn], ["fit", "background", "try"]]
-    if selection.vertices:
-        return _of_vertices(editor)
     shapes = [editor.sketch.item(key).shape for key in selection.items if key in editor.sketch.places]
-    if selection.starts and not shapes:
-        return [["copy", "duplicate", "delete"], ["name", "show:robots", "fit:selection"]]
+    if not selection:
+        drawn = "tool:polygon tool:rectangle tool:circle tool:wall tool:boundary tool:disc"
+        return ["paste select:all", drawn, "fit background try"]
+    if not shapes and selection.starts:
+        return ["copy duplicate delete", "name show:robots fit:selection"]
     if not shapes:
-        return [["fit", "simplify", "straighten", "repair"], ["tool:boundary"]]
+        return ["fit simplify straighten repair", "tool:boundary"]
     one, several = len(selection.owners) == 1, len(shapes) > 1
     walls = sum(isinstance(shape, WallObstacle) for shape in shapes)
     polygons = sum(isinstance(shape, PolygonObstacle) for shape in shapes)
-    spread = ["distribute:x", "distribute:y"] if len(shapes) > 2 else []
     of_shapes = {
         "join": several and walls == len(shapes),
         "polygons": polygons < len(shapes),
-        "simplify": polygons or selection.boundary,
-        "straighten": polygons or selection.boundary,
+        "simplify straighten": polygons or selection.boundary,
         "boundary:of": one and len(shapes) == polygons == 1,
         "repair": any(problem.of in selection.owners and problem.grave for problem in editor.problems),
     }
+    spread = "distribute:x distribute:y" if len(shapes) > 2 else ""
     return [
-        ["cut", "copy", "duplicate", "delete"],
-        ["name", "fit:selection"] if one and not selection.boundary else [],
-        ["rotate:left", "rotate:right", "mirror:x", "mirror:y"],
-        ["unite", "subtract", "intersect", "divide"] if several else [],
-        ["align:left", "align:bottom", *spread] if several else [],
-        ["group", "lock", "hide"] if several else ["lock", "hide"],
-        [name for name, means_something in of_shapes.items() if means_something],
+        "cut copy duplicate delete",
+        "name fit:selection" if one and not selection.boundary else "",
+        "rotate:left rotate:right mirror:x mirror:y",
+        *(["unite subtract intersect divide", f"align:left align:bottom {spread}"] if several else []),
+        "group lock hide" if several else "lock hide",
+        " ".join(names for names, means_something in of_shapes.items() if means_something),
     ]
 
 
-def _of_vertices(editor: Editor) -> list[list[str]]:
+def _of_vertices(editor: Editor) -> list[str]:
     selection = editor.selection
-    names, aligning = ["delete", "bevel", "round"], ["align:left", "align:bottom"]
+    names, aligning = "delete bevel round", "align:left align:bottom"
     if len(selection.vertices) == 1:
-        (vertex,), aligning = selection.vertices, []
+        (vertex,), aligning = selection.vertices, ""
         shape = editor.sketch.item(vertex.of).shape if isinstance(vertex.of, int) and vertex.of >= 0 else None
         if isinstance(shape, WallObstacle):
-            names.append("extend" if vertex.index in (0, len(shape.points) - 1) else "split")
-        if vertex.ring:
-            names.append("fill")
-    copying = ["copy", "duplicate"] if BOUNDARY not in whole(selection).owners else []
-    return [names, aligning, ["straighten", "simplify"], copying]
+            names += " extend" if vertex.index in (0, len(shape.points) - 1) else " split"
+        names += " fill" if vertex.ring else ""
+    copying = "copy duplicate" if BOUNDARY not in whole(selection).owners else ""
+    return [names, aligning, "straighten simplify", copying]

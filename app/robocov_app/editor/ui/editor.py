@@ -1,6 +1,8 @@
 """The editor: what is open, selected, shown and remembered, and how every change is made. No pygame."""
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -13,7 +15,7 @@ from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement
-from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, in_words
 from robocov_app.editor.tools import draw
@@ -28,10 +30,9 @@ from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
 
+# layers that can be shown or hidden, with their titles
 SHOWN = {"grid": "Grid", "names": "Names", "impassable": "Too narrow", "problems": "Problems"}
 SHOWN |= {"robots": "Robots at start", "picture": "Picture", "legend": "Legend", "handles": "Handles"}
-"""Layers that can be shown or hidden, with their titles."""
-
 # settings that are as an attribute of the editor, with its name
 KEPT = {"grid": "grid", "angle": "snap_angle", "radius": "radius", "robots": "robots", "wall": "wall_width"}
 
@@ -61,6 +62,54 @@ class EditorSettings(BaseModel):
 SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong
 FEW = 1500  # vertices up to which a map is measured while something is dragged
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spacings to choose from
+
+
+@dataclass(frozen=True)
+class Team:
+    """A team at a start, for its preview."""
+
+    start: str | None  # None for anywhere in the free space
+    robots: int
+    radius: float  # m
+    places: tuple[Point, ...] = ()  # m; empty where it cannot stand there
+    words: str = ""  # why not
+
+
+def placed(sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> Team:
+    try:
+        points = sketch.environment().start(start).sample(robots, seed=seed, radius=radius)
+    except Exception as error:  # what nobody has foreseen must not end the window either
+        return Team(start, robots, radius, words=str(error).removeprefix("map: "))
+    return Team(start, robots, radius, tuple((x, y) for x, y in points.tolist()))
+
+
+class TeamThread:
+    """Asks `placed` in a thread, so that the window does not wait; only the newest question counts."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "team")
+        self._asked: tuple[object, ...] = ()
+        self._answer: Future[Team] | None = None
+
+    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
+        """Ask where a team would stand; asking the same again does nothing."""
+        team = start, robots, seed, radius
+        if self._asked == (sketch, *team):
+            return
+        self._asked = sketch, *team
+        if self._answer is not None:
+            self._answer.cancel()
+        self._answer = self._pool.submit(placed, sketch, *team)
+
+    def poll(self) -> Team | None:
+        """Return the answer to the newest question, once."""
+        if self._answer is None or not self._answer.done():
+            return None
+        answer, self._answer = self._answer.result(), None
+        return answer
+
+    def close(self) -> None:
+        self._pool.shutdown(cancel_futures=True)
 
 
 class Editor(Workspace):
@@ -103,15 +152,10 @@ class Editor(Workspace):
         return self.tools["select"]  # type: ignore[return-value]
 
     @property
-    def pending(self) -> Change | None:
-        """Change that letting go of the mouse would make."""
-        return self.selector.drag.change if self.selector.drag is not None else None
-
-    @property
     def preview(self) -> tuple[Sketch, Selection]:
         """The map and what is selected as they are shown: in a drag, what letting go would make."""
-        pending = self.pending
-        return (self.sketch, self.selection) if pending is None else (pending.sketch, pending.selection)
+        change = self.selector.drag.change if self.selector.drag is not None else None
+        return (self.sketch, self.selection) if change is None else (change.sketch, change.selection)
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -199,15 +243,6 @@ class Editor(Workspace):
         if (answer := self.readings.poll()) is not None:
             self.measurement = answer
             self.version += 1
-
-    @property
-    def takes_numbers(self) -> bool:
-        tool = self.tool
-        return tool.takes_numbers and (tool.busy or tool.begins_typed or bool(self.typed))
-
-    def enter(self) -> None:
-        text, self.typed = self.typed, ""
-        self.attempt(lambda: self.tool.enter(self, text))
 
     def switch(self, kind: str, name: str) -> None:
         chosen = self.shown if kind == "show" else self.snaps

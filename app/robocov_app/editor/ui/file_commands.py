@@ -111,8 +111,7 @@ class FileCommands:
 
         worker: Worker[Imported] = DirectWorker(Importing())
         if not self._patient:
-            service = "robocov_app.editor.ui.importing:Importing"
-            worker = LatestWorker(service, "imports", patience=_PATIENCE)
+            worker = LatestWorker(f"{Importing.__module__}:Importing", "imports", patience=_PATIENCE)
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
@@ -144,8 +143,7 @@ class FileCommands:
         try:
             words = editor.document.save(path, over=over)
         except ChangedError as error:
-            replace = partial(self._save, path, then, over=True)
-            self._ask_over("Replace the file?", str(error), then, replace)
+            self._ask_over("Replace the file?", str(error), then, partial(self._save, path, then, over=True))
             return None
         assert editor.document.path is not None
         self.remember(editor.document.path)

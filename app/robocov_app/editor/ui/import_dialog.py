@@ -104,10 +104,9 @@ class ImportDialog(Dialog):
         return self.imported is not None and not self.busy and not self.trouble
 
     def key(self, name: str, ui: Ui) -> bool:
-        if name in ("return", "enter") and ui.open_list is None:
-            self.accepted = True
-            return True
-        return False
+        accepts = name in ("return", "enter") and ui.open_list is None
+        self.accepted |= accepts
+        return accepts
 
     def cancelled(self) -> None:
         self._worker.close()
@@ -118,8 +117,7 @@ class ImportDialog(Dialog):
         ui.wide = _COLUMN
         self._options(ui, top + high)
         ui.x, ui.y, ui.wide = left + _COLUMN + _GAP, top, wide - _COLUMN - _GAP
-        below = _LINE * (_FEWEST_LINES + 1) + 14
-        ui.row(height=high - below, below=0)
+        ui.row(height=high - (_LINE * (_FEWEST_LINES + 1) + 14), below=0)
         rect, clicked = ui.area("maps")
         if self.imported is not None:
             maps = self._place(rect, self.imported, ui.scale)
@@ -148,8 +146,7 @@ class ImportDialog(Dialog):
             self._seen = ui
             first = next(option.name for option in self.options if not option.choices)
             ui.focus, ui.edit = first, TextEdit.of(self.given.get(first, ""))
-        room = min((foot - 44 - ui.y) / len(self.options), 28.0)
-        ui.row(_NAME, 0, height=room - 4, below=4)
+        ui.row(_NAME, 0, height=min((foot - 44 - ui.y) / len(self.options), 28.0) - 4, below=4)
         for option in self.options:
             name, tip = option.name, option.help
             now = self.given.get(name, option.default)
@@ -211,7 +208,7 @@ class ImportDialog(Dialog):
         screen.blit(maps, (0, 0))
         self._draw_captions(screen, imported, scale, theme)
         inside = next(option for option in self.options if option.name == "inside")
-        if inside.name in self.given and not self.trouble:
+        if "inside" in self.given and not self.trouble:
             for camera in self.cameras:
                 x, y = camera.to_pixels(np.array(inside.value(self.given["inside"]))).tolist()
                 for width, ink in ((5, theme.background), (2, theme.final)):

@@ -17,8 +17,7 @@ Kind = Literal["number", "place", "words", "text", "choice"]
 
 ON = "yes"  # a switch that is on
 
-Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]
-"""A file, its format, and the options to import it with."""
+Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]  # a file, its format, and how to import it
 
 
 @dataclass(frozen=True)

@@ -36,11 +36,7 @@ class Field(NamedTuple):
 
 
 def number(value: float | None) -> str:
-    """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros.
-
-    >>> number(2.0), number(0.30004), number(-0.00001), number(None)
-    ('2', '0.3', '0', '')
-    """
+    """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros."""
     return "" if value is None else f"{round(value, 4) + 0.0:.12g}"
 
 
@@ -153,7 +149,6 @@ FIELDS: dict[str, Field] = {
     "picture:scale": Field(lambda editor: f"{_picture(editor).scale:.6g}", _set_scale, "Side of a pixel"),
     "picture:turn": Field(lambda editor: number(_picture(editor).turn), _turn, "Counter-clockwise"),
 }
-"""All fields by name."""
 
 
 TABS = ("map", "object", "snap", "problems", "history")
@@ -173,7 +168,7 @@ _STARTS = "Disc tool:disc|Points tool:places|Anywhere start:uniform|Next start:n
 _PICTURE = "Choose… background|Scale, move tool:picture|Remove background:none"
 _PROBLEMS = "Next problem:next|Repair repair|Clip clip|Mend problem:fix"
 _TURNS = "Turn ↺ rotate:left|Turn ↻ rotate:right|Flip ↔ mirror:x|Flip ↕ mirror:y"
-_BUTTONS = {
+_BUTTONS = {  # of the page Object, by what is selected
     "vertex": ("Delete delete|Cut off bevel|Round round|Split split",),
     "vertices": ("Delete delete|Cut off bevel|Round round|Align align:left",),
     "boundary": ("Simplify simplify|Straighten straighten|Repair repair",),
@@ -190,7 +185,6 @@ _BUTTONS = {
         "Join join|Polygons polygons|Simplify simplify|Delete delete",
     ),
 }
-"""Buttons of the page Object, by what is selected."""
 
 
 class Panel(SidePanel):
@@ -266,8 +260,7 @@ class Panel(SidePanel):
             editor.attempt(lambda: field.take(editor, given))
 
     def _pair(self, ui: Ui, *fields: tuple[str, str, str]) -> None:
-        names = max(len(word) for _, word, _ in fields)
-        word = 14.0 if names < 3 else 48.0
+        word = 14.0 if max(len(word) for _, word, _ in fields) < 3 else 48.0
         ui.row(*(width for _ in range(2) for width in (word, 0.0, 16.0)))
         for name, words, unit in fields:
             self._field(ui, name, words, unit or " ")
@@ -362,8 +355,7 @@ class Panel(SidePanel):
                 )
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
-                room = ui.wide - 44 - (66 if mends else 0)
-                lines = wrapped(problem.words, ui.px(TEXT), ui.px(room))
+                lines = wrapped(problem.words, ui.px(TEXT), ui.px(ui.wide - 44 - (66 if mends else 0)))
                 ui.row(20, 0, *([54] if mends else []), height=(TEXT + 5) * len(lines) + 8, below=2)
                 badge = ui.cell()
                 if ui.surface is not None:
@@ -422,8 +414,7 @@ class Panel(SidePanel):
                     self._pick(Selection(vertices=frozenset({vertex})), before)
 
     def _pick(self, own: Selection, before: Selection) -> None:
-        shift = pygame.key.get_mods() & pygame.KMOD_SHIFT
-        self.editor.select(before.toggled(own) if shift else own)
+        self.editor.select(before.toggled(own) if pygame.key.get_mods() & pygame.KMOD_SHIFT else own)
 
 
 def object_kind(editor: Editor) -> str:

@@ -13,12 +13,11 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import PointerEvent
 from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.editor import Editor, Team, TeamThread
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
-from robocov_app.editor.ui.team import Team, TeamThread
 from robocov_app.render.theme import theme_named
 from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, WHEEL, key_of, show_cursor, wheel_notches
@@ -32,117 +31,6 @@ _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CR
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
 _SHAPES |= {"sideways": pygame.SYSTEM_CURSOR_SIZEWE, "updown": pygame.SYSTEM_CURSOR_SIZENS}
 _SHAPES |= {"rising": pygame.SYSTEM_CURSOR_SIZENESW, "falling": pygame.SYSTEM_CURSOR_SIZENWSE}
-
-
-class Pointer:
-    """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
-
-    def __init__(
-        self, editor: Editor, canvas: EditorCanvas, panel: Panel, menu: Callable[[tuple[int, int]], object]
-    ) -> None:
-        self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
-        self.at = (0, 0)
-        self.held = False  # whether the left button pans, for as long as a key is held
-        self.drag = ""  # what a button that is held down drags: "tool", "pan"
-        self._button = 0
-        self._pressed_at = (0, 0)
-        self._last_click = -1.0, (0, 0)
-        self._moved_off = False
-        self._shape = -1
-
-    def take(self, event: pygame.event.Event, now: float) -> None:
-        taken = not self.drag and self._panel.take(event)
-        if event.type == pygame.MOUSEMOTION:
-            self._moved(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self._released(event)
-        elif taken:
-            self._editor.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.ui.stop_typing()
-            self._pressed(event, now)
-        elif self._canvas.over(self.at):
-            self._canvas.zoom(WHEEL ** wheel_notches(event), self.at)
-
-    def aim(self, pixel: tuple[int, int]) -> PointerEvent:
-        raw, reach = self._canvas.to_world(pixel), self._canvas.reach
-        editor, tool, held, point = self._editor, self._editor.tool, pygame.key.get_mods(), raw
-        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
-        if tool.snaps:
-            free = ctrl or not editor.snaps
-            snap = Snap(raw) if free else editor.snapped(raw, reach, tool.origin, tool.drawn)
-            point, tool.guides = snap.point, snap.guides
-        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
-        return PointerEvent(point, raw, reach, shift, alt, ctrl)
-
-    def _pressed(self, event: pygame.event.Event, now: float) -> None:
-        editor = self._editor
-        if self.drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
-            return
-        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
-        if event.button != 1 or editor.tool.name == "pan" or self.held:
-            self.drag = "pan"
-            return
-        problem = self._canvas.problem_at(event.pos)
-        if problem is not None and not editor.tool.busy:
-            editor.problem = None if editor.problem is problem else problem
-            editor.say(problem.words, trouble=problem.grave)
-            editor.version += 1
-            return
-        then, where = self._last_click
-        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self._canvas.layout.scale
-        self._last_click = (-1.0 if double else now), event.pos
-        self.drag = "tool"
-        aim = self.aim(event.pos)
-        act = editor.tool.twice if double else editor.tool.press
-        editor.attempt(lambda: act(editor, aim))
-
-    def _moved(self, event: pygame.event.Event) -> None:
-        editor, canvas = self._editor, self._canvas
-        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
-        aimed = over or self.drag == "tool"
-        editor.cursor = canvas.to_world(event.pos) if aimed else None
-        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
-        canvas.hovered = canvas.problem_at(event.pos) if over and not self.drag else None
-        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
-        self._moved_off = self._moved_off or (bool(self.drag) and far)
-        if self.drag == "pan":
-            if self._moved_off:
-                canvas.pan(*event.rel)
-        elif aimed:
-            aim, version = self.aim(event.pos), editor.version
-            editor.attempt(lambda: editor.tool.move(editor, aim))
-            editor.version = version  # the panel need not look again at every move of the mouse
-        else:
-            editor.tool.guides = ()
-
-    def _released(self, event: pygame.event.Event) -> None:
-        editor, drag = self._editor, self.drag
-        if event.button != self._button or not drag:
-            return
-        self.drag, self._button = "", 0
-        if drag == "tool":
-            aim = self.aim(event.pos)
-            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
-            editor.document.history.break_drag()
-        elif event.button == 3 and not self._moved_off:
-            if editor.tool.busy:
-                editor.attempt(lambda: editor.tool.finish(editor))
-            else:
-                self._menu(event.pos)
-
-    def show(self) -> None:
-        canvas, editor = self._canvas, self._editor
-        if inside(canvas.layout.panel, self.at):
-            self._shape = -1  # the panel has set its own
-            return
-        shape = "arrow"
-        if canvas.over(self.at):
-            panned = self.drag == "pan" or self.held
-            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
-        if _SHAPES[shape] != self._shape:
-            self._shape = _SHAPES[shape]
-            show_cursor(self._shape)
 
 
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
@@ -187,8 +75,8 @@ class EditorWindow(BaseWindow):
             "try": self.try_it,
             "screenshot": lambda: self.save_screenshot(editor.folder),
             "name": self._name,
-            "menu": lambda: self.open_menu(self.pointer.at),
-            "pan:hold": lambda: setattr(self.pointer, "held", True),
+            "menu": lambda: self.open_menu(self.at),
+            "pan:hold": lambda: setattr(self, "held", True),
             "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
             "fullscreen": self.toggle_fullscreen,
             "help": lambda: setattr(self, "help", not self.help),
@@ -197,7 +85,11 @@ class EditorWindow(BaseWindow):
         listed = editor_commands(editor, self.canvas, self.documents, of_window)
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
         self.panel = Panel(editor, self.commands, self.do, self._show_problem)
-        self.pointer = Pointer(editor, self.canvas, self.panel, self.open_menu)
+        self.at = (0, 0)  # where the mouse is, px
+        self.held = False  # whether the left button pans, for as long as a key is held
+        self.drag = ""  # what a button that is held down drags: "tool", "pan"
+        self._button, self._shape, self._moved_off = 0, -1, False
+        self._pressed_at, self._last_click = (0, 0), (-1.0, (0, 0))
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
@@ -243,14 +135,14 @@ class EditorWindow(BaseWindow):
             return
         editor = self.editor
         editor.pass_time(seconds)
-        if not self.pointer.drag:
+        if not self.drag:
             self.documents.look()
             if "robots" in editor.shown:
                 self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
                 if (team := self.team.poll()) is not None:
                     self.canvas.team = team
                     editor.say(team.words, trouble=True)
-        if not (self.pointer.drag and editor.readings.busy):
+        if not (self.drag and editor.readings.busy):
             editor.ask_readings()
         if editor.document.trouble:
             editor.say(editor.document.trouble, trouble=True)
@@ -260,7 +152,7 @@ class EditorWindow(BaseWindow):
         self._arrange()
         self.panel.covered = self.dialogs.open
         self.panel.update()
-        self.pointer.show()
+        self._show_cursor()
         caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · robocov edit"
         if caption != self._caption:
             self._caption = caption
@@ -320,8 +212,7 @@ class EditorWindow(BaseWindow):
         editor = self.editor
         if self.canvas.over(pixel):
             there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
-            near = editor.selection.vertices or any(each in editor.selection.owners for each in there)
-            if not near:
+            if not (editor.selection.vertices or any(each in editor.selection.owners for each in there)):
                 editor.select(Selection.of(*there[:1]))
         found = [self.commands[name] if name else None for name in offered(editor)]
         self.dialogs.ask(Menu(found, pixel, self.do))
@@ -364,15 +255,15 @@ class EditorWindow(BaseWindow):
         kind = event.type
         if kind == pygame.KEYUP:
             self.commands.release(event)
-            self.pointer.held = self.pointer.held and event.key != pygame.K_SPACE
+            self.held = self.held and event.key != pygame.K_SPACE
         elif kind == pygame.WINDOWFOCUSLOST:
             self.commands.forget_keys()
-            self.pointer.held = False
+            self.held = False
         elif kind == pygame.KEYDOWN and event.key == pygame.K_F12:
             self.do("screenshot")
             return
         if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
-            self.pointer.at = event.pos
+            self.at = event.pos
         if kind == pygame.QUIT:
             if isinstance(self.editor.asked, ImportDialog | Menu):
                 self.dialogs.close()
@@ -383,20 +274,114 @@ class EditorWindow(BaseWindow):
         elif kind == pygame.DROPFILE:
             self.editor.attempt(lambda: self.documents.open(Path(event.file)))
         elif kind == pygame.KEYDOWN:
-            self._press(event)
+            self._key_down(event)
             if self.trial is not None:
                 self.trial.held = event.key
             self.dialogs.swallow(event.unicode)
         elif kind == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif kind in OF_THE_MOUSE:
-            self.pointer.take(event, self.editor.now)
+            self._mouse(event)
         elif kind == pygame.WINDOWLEAVE:
             self.editor.cursor = self.canvas.at = self.canvas.hovered = None
         else:
             self.panel.take(event)
 
-    def _press(self, event: pygame.event.Event) -> None:
+    def _mouse(self, event: pygame.event.Event) -> None:
+        taken = not self.drag and self.panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self.editor.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self.panel.ui.stop_typing()
+            self._pressed(event)
+        elif self.canvas.over(self.at):
+            self.canvas.zoom(WHEEL ** wheel_notches(event), self.at)
+
+    def _aim(self, pixel: tuple[int, int]) -> PointerEvent:
+        raw, reach = self.canvas.to_world(pixel), self.canvas.reach
+        editor, tool, held, point = self.editor, self.editor.tool, pygame.key.get_mods(), raw
+        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        if tool.snaps:
+            free = ctrl or not editor.snaps
+            snap = Snap(raw) if free else editor.snapped(raw, reach, tool.origin, tool.drawn)
+            point, tool.guides = snap.point, snap.guides
+        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
+        return PointerEvent(point, raw, reach, shift, alt, ctrl)
+
+    def _pressed(self, event: pygame.event.Event) -> None:
+        editor = self.editor
+        if self.drag or not self.canvas.over(event.pos) or event.button not in (1, 2, 3):
+            return
+        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
+        if event.button != 1 or editor.tool.name == "pan" or self.held:
+            self.drag = "pan"
+            return
+        problem = self.canvas.problem_at(event.pos)
+        if problem is not None and not editor.tool.busy:
+            editor.problem = None if editor.problem is problem else problem
+            editor.say(problem.words, trouble=problem.grave)
+            editor.version += 1
+            return
+        (then, where), now = self._last_click, editor.now
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self.canvas.layout.scale
+        self._last_click = (-1.0 if double else now), event.pos
+        self.drag = "tool"
+        aim = self._aim(event.pos)
+        act = editor.tool.twice if double else editor.tool.press
+        editor.attempt(lambda: act(editor, aim))
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        editor, canvas = self.editor, self.canvas
+        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
+        aimed = over or self.drag == "tool"
+        editor.cursor = canvas.to_world(event.pos) if aimed else None
+        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
+        canvas.hovered = canvas.problem_at(event.pos) if over and not self.drag else None
+        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
+        self._moved_off = self._moved_off or (bool(self.drag) and far)
+        if self.drag == "pan":
+            if self._moved_off:
+                canvas.pan(*event.rel)
+        elif aimed:
+            aim, version = self._aim(event.pos), editor.version
+            editor.attempt(lambda: editor.tool.move(editor, aim))
+            editor.version = version  # the panel need not look again at every move of the mouse
+        else:
+            editor.tool.guides = ()
+
+    def _released(self, event: pygame.event.Event) -> None:
+        editor, drag = self.editor, self.drag
+        if event.button != self._button or not drag:
+            return
+        self.drag, self._button = "", 0
+        if drag == "tool":
+            aim = self._aim(event.pos)
+            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
+            editor.document.history.break_drag()
+        elif event.button == 3 and not self._moved_off:
+            if editor.tool.busy:
+                editor.attempt(lambda: editor.tool.finish(editor))
+            else:
+                self.open_menu(event.pos)
+
+    def _show_cursor(self) -> None:
+        canvas, editor = self.canvas, self.editor
+        if inside(canvas.layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = "arrow"
+        if canvas.over(self.at):
+            panned = self.drag == "pan" or self.held
+            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
+        if _SHAPES[shape] != self._shape:
+            self._shape = _SHAPES[shape]
+            show_cursor(self._shape)
+
+    def _key_down(self, event: pygame.event.Event) -> None:
         """Take a key: for a field, for a number while something is drawn, else for a command."""
         if self.panel.take(event) or (not self.panel.ui.busy and self._number(event)):
             return
@@ -405,18 +390,18 @@ class EditorWindow(BaseWindow):
             self.do(command.name)
 
     def _number(self, event: pygame.event.Event) -> bool:
-        editor, name, sign = self.editor, key_of(event), event.unicode
-        if not editor.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
+        editor, tool, name, sign = self.editor, self.editor.tool, key_of(event), event.unicode
+        text, modifiers = editor.typed, pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
+        if not (tool.takes_numbers and (tool.busy or tool.begins_typed or text)) or event.mod & modifiers:
             return False
-        if editor.typed and name in ("return", "enter", "backspace", "tab"):
-            if name in ("return", "enter"):
-                editor.enter()
-            else:
-                editor.typed = editor.typed[:-1] if name == "backspace" else f"{editor.typed} "
-            return True
-        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if editor.tool.busy else "x×*/ ;%,-+@<°")
-        follows = bool(editor.typed) and (sign in _OF_NUMBERS or sign in _UNITS)
-        if len(sign) == 1 and (begins or follows):
-            editor.typed = (editor.typed + sign)[:40]
-            return True
-        return False
+        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if tool.busy else "x×*/ ;%,-+@<°")
+        if text and name in ("return", "enter"):
+            editor.typed = ""
+            editor.attempt(lambda: tool.enter(editor, text))
+        elif text and name in ("backspace", "tab"):
+            editor.typed = text[:-1] if name == "backspace" else f"{text} "
+        elif len(sign) == 1 and (begins or (text and (sign in _OF_NUMBERS or sign in _UNITS))):
+            editor.typed = (text + sign)[:40]
+        else:
+            return False
+        return True
