@@ -50,8 +50,7 @@ class Autosaver:
     ) -> None:
         self.trouble = ""  # why work cannot be kept, in words
         self._kind, self._path = kind, path
-        self._lock = ExitStack()
-        self._changed = threading.Condition()
+        self._lock, self._changed = ExitStack(), threading.Condition()
         self._wanted: tuple[Path | None, _Content | None] | None = None
         self._writing = self._closed = self._hurried = False
         self._holds = resumed is not None
@@ -184,14 +183,12 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     wanted = path.resolve()
     for place in _places(folder):
         with suppress(MapError, OSError):
-            named = read_record(place, kind).path
-            if named is None or named.resolve() != wanted:
-                continue
-            try:
-                with locked(place):
-                    pass
-            except OutputError:
-                return True
+            if (named := read_record(place, kind).path) is not None and named.resolve() == wanted:
+                try:
+                    with locked(place):
+                        pass
+                except OutputError:
+                    return True
     return False
 
 

@@ -72,8 +72,7 @@ class Commands:
 
     def of_key(self, event: pygame.event.Event) -> Command | None:
         """Return the command of a key that goes down; None while it is held and does not repeat."""
-        command = self._keyed.get(key_of(event))
-        held = event.key in self._down
+        command, held = self._keyed.get(key_of(event)), event.key in self._down
         self._down.add(event.key)
         return None if command is None or (held and not command.repeats) else command
 

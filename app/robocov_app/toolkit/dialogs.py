@@ -126,8 +126,7 @@ class Option:
 class Choice(Dialog):
     """A list that typing narrows down; an error of `accept` is told below, and nothing typed is lost."""
 
-    width = 620.0
-    closes_beside = True
+    width, closes_beside = 620.0, True
 
     title: str
     options: Callable[[str], Sequence[Option]]  # the lines for what is typed
@@ -189,8 +188,7 @@ class Choice(Dialog):
     def key(self, name: str, ui: Ui) -> bool:
         found = list(self.options(self.text))
         option = found[self.chosen] if self.chosen < len(found) else None
-        by = {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0)
-        if by:
+        if by := {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0):
             self.wheel(-by)
             self.chosen = min(max(self.chosen, 0), max(len(found) - 1, 0))
             self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)

@@ -24,8 +24,7 @@ class Outline:
 
     def press(self, point: Point, raw: Point, closing: float, same: float = SAME) -> bool:
         """Add a point; one within `closing` m of the first, or `same` m of the last, ends the outline."""
-        self.at = point
-        enough = len(self.points) >= self.least
+        self.at, enough = point, len(self.points) >= self.least
         if self.closes and enough and dist(point, self.points[0]) < closing:
             return True
         if self.points and dist(point, self.points[-1]) < same:

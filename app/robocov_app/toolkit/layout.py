@@ -43,16 +43,14 @@ def laid_out(
     width, height = size
     scale = min(scale, largest_scale(size))
     wide = min(round(PANEL * scale), width - 1) if panel else 0
-    left = width - wide
-    status = round(STATUS * scale)
+    left, status = width - wide, round(STATUS * scale)
     track = round(TRACK * scale) if plot else 0
     chart = min(round(CHART * scale), height // 3) if plot else 0
     arena: Box = (0, 0, left, max(height - status - track - chart, 1))
     legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
     free = left, max(arena[3] - legend, 1)
     columns = columns_for(panes, aspect, free, around=68 * scale, beside=31 * scale)
-    rows = -(-panes // columns)
-    pane_width = (left - GAP * (columns - 1)) // columns
+    rows, pane_width = -(-panes // columns), (left - GAP * (columns - 1)) // columns
     pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
     boxes: list[Box] = []
     for row, k in (divmod(k, columns) for k in range(panes)):

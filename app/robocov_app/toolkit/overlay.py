@@ -84,8 +84,7 @@ def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: li
     left, top, width, height = box
     screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
     canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2
-    room = width - 44 * scale - canvas.text_width(hint, size)
-    kept = list(facts)
+    room, kept = width - 44 * scale - canvas.text_width(hint, size), list(facts)
     while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
         kept.pop()
     words = shortened("    ".join(kept), canvas.text_size(size), room)

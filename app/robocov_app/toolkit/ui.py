@@ -112,11 +112,9 @@ class Ui:
         self._folded: set[str] = set()
         self._scrolled: dict[str, float] = {}
         self._heights: dict[str, float] = {}
-        self._hot = ""
-        self._rested = perf_counter()
+        self._hot, self._rested = "", perf_counter()
         self._clicked = (-1.0, "")
-        self._again = False
-        self._grabbed = 0.0
+        self._again, self._grabbed = False, 0.0
         self._begin()
 
     def _begin(self) -> None:
@@ -220,8 +218,7 @@ class Ui:
         if tipped is None or self.active is not None or perf_counter() - self._rested < TIP_AFTER:
             return
         size, theme = self.px(SMALL), self.theme
-        lines = wrapped(tipped.tip, size, self.px(240))
-        high = self.px(SMALL + 5)
+        lines, high = wrapped(tipped.tip, size, self.px(240)), self.px(SMALL + 5)
         box = Rect(0, 0, max(text_width(line, size) for line in lines) + self.px(14), 0)
         box.height = high * len(lines) + self.px(9)
         box.topleft = self.at[0], tipped.rect.bottom + self.px(5)
@@ -689,8 +686,7 @@ class Ui:
             self.open_list.show(self.open_list.options.index(now) if now in options else 0)
             self.focus, self.edit, self._event = key, None, None
         if self.surface is not None and self._draws(rect):
-            ink = self._face(rect, key, "")
-            words = rect.inflate(-self.px(18), 0)
+            ink, words = self._face(rect, key, ""), rect.inflate(-self.px(18), 0)
             words.width -= self.px(12)
             self._write(now, words, ink, TEXT)
             x, y, side = rect.right - self.px(13), rect.centery + self.px(1), self.px(4)
@@ -703,8 +699,7 @@ class Ui:
         assert found is not None
         self.stale = True
         if event.type == pygame.MOUSEBUTTONDOWN:
-            k = found.at(event.pos)
-            if k is None:
+            if (k := found.at(event.pos)) is None:
                 self.stop_typing()
             else:
                 self._pick(found, k)
@@ -729,8 +724,7 @@ class Ui:
         return True
 
     def _pick(self, found: _List, k: int) -> None:
-        found.picked = found.options[k]
-        self.focus = None
+        found.picked, self.focus = found.options[k], None
         self.run(None, None)
         self.open_list = None
 
@@ -765,8 +759,7 @@ class SidePanel:
     def __init__(self, tab: str) -> None:
         self.tab = tab  # the page that is open
         self.covered = False  # something else is drawn in its place, or takes the events
-        self.hidden = False
-        self.ui = Ui(self._page, LIGHT)
+        self.hidden, self.ui = False, Ui(self._page, LIGHT)
         self._drawn: object = None  # what the page showed when it was drawn
 
     def _page(self, ui: Ui) -> None:

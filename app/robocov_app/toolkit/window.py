@@ -47,9 +47,7 @@ class BaseWindow:
         self.windowed: tuple[int, int] | None = None  # the size before full screen
         self.closed = False
         self.remote: Remote | None = None
-        self.rate = float(FPS)
-        self._calm = 0.0
-        self._touched = False
+        self.rate, self._calm, self._touched = float(FPS), 0.0, False
         self._drawn: object = None
 
     def take(self, event: pygame.event.Event) -> None:

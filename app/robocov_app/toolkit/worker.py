@@ -166,9 +166,7 @@ class LatestWorker(Generic[_Answer]):
 class DirectWorker(Generic[_Answer]):
     """A service that answers in this process at once: for pictures without a display, and for tests."""
 
-    busy = False
-    lives = True
-    progress = None
+    busy, lives, progress = False, True, None
 
     def __init__(self, service: Service, wire: Wire | None = None) -> None:
         self._service, self._wire = service, wire or Wire()
@@ -308,7 +306,7 @@ def ended(process: subprocess.Popen[bytes]) -> int:
 
 
 def send(stream: IO[bytes], message: object) -> None:
-    pickle.dump(message, stream, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
     stream.flush()
 
 

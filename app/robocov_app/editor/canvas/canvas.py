@@ -60,8 +60,7 @@ class EditorCanvas:
     """Draws what is in the editor, and finds what is under the cursor."""
 
     def __init__(self, editor: Editor) -> None:
-        self.editor = editor
-        self.sheet = Sheet()
+        self.editor, self.sheet = editor, Sheet()
         self.entries: list[LegendEntry] = []  # of the legend
         self._rows = 1
         self._rows_for: object = None
@@ -149,8 +148,7 @@ class EditorCanvas:
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
-        self.camera = camera
-        self.editor.pixel = self.layout.scale / camera.zoom
+        self.camera, self.editor.pixel = camera, self.layout.scale / camera.zoom
 
     def over(self, pixel: Point) -> bool:
         return inside(self.camera.view, pixel)
@@ -188,8 +186,7 @@ class EditorCanvas:
         view = self._view()
         base, (now, chosen) = editor.sketch, editor.preview
         moved = getattr(editor.tools["picture"], "moved", None)
-        weighed = getattr(editor.tool, "change", None)
-        drag = editor.selector.drag
+        weighed, drag = getattr(editor.tool, "change", None), editor.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
         lifted: frozenset[int] = frozenset()
         if carried is not None and not carried.copies:
@@ -236,8 +233,7 @@ class EditorCanvas:
         if "problems" in shown:
             overlay.draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
         overlay.draw_guides(canvas, editor.tool.guides)
-        preview = editor.tool.preview(editor)
-        if preview is not None:
+        if (preview := editor.tool.preview(editor)) is not None:
             overlay.draw_preview(canvas, preview, self.at)
         if editor.typed:
             overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
@@ -305,8 +301,7 @@ class EditorCanvas:
         self, screen: Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
     ) -> None:
         editor, selector, colour = self.editor, self.editor.selector, self.theme.final
-        floor = self.theme.background
-        selection = selection.within(sketch)
+        floor, selection = self.theme.background, selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
         hovered = selector.hovered if editor.tool is selector and not selector.busy and self.at else None
         if hovered is not None and hovered not in owners and Selection.of(hovered).within(sketch):

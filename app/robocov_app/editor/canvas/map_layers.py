@@ -144,8 +144,7 @@ class ReferenceImage:
     def __init__(self) -> None:
         self._of: Path | None = None
         self._picture: Surface | None = None
-        self._shrunk = 1.0
-        self.trouble = ""
+        self._shrunk, self.trouble = 1.0, ""
 
     def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
         """Draw the picture on a page; `folder` is where its path counts from."""
@@ -185,8 +184,7 @@ class ReferenceImage:
         try:
             with Image.open(path) as opened:
                 full = ImageOps.exif_transpose(opened)
-                width = full.size[0]
-                rgb = _on_white(full)
+                width, rgb = full.size[0], _on_white(full)
         except Exception as error:  # whatever a broken picture makes its decoder raise
             self.trouble = f"the picture {path.name} cannot be shown: {error}"
             return
@@ -211,8 +209,7 @@ class Sheet:
     """Draws the page, and keeps it."""
 
     def __init__(self) -> None:
-        self.outlines = Outlines()
-        self.underlaid = ReferenceImage()
+        self.outlines, self.underlaid = Outlines(), ReferenceImage()
         self.full = self.patched = self.scrolled = 0  # how often it was drawn whole, in part, and moved
         self._page: Surface | None = None
         self._look: object = None
@@ -247,8 +244,7 @@ class Sheet:
         """Return what is to be painted anew, after the page was moved with the camera; None where all is."""
         boxes: list[Rect] = []
         if self._camera is not None and view.camera.center != self._camera.center:
-            moved = self._scroll(self._camera, view)
-            if moved is None:
+            if (moved := self._scroll(self._camera, view)) is None:
                 return None
             boxes += moved
         changed = [item for key, item in self._drawn.items() if items.get(key) is not item]
@@ -349,8 +345,7 @@ class Sheet:
     ) -> None:
         fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
         plain = [self.outlines.of(item) for item in items]
-        rings = [ring for each in plain for ring in each.rings]
-        if rings:
+        if rings := [ring for each in plain for ring in each.rings]:
             ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
             corners = canvas.camera.to_pixels(np.concatenate(rings))
             fills = [fill if all(each.outer) else None for each in plain for _ in each.rings]
@@ -396,8 +391,7 @@ def beyond(sketch: Sketch) -> shapely.Geometry:
 
 def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
     """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear."""
-    least = FINE * scale / zoom
-    fine = grid
+    least, fine = FINE * scale / zoom, grid
     if fine < least:
         times = round_length(least / grid)
         fine = grid * (times if times >= least / grid else round_length(2.5001 * times))
@@ -429,8 +423,7 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
 def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
     """Draw an obstacle with holes on a page of its own, so that what lies below shows in them."""
     clip = canvas.surface.get_clip()
-    page = Surface(clip.size, pygame.SRCALPHA, 32)
-    shift = np.array(clip.topleft, dtype=float)
+    page, shift = Surface(clip.size, pygame.SRCALPHA, 32), np.array(clip.topleft, dtype=float)
     own = replace(canvas, surface=page)
     for ring, outer in zip(outline.rings, outline.outer, strict=True):
         own.polygon(canvas.camera.to_pixels(ring) - shift, (*fill, 255) if outer else (0, 0, 0, 0))

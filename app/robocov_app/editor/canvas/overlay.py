@@ -198,11 +198,9 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
     ink, size = mix(canvas.theme.background, canvas.theme.ink, 0.85), canvas.theme.small_text
     for a, b in list(pairwise(line[:-1]))[-MOST_LENGTHS:]:
-        ends = pixels(canvas, (a, b))
-        words = length_words(distance(a, b))
+        ends, words = pixels(canvas, (a, b)), length_words(distance(a, b))
         along, wide = ends[1] - ends[0], canvas.text_width(words, size)
-        length = float(np.hypot(*along))
-        if length < wide:
+        if (length := float(np.hypot(*along))) < wide:
             continue
         across = np.array([along[1], -along[0]]) / max(length, 1e-9)
         if across[1] > 0 or (across[1] == 0 and across[0] < 0):

@@ -213,8 +213,7 @@ def make_areas(editor: Editor) -> None:
 
 def fix_problem(editor: Editor) -> None:
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
-        change = fixed(editor.sketch, problem, editor.radius)
-        if change is not None:
+        if (change := fixed(editor.sketch, problem, editor.radius)) is not None:
             editor.change(change)
             return
     raise MapError("there is nothing that can be mended by itself")

@@ -188,8 +188,7 @@ class Editor(Workspace):
 
     def travel(self, steps: int) -> None:
         """Undo so many changes, or with a negative number do them again; tell of a single one."""
-        history = self.document.history
-        change = None
+        history, change = self.document.history, None
         for _ in range(abs(steps)):
             change = history.undo() if steps > 0 else history.redo()
         if abs(steps) == 1:

@@ -147,8 +147,7 @@ class FileCommands:
             return None
         assert editor.document.path is not None
         self.remember(editor.document.path)
-        grave = [problem for problem in editor.problems if problem.grave]
-        if grave:
+        if grave := [problem for problem in editor.problems if problem.grave]:
             words += f", as a draft: {grave[0].words}"
         if then is not None:
             then()

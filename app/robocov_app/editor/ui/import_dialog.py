@@ -49,8 +49,7 @@ class ImportDialog(Dialog):
         self.accepted = False  # whether it is wanted as it is set, as soon as it is there
         self.cameras: list[Camera] = []
         self._seen: Ui | None = None
-        self._worker = worker
-        self._mistake = ""
+        self._worker, self._mistake = worker, ""
         self._picture: Latest[Surface] = Latest()
         self._ask()
 
@@ -84,8 +83,7 @@ class ImportDialog(Dialog):
             self._worker.put((self.path, self.importer.name, options, shaping))
 
     def poll(self) -> Imported | None:
-        answer = self._worker.poll()
-        if answer is not None and not self._worker.busy:
+        if (answer := self._worker.poll()) is not None and not self._worker.busy:
             self.imported = answer
         if self.trouble:
             self.accepted = False
@@ -245,8 +243,7 @@ class ImportDialog(Dialog):
 def _maps(
     size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
-    compared = imported.comparison
-    picture = Surface(size, pygame.SRCALPHA)
+    compared, picture = imported.comparison, Surface(size, pygame.SRCALPHA)
     before, after = (compared.before, compared.lost), (compared.after, compared.opened)
     colours = theme.trajectory, theme.start
     for camera, (free, marked), colour in zip(cameras, (before, after), colours, strict=True):

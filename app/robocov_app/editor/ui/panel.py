@@ -43,8 +43,7 @@ def number(value: float | None) -> str:
 def _box(editor: Editor) -> tuple[float, float, float, float]:
     """Return the place of a vertex, a centre, or a box's lower left corner, and the box's sides, m."""
     sketch, selection = editor.preview
-    bounds = bounds_of(sketch, whole(selection))
-    if bounds is None:
+    if (bounds := bounds_of(sketch, whole(selection))) is None:
         raise MapError("nothing is selected")
     x, y, high_x, high_y = bounds
     sides = high_x - x, high_y - y

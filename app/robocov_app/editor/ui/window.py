@@ -163,8 +163,7 @@ class EditorWindow(BaseWindow):
         key = (self.screen.get_size(), self.scale, editor.panel, editor.theme)
         if key == self._arranged:
             return
-        self._arranged = key
-        self.theme = theme_named(editor.theme)
+        self._arranged, self.theme = key, theme_named(editor.theme)
         self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
@@ -221,8 +220,7 @@ class EditorWindow(BaseWindow):
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
             self.editor.selector.cancel(self.editor)
         trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
-        trial.windowed = self.windowed
-        self.trial = trial
+        trial.windowed, self.trial = self.windowed, trial
 
     def _play(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen, trial.rate = self.screen, self.rate
@@ -320,8 +318,7 @@ class EditorWindow(BaseWindow):
         if event.button != 1 or editor.tool.name == "pan" or self.held:
             self.drag = "pan"
             return
-        problem = self.canvas.problem_at(event.pos)
-        if problem is not None and not editor.tool.busy:
+        if (problem := self.canvas.problem_at(event.pos)) is not None and not editor.tool.busy:
             editor.problem = None if editor.problem is problem else problem
             editor.say(problem.words, trouble=problem.grave)
             editor.version += 1
@@ -385,8 +382,7 @@ class EditorWindow(BaseWindow):
         """Take a key: for a field, for a number while something is drawn, else for a command."""
         if self.panel.take(event) or (not self.panel.ui.busy and self._number(event)):
             return
-        command = self.commands.of_key(event)
-        if command is not None:
+        if (command := self.commands.of_key(event)) is not None:
             self.do(command.name)
 
     def _number(self, event: pygame.event.Event) -> bool:
