@@ -120,8 +120,8 @@ class EditorCanvas:
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
 
-    def go_to(self, problem: Problem) -> None:
-        if problem.where is None or problem.where.is_empty:
+    def go_to(self, problem: Problem | None) -> None:
+        if problem is None or problem.where is None or problem.where.is_empty:
             return
         spot = problem.where.representative_point()
         x, y = self.to_pixel((spot.x, spot.y))
@@ -260,12 +260,12 @@ class EditorCanvas:
         fill = mix(self.theme.obstacle, colour, 0.22)
 
         def drawn() -> Surface:
-            page = Surface(view.size, pygame.SRCALPHA, 32)
+            page = view.page()
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
-            self.sheet.draw_items(view.canvas(page), there, fill, colour)
+            self.sheet.draw_items(page, there, fill, colour)
             for owner in drag.moving.owners - drag.moving.items:
-                self._draw_owner(view.canvas(page), sketch, owner, colour, 2.0)
-            return page
+                self._draw_owner(page, sketch, owner, colour, 2.0)
+            return page.surface
 
         dx, dy = (view.camera.zoom * by for by in drag.offset)
         screen.blit(self._carried.of(drag, view.camera, drawn), (round(dx), round(-dy)), special_flags=_BLEND)
@@ -307,18 +307,15 @@ class EditorCanvas:
         if hovered is not None and hovered not in owners and Selection.of(hovered).within(sketch):
             self._draw_owner(canvas, sketch, hovered, mix(floor, colour, 0.7), 1.5)
 
-        def outline(canvas: Canvas) -> None:
+        def outline(on: Canvas) -> Surface:
             for owner in owners:
-                self._draw_owner(canvas, sketch, owner, colour, 2.0)
-
-        def outlined() -> Surface:
-            page = Surface(view.size, pygame.SRCALPHA, 32)
-            outline(view.canvas(page))
-            return page
+                self._draw_owner(on, sketch, owner, colour, 2.0)
+            return on.surface
 
         if len(owners) > MANY:
             look = (selection, view.camera, view.theme.name, view.scale)
-            screen.blit(self._outlined.of(sketch, look, outlined), (0, 0), special_flags=_BLEND)
+            page = self._outlined.of(sketch, look, lambda: outline(view.page()))
+            screen.blit(page, (0, 0), special_flags=_BLEND)
         else:
             outline(canvas)
         if "handles" not in editor.shown or editor.tool is not selector or not selection:

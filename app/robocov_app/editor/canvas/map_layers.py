@@ -133,6 +133,10 @@ class View:
     def canvas(self, surface: Surface) -> Canvas:
         return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
 
+    def page(self) -> Canvas:
+        """Return a clear canvas as large as the window."""
+        return self.canvas(Surface(self.size, pygame.SRCALPHA, 32))
+
 
 def outside_colour(theme: Theme) -> Colour:
     return mix(theme.panel, theme.ink, 0.05) if theme is LIGHT else mix(theme.background, (0, 0, 0), 0.28)
@@ -210,7 +214,6 @@ class Sheet:
 
     def __init__(self) -> None:
         self.outlines, self.underlaid = Outlines(), ReferenceImage()
-        self.full = self.patched = self.scrolled = 0  # how often it was drawn whole, in part, and moved
         self._page: Surface | None = None
         self._look: object = None
         self._camera: Camera | None = None
@@ -230,13 +233,8 @@ class Sheet:
         boxes = self._boxes(view, items) if look == self._look else None
         if self._page is None or self._page.get_size() != view.size:
             self._page = Surface(view.size, 0, 32)
-        if boxes is None:
-            boxes = [view.clip]
-            self.full += 1
-        else:
-            self.patched += len(boxes)
         self._look, self._camera, self._drawn = look, view.camera, items
-        for box in boxes:
+        for box in boxes if boxes is not None else [view.clip]:
             self._paint(self._page, view, sketch, items, box)
         return self._page
 
@@ -253,7 +251,7 @@ class Sheet:
         bounds = [self.outlines.of(item).bounds for item in changed]
         boxes += [pixel_box(view.camera, b).inflate(edge, edge) for b in bounds if np.isfinite(b[0])]
         whole = view.clip
-        boxes = [box for box in (each.clip(whole) for each in boxes) if box.width and box.height]
+        boxes = [box for box in (each.clip(whole) for each in boxes) if box]
         if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
             return None
         return _merged(boxes)
@@ -267,7 +265,6 @@ class Sheet:
         if far or abs(dx - whole_x) > 0.02 or abs(dy - whole_y) > 0.02:
             return None
         assert self._page is not None
-        self.scrolled += 1
         self._page.set_clip(clip)
         self._page.scroll(whole_x, whole_y)
         self._page.set_clip(None)

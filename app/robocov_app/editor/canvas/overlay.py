@@ -159,9 +159,8 @@ def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
     colour = canvas.theme.final
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
-        box = pixel_box(canvas.camera, [*ring.min(axis=0), *ring.max(axis=0)])
-        box = box.clip(canvas.surface.get_clip())
-        if box.width and box.height:
+        box = pixel_box(canvas.camera, [*ring.min(axis=0), *ring.max(axis=0)]).clip(canvas.surface.get_clip())
+        if box:
             page = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = np.rint(np.clip(corners - np.array(box.topleft), -30000, 30000)).tolist()
             pygame.draw.polygon(page, (*mix(canvas.theme.obstacle, colour, 0.35), 130), shifted)
@@ -215,7 +214,7 @@ def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bo
     low, high = ends.min(axis=0), ends.max(axis=0)
     box = Rect(*np.rint([*low, *(high - low)]).astype(int).tolist()).clip(canvas.surface.get_clip())
     colour = canvas.theme.start if touched else canvas.theme.final
-    if box.width and box.height:
+    if box:
         page = Surface(box.size, pygame.SRCALPHA, 32)
         page.fill((*colour, 34))
         canvas.surface.blit(page, box)
@@ -248,9 +247,9 @@ def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None
     parts = [part for part in parts if part[0].rings]
     if not parts:
         return None
-    box = pixel_box(view.camera, shapely.total_bounds([outline.geometry for outline, _, _ in parts]))
-    box = box.clip(view.clip)
-    if not (box.width and box.height):
+    bounds = shapely.total_bounds([outline.geometry for outline, _, _ in parts])
+    box = pixel_box(view.camera, bounds).clip(view.clip)
+    if not box:
         return None
     patch = Surface(box.size, pygame.SRCALPHA, 32)
     edged = view.canvas(patch)

@@ -60,18 +60,17 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
         hint = hints[field.name]
         plain = next((each for each in get_args(hint) if each is not type(None)), hint)
         hint = hint if get_origin(hint) in (Literal, tuple) else plain
+        name, words = field.name, helps.get(field.name, "")
         default = "" if field.default is None else str(field.default)
-        kind: Kind = "number" if hint is float else "text"
-        choices: tuple[str, ...] = ()
         if hint is bool:
-            kind, choices, default = "choice", ("no", ON), "no"
+            yield Option(name, "choice", ("no", ON), "no", words)
         elif get_origin(hint) is Literal:
-            kind, choices = "choice", get_args(hint)
-            if default:
-                choices = tuple(sorted(choices, key=lambda each: each != default))
+            choices = sorted(get_args(hint), key=lambda each: bool(default) and each != default)
+            yield Option(name, "choice", tuple(choices), default, words)
         elif get_origin(hint) is tuple:
-            kind = "words" if ... in get_args(hint) else "place"
-        yield Option(field.name, kind, choices, default, helps.get(field.name, ""))
+            yield Option(name, "words" if ... in get_args(hint) else "place", (), default, words)
+        else:
+            yield Option(name, "number" if hint is float else "text", (), default, words)
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,7 +84,7 @@ class EditorWindow(BaseWindow):
         }
         listed = editor_commands(editor, self.canvas, self.documents, of_window)
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
-        self.panel = Panel(editor, self.commands, self.do, self._show_problem)
+        self.panel = Panel(editor, self.commands, self.do, lambda: self.canvas.go_to(editor.problem))
         self.at = (0, 0)  # where the mouse is, px
         self.held = False  # whether the left button pans, for as long as a key is held
         self.drag = ""  # what a button that is held down drags: "tool", "pan"
@@ -93,7 +93,6 @@ class EditorWindow(BaseWindow):
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
-        self._caption = ""
         self._arrange()
         self.canvas.fit()
         editor.ask_readings()
@@ -119,7 +118,7 @@ class EditorWindow(BaseWindow):
             *(editor.problem, editor.sketch, editor.selection, editor.measurement, editor.tool),
             *(editor.cursor, frozenset(editor.shown), editor.grid, frozenset(editor.snaps)),
             *(canvas.team, canvas.camera, canvas.hovered, self.help, id(editor.asked)),
-            *(self._arranged, self._caption),
+            *(self._arranged, pygame.display.get_caption()),
         )
 
     def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
@@ -154,8 +153,7 @@ class EditorWindow(BaseWindow):
         self.panel.update()
         self._show_cursor()
         caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · robocov edit"
-        if caption != self._caption:
-            self._caption = caption
+        if caption != pygame.display.get_caption()[0]:
             pygame.display.set_caption(caption)
 
     def _arrange(self) -> None:
@@ -194,11 +192,7 @@ class EditorWindow(BaseWindow):
         editor, problem = self.editor, self.editor.problem
         editor.attempt(action)
         if editor.problem is not problem:
-            self._show_problem()
-
-    def _show_problem(self) -> None:
-        if self.editor.problem is not None:
-            self.canvas.go_to(self.editor.problem)
+            self.canvas.go_to(editor.problem)
 
     def _name(self) -> None:
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
