@@ -109,12 +109,11 @@ class Autosaver:
                 place = folder / f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(4)}"
                 place.mkdir(mode=0o700)
                 self._lock.enter_context(locked(place))
+                self.trouble = ""
+                return place
             except (OSError, OutputError) as error:
                 # perhaps another program looks for what was left behind in just this moment
                 self.trouble = f"work is not kept aside: {error}"
-                continue
-            self.trouble = ""
-            return place
         return None
 
     def _work(self) -> None:

@@ -49,9 +49,6 @@ class Dialog:
         """Take a key; return whether it meant something."""
         return False
 
-    def wheel(self, notches: float) -> None:
-        """Take a turn of the wheel."""
-
     def cancelled(self) -> None:
         """Take note that it was given up."""
 
@@ -322,7 +319,7 @@ class Dialogs:
                 ui.take(event)
             if self.asked is not asked:  # it was answered, and that asks something else
                 self.swallow(event.unicode)
-        elif event.type == pygame.MOUSEWHEEL:
+        elif event.type == pygame.MOUSEWHEEL and isinstance(asked, Choice):
             asked.wheel(wheel_notches(event))
         elif event.type != pygame.MOUSEBUTTONDOWN or ui.box.collidepoint(event.pos):
             ui.take(event)

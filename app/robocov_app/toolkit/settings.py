@@ -23,10 +23,8 @@ def settings_file(name: str = "window.json") -> Path | None:
 def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
     """Return settings of a kind, and what to tell if they could not be read: the defaults are used then."""
     try:
-        if file is not None:
+        if file is not None and file.exists():
             return kind.model_validate_json(file.read_bytes()), ""
-    except FileNotFoundError:
-        pass
     except (OSError, ValueError):
         return kind(), f"{file} could not be read: default settings"
     return kind(), ""

@@ -364,9 +364,6 @@ def editor_commands(
     def switch_theme() -> None:
         editor.theme = "dark" if editor.theme == "light" else "light"
 
-    def switch_panel() -> None:
-        editor.panel = not editor.panel
-
     table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
         "File",
         ("new", "New map", "ctrl+n", documents.new),
@@ -457,7 +454,7 @@ def editor_commands(
         *arrows("pan:{}", "Pan (all arrows)", "ctrl+{}", lambda x, y: canvas.pan(-_PAN * x, _PAN * y)),
         ("pan:hold", "Pan while it is held down", "space", of_window["pan:hold"]),
         ("theme", "Light or dark", "t", switch_theme),
-        ("panel", "Hide or show the panel", "h", switch_panel),
+        ("panel", "Hide or show the panel", "h", lambda: setattr(editor, "panel", not editor.panel)),
         ("tab", "Next page of the panel", "ctrl+tab", of_window["tab"]),
         ("fullscreen", "Full screen", "f11", of_window["fullscreen"]),
         ("path:play", "Let obstacles move, or stand again", "l", does(play)),
