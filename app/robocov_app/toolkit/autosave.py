@@ -20,14 +20,12 @@ from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
 
 FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
-
 _FILE = "draft.json"
 _PAUSE = 0.25  # seconds between two writings
 _SHARE = 10.0  # times as long as the last writing took: large work does not stutter
 _PATIENCE = 2.0  # seconds until it is tried again when work could not be written
 _TRIES = 3  # folders that are tried to work in
 _YOUNG = 60.0  # seconds in which a folder without work may be one that a program is just making
-
 _Work = TypeVar("_Work")
 _Content = Callable[[], Mapping[str, Any]]
 
@@ -117,6 +115,7 @@ class Autosaver:
         return None
 
     def _work(self) -> None:
+        assert self._place is not None
         pause = 0.0
         while True:
             with self._changed:
@@ -126,31 +125,26 @@ class Autosaver:
                 if job is None:
                     return
                 self._writing, self._hurried = True, False
-            began = time.perf_counter()
-            trouble = self._written(*job)
+            (path, content), began, trouble = job, time.perf_counter(), ""
+            try:
+                record = {
+                    "format": self._kind,
+                    "version": 1,
+                    "path": None if path is None else str(path.absolute()),
+                    "when": datetime.now().astimezone().isoformat(timespec="seconds"),
+                    **(content() if content is not None else {}),
+                }
+                with written(self._place / _FILE) as part:
+                    part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
+                self._holds = content is not None
+            except (OSError, OutputError) as error:
+                trouble = f"work is not kept aside: {error}"
             pause = max(_PAUSE, _SHARE * (time.perf_counter() - began))
             with self._changed:
                 self._writing, self.trouble = False, trouble
                 if trouble and self._wanted is None and not self._closed:
                     self._wanted, pause = job, _PATIENCE  # perhaps there is room later
                 self._changed.notify_all()
-
-    def _written(self, path: Path | None, content: _Content | None) -> str:
-        assert self._place is not None
-        try:
-            record = {
-                "format": self._kind,
-                "version": 1,
-                "path": None if path is None else str(path.absolute()),
-                "when": datetime.now().astimezone().isoformat(timespec="seconds"),
-                **(content() if content is not None else {}),
-            }
-            with written(self._place / _FILE) as part:
-                part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
-        except (OSError, OutputError) as error:
-            return f"work is not kept aside: {error}"
-        self._holds = content is not None
-        return ""
 
 
 def autosave_folder() -> Path | None:

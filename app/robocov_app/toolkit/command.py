@@ -80,7 +80,6 @@ class Commands:
         self._down.discard(event.key)
 
     def forget_keys(self, *held: int) -> None:
-        """Take note of the keys that are held down still, whatever was before."""
         self._down = set(held)
 
     def _typable(self) -> dict[str, Command]:

@@ -11,7 +11,6 @@ from robocov.errors import OutputError
 from robocov.files.atomic import written
 
 FOLDER = "ROBOCOV_SETTINGS"  # environment variable with another folder for the settings; empty for none
-
 Kept = TypeVar("Kept", bound=BaseModel)
 
 

@@ -38,7 +38,6 @@ LONGEST_LIST = 268.0  # greatest height of an open list
 LIST_ROW = 24.0
 _TALLEST = 32.0  # a button in a row that is higher
 _NOTCH = 40.0
-
 TIP_AFTER = 0.6  # seconds for which the mouse rests before a tool tip appears
 _ENTER = ("return", "enter")
 

@@ -46,6 +46,7 @@ class BaseWindow:
         self.screen = screen or open_window(size)
         self.windowed: tuple[int, int] | None = None  # the size before full screen
         self.closed = False
+        self.inner: BaseWindow | None = None  # one that is shown in its place for a while
         self.remote: Remote | None = None
         self.rate, self._calm, self._touched = float(FPS), 0.0, False
         self._drawn: object = None
@@ -96,10 +97,11 @@ class BaseWindow:
         self.advance(seconds)
         if self.closed:
             return
-        look = self.look()
+        shown = self.inner or self
+        look = shown.look()
         self._calm = 0.0 if self._touched or look is None else self._calm + seconds
         if not (rested and self.resting and look == self._drawn):
-            self.draw()
+            shown.draw()
         self._drawn = look
         if self.remote is not None:
             self.remote.send(self.screen)
@@ -112,7 +114,7 @@ class BaseWindow:
         for event in events:
             if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
                 self.screen = pygame.display.get_surface() or self.screen
-            self.take(event)
+            (self.inner or self).take(event)
         if self.closed:
             return
         if seconds > 0 and not self.resting:

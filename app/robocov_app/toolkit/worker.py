@@ -24,9 +24,7 @@ from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 from robocov.errors import RobocovError
 
 _Answer = TypeVar("_Answer")
-
 READY = "ready"  # first message of a process: its service is loaded
-
 _PIPE = 1 << 20
 _SET_DEATH_SIGNAL = 1
 

@@ -52,7 +52,6 @@ REACH = 12.0  # pixels at scale 1 that a finger is wide
 MARGIN = 26.0  # pixels at scale 1 around the map when all of it is shown
 STAYS = 0.45  # part of the view by which the map can be moved out of its middle
 EMPTY = (0.0, 0.0, 10.0, 10.0)  # m; what is shown of a sheet with nothing on it
-
 _BLEND = pygame.BLEND_PREMULTIPLIED
 
 
@@ -65,14 +64,12 @@ class EditorCanvas:
         self._rows = 1
         self._rows_for: object = None
         self._unfree: Latest[bool] = Latest()
-        self._legend: Latest[Surface] = Latest()
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
         self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
         self._hatched: Latest[tuple[Surface, Rect] | None] = Latest()
-        self._carried: Latest[Surface] = Latest()
-        self._outlined: Latest[Surface] = Latest()
+        self._legend, self._carried, self._outlined = Latest[Surface](), Latest[Surface](), Latest[Surface]()
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
@@ -104,18 +101,14 @@ class EditorCanvas:
         self._rows = max(rows, self._rows) if key == self._rows_for else rows
         self._rows_for = key
 
-    def fit(self) -> None:
-        self._show(self._bounds)
-
-    def fit_selection(self) -> None:
-        self._show(bounds_of(self.editor.sketch, self.editor.selection) or self._bounds)
-
     @property
     def _bounds(self) -> tuple[float, float, float, float]:
         return self.editor.sketch.bounds or EMPTY
 
-    def _show(self, bounds: tuple[float, float, float, float]) -> None:
-        low_x, low_y, high_x, high_y = bounds
+    def fit(self, selection: Selection | None = None) -> None:
+        """Show what is selected, or the whole map."""
+        bounds = bounds_of(self.editor.sketch, selection) if selection else None
+        low_x, low_y, high_x, high_y = bounds or self._bounds
         grow_x, grow_y = max(0.2 - (high_x - low_x), 0) / 2, max(0.2 - (high_y - low_y), 0) / 2  # m
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
@@ -143,8 +136,8 @@ class EditorCanvas:
         camera = self.camera.panned(dx, dy)
         low_x, low_y, high_x, high_y = self._bounds
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
-        x = float(np.clip(camera.center[0], low_x - far_x, high_x + far_x))
-        y = float(np.clip(camera.center[1], low_y - far_y, high_y + far_y))
+        low, high = (low_x - far_x, low_y - far_y), (high_x + far_x, high_y + far_y)
+        x, y = np.clip(camera.center, low, high).tolist()
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
@@ -181,8 +174,7 @@ class EditorCanvas:
         editor, shown, theme = self.editor, self.editor.shown, self.theme
         box = Rect(self.layout.arena)
         self._update_legend(self._view().canvas(Surface((box.width, 1))))
-        if self.camera.view != self._view_box():
-            self._look(self.camera.within(self._view_box()))
+        self._look(self.camera.within(self._view_box()))
         view = self._view()
         base, (now, chosen) = editor.sketch, editor.preview
         moved = getattr(editor.tools["picture"], "moved", None)
@@ -226,7 +218,7 @@ class EditorCanvas:
         if self.team is not None and self.team.places and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
-            self._draw_selection(screen, view, canvas, now, chosen)
+            self._draw_selection(view, canvas, now, chosen)
         if measurement is not None and gap is not None:
             busy = editor.tool is not editor.selector or drag is not None
             overlay.tag_gap(canvas, gap, measurement.radius, self.at if busy else None)
@@ -254,7 +246,6 @@ class EditorCanvas:
         own.text(words, (box.width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
 
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
-        """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
         sketch, colour = self.editor.sketch, self.theme.final
         fill = mix(self.theme.obstacle, colour, 0.22)
@@ -297,9 +288,7 @@ class EditorCanvas:
             rim = min(1.4 * scale, 0.3 * size)
             canvas.stamp(partial(sprites.disc, size, fill, theme.robot_ring, rim, edge, text), at)
 
-    def _draw_selection(
-        self, screen: Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
-    ) -> None:
+    def _draw_selection(self, view: View, canvas: Canvas, sketch: Sketch, selection: Selection) -> None:
         editor, selector, colour = self.editor, self.editor.selector, self.theme.final
         floor, selection = self.theme.background, selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
@@ -315,7 +304,7 @@ class EditorCanvas:
         if len(owners) > MANY:
             look = (selection, view.camera, view.theme.name, view.scale)
             page = self._outlined.of(sketch, look, lambda: outline(view.page()))
-            screen.blit(page, (0, 0), special_flags=_BLEND)
+            canvas.surface.blit(page, (0, 0), special_flags=_BLEND)
         else:
             outline(canvas)
         if "handles" not in editor.shown or editor.tool is not selector or not selection:

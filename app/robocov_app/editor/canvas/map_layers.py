@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +105,6 @@ class Outlines:
 FINE, COARSE = 11.0, 55.0  # between the fine and the strong lines of the grid, at least
 _EDGE = 6  # around what changed that are drawn anew too
 _ROOM = 8.0  # that a name leaves free beside it
-
 BIAS = 1e-4  # pixels by which all is shifted: round numbers would else lie between two, and fall anyhow
 PATCHES = 0.5  # part of the page from which on it is drawn anew as a whole
 LEAST_LETTERS = 6  # of a shortened name
@@ -347,9 +347,14 @@ class Sheet:
             corners = canvas.camera.to_pixels(np.concatenate(rings))
             fills = [fill if all(each.outer) else None for each in plain for _ in each.rings]
             canvas.polygons(corners, ends, fills)
-            for each in plain:
-                if not all(each.outer):
-                    _draw_holed(canvas, each, fill)
+            clip = canvas.surface.get_clip()
+            for each in (each for each in plain if not all(each.outer)):
+                # on a page of its own, so that what lies below shows in the holes
+                own = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
+                for ring, outer in zip(each.rings, each.outer, strict=True):
+                    inside = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
+                    own.polygon(inside, (*fill, 255) if outer else (0, 0, 0, 0))
+                canvas.surface.blit(own.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
             _draw_rings(canvas, corners, ends, edge)
         for each in plain:
             for line in each.lines:
@@ -400,11 +405,10 @@ def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
-        points, begin = corners.tolist(), 0
-        for end in ends:
+        points = corners.tolist()
+        for begin, end in pairwise((0, *ends)):
             if end - begin > 1:
                 pygame.draw.aalines(canvas.surface, colour, True, points[begin:end])
-            begin = end
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
@@ -415,16 +419,6 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
     seen = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
     seen &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
     canvas.segments(edges[seen], colour, width)
-
-
-def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
-    """Draw an obstacle with holes on a page of its own, so that what lies below shows in them."""
-    clip = canvas.surface.get_clip()
-    page, shift = Surface(clip.size, pygame.SRCALPHA, 32), np.array(clip.topleft, dtype=float)
-    own = replace(canvas, surface=page)
-    for ring, outer in zip(outline.rings, outline.outer, strict=True):
-        own.polygon(canvas.camera.to_pixels(ring) - shift, (*fill, 255) if outer else (0, 0, 0, 0))
-    canvas.surface.blit(page, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _merged(boxes: list[Rect]) -> list[Rect]:

@@ -31,7 +31,6 @@ MOST_RADIUS = 300.0  # up to which circles are sprites, which are smoother than 
 HATCH = 7  # from one slanted line to the next
 BADGE = 8.0  # radius of a problem's badge
 STEM = 17.0  # that it is above its place
-
 MOST_LENGTHS = 40  # edges of what is drawn whose lengths are told
 MOST_BADGES = 200
 SEALED = "repulsion_robots"  # the force with the colour of what no robot comes to from the largest part

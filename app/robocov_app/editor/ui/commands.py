@@ -28,9 +28,7 @@ FINGER = 12.0  # pixels at scale 1 that a finger is wide
 WIDER = 1.25
 _PAN = 60  # pixels that a key pans
 TOLERANCE = 0.02  # metres that simplified outlines may be off
-
 GHOST = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 · robots 8"
-
 Edit = Callable[..., Change]
 Run = Callable[[], object]
 RunWith = Callable[[Editor, str], object]
@@ -323,7 +321,6 @@ def _array_of(text: str) -> tuple[int, int, float, float]:
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
 _TOOL_KEYS = ("v", "g", "p", "r", "c", "w", "k", "b", "m", "s", "shift+s", "d", "o", "i")
 _SHOWN_KEYS = ("alt+3", "alt+2", "alt+1", "alt+5", "a", "alt+6", "alt+7", "alt+4")
-
 # commands that are done again and again while their key is held down
 _REPEATED = (
     *("undo", "redo", "paste", "duplicate", "select:next", "select:previous", "back", "more", "fewer"),
@@ -448,7 +445,7 @@ def editor_commands(
         ("snap:all", "Snap to everything, or to nothing", "0", partial(editor.switch, "snap", "all")),
         "View",
         ("fit", "Show the whole map", "f", canvas.fit),
-        ("fit:selection", "Show what is selected", "z", canvas.fit_selection),
+        ("fit:selection", "Show what is selected", "z", lambda: canvas.fit(editor.selection)),
         ("zoom:in", "Zoom in", "ctrl+=, ctrl++", partial(canvas.zoom, 1.25)),
         ("zoom:out", "Zoom out", "ctrl+-", partial(canvas.zoom, 0.8)),
         *arrows("pan:{}", "Pan (all arrows)", "ctrl+{}", lambda x, y: canvas.pan(-_PAN * x, _PAN * y)),

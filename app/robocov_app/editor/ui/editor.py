@@ -29,13 +29,11 @@ from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
 from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
-
 # layers that can be shown or hidden, with their titles
 SHOWN = {"grid": "Grid", "names": "Names", "impassable": "Too narrow", "problems": "Problems"}
 SHOWN |= {"robots": "Robots at start", "picture": "Picture", "legend": "Legend", "handles": "Handles"}
 # settings that are as an attribute of the editor, with its name
 KEPT = {"grid": "grid", "angle": "snap_angle", "radius": "radius", "robots": "robots", "wall": "wall_width"}
-
 MOST_RECENT = 10
 
 

@@ -28,7 +28,6 @@ from robocov_app.toolkit.worker import Worker
 
 # pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
-
 _FEWEST_LINES = 7  # of the report; more below maps that are wide
 _HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
 _DEFAULT = "default"
@@ -49,7 +48,7 @@ class ImportDialog(Dialog):
         self.accepted = False  # whether it is wanted as it is set, as soon as it is there
         self.cameras: list[Camera] = []
         self._seen: Ui | None = None
-        self._worker, self._mistake = worker, ""
+        self._worker = worker
         self._picture: Latest[Surface] = Latest()
         self._ask()
 
@@ -66,21 +65,18 @@ class ImportDialog(Dialog):
         self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
-        given = self.given
-        values = {each.name: each.value(given[each.name]) for each in self.options if each.name in given}
+        named = {each.name: each for each in self.options}
+        values = {name: named[name].value(text) for name, text in self.given.items()}
         of_reading = {field.name for field in fields(ReadOptions)}
         read = {name: values.pop(name) for name in values.keys() & of_reading}
         return ReadOptions(**read), Shaping(**values)
 
     def _ask(self) -> None:
-        self.accepted = False
+        self.accepted, self._mistake = False, ""
         try:
-            options, shaping = self.settings()
+            self._worker.put((self.path, self.importer.name, *self.settings()))
         except RobocovError as error:
             self._mistake = str(error)
-        else:
-            self._mistake = ""
-            self._worker.put((self.path, self.importer.name, options, shaping))
 
     def poll(self) -> Imported | None:
         if (answer := self._worker.poll()) is not None and not self._worker.busy:
@@ -128,8 +124,7 @@ class ImportDialog(Dialog):
                     self.keep_inside((round(x, digits), round(y, digits)))
             ui.y = top + maps / ui.scale + 14
         else:
-            ui.end_row()
-            ui.y += 14
+            ui.space(14)
             if ui.surface is not None:
                 words = label("nothing to show" if self.trouble else "reading…", ui.px(13), ui.theme.faint)
                 ui.surface.blit(words, words.get_rect(center=rect.center))
@@ -162,8 +157,7 @@ class ImportDialog(Dialog):
         ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
         ui.y = foot - 30
         ui.row(92, 92, height=30, below=0)
-        if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
-            self.accepted = True
+        self.accepted |= ui.button("Import", chosen=self.ready, key="import", tip=self.trouble)
         if ui.button("Cancel", key="cancel"):
             self.done = True
             self.cancelled()

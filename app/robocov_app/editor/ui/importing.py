@@ -14,9 +14,7 @@ from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
 Kind = Literal["number", "place", "words", "text", "choice"]
-
 ON = "yes"  # a switch that is on
-
 Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]  # a file, its format, and how to import it
 
 

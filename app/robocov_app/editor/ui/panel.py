@@ -151,11 +151,9 @@ FIELDS: dict[str, Field] = {
 
 
 TABS = ("map", "object", "snap", "problems", "history")
-
 ROW = 20.0  # height of a line of a list, px at scale 1
 MOST_PROBLEMS = 200  # that are listed
 _NAME = 62.0
-
 _NOTHING = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab goes on to the next; Ctrl A takes all."

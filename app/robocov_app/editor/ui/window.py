@@ -26,7 +26,6 @@ from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import BaseWindow
 
 SLIP = 4.0  # pixels at scale 1 that a click may move
-
 _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
 _SHAPES |= {"sideways": pygame.SYSTEM_CURSOR_SIZEWE, "updown": pygame.SYSTEM_CURSOR_SIZENS}
@@ -54,7 +53,6 @@ def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
 
 # what numbers are typed with, and what may follow in one
 _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
-
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 
@@ -99,16 +97,14 @@ class EditorWindow(BaseWindow):
         self.draw()
 
     def close(self) -> None:
-        if self.trial is not None:
-            self.trial.close()
+        if self.inner is not None:
+            self.inner.close()
         self.team.close()
         self.dialogs.close()
         self.editor.snapper.close()
 
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
-        if self.trial is not None:
-            return self.trial.look()
         editor, canvas, ui = self.editor, self.canvas, self.panel.ui
         importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
@@ -167,9 +163,6 @@ class EditorWindow(BaseWindow):
         self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        if self.trial is not None:
-            self.trial.draw()
-            return
         layout, theme, editor = self.layout, self.theme, self.editor
         self.canvas.draw(self.screen)
         told = facts(editor, self.rate, self.canvas.team)
@@ -214,7 +207,8 @@ class EditorWindow(BaseWindow):
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
             self.editor.selector.cancel(self.editor)
         trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
-        trial.windowed, self.trial = self.windowed, trial
+        trial.windowed = self.windowed
+        self.trial = self.inner = trial
 
     def _play(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen, trial.rate = self.screen, self.rate
@@ -223,7 +217,7 @@ class EditorWindow(BaseWindow):
             return
         trial.close()
         trial.keeper.finish()
-        self.trial = None
+        self.trial = self.inner = None
         self.screen = pygame.display.get_surface() or self.screen
         self.windowed = trial.windowed
         editor, viewer = self.editor, trial.viewer
@@ -241,9 +235,6 @@ class EditorWindow(BaseWindow):
             self.do("quit")
 
     def take(self, event: pygame.event.Event) -> None:
-        if self.trial is not None:
-            self.trial.take(event)
-            return
         kind = event.type
         if kind == pygame.KEYUP:
             self.commands.release(event)
