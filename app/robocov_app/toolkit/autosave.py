@@ -13,19 +13,19 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeVar
 
+from platformdirs import user_state_path
+
 from robocov.errors import MapError, OutputError
 from robocov.files.atomic import locked, written
 from robocov.files.strictjson import parse, read_bytes
 
 FOLDER = "ROBOCOV_DRAFTS"  # environment variable with another folder to keep work in; empty for none
-
 _FILE = "draft.json"
 _PAUSE = 0.25  # seconds between two writings
 _SHARE = 10.0  # times as long as the last writing took: large work does not stutter
 _PATIENCE = 2.0  # seconds until it is tried again when work could not be written
 _TRIES = 3  # folders that are tried to work in
 _YOUNG = 60.0  # seconds in which a folder without work may be one that a program is just making
-
 _Work = TypeVar("_Work")
 _Content = Callable[[], Mapping[str, Any]]
 
@@ -48,8 +48,7 @@ class Autosaver:
     ) -> None:
         self.trouble = ""  # why work cannot be kept, in words
         self._kind, self._path = kind, path
-        self._lock = ExitStack()
-        self._changed = threading.Condition()
+        self._lock, self._changed = ExitStack(), threading.Condition()
         self._wanted: tuple[Path | None, _Content | None] | None = None
         self._writing = self._closed = self._hurried = False
         self._holds = resumed is not None
@@ -61,16 +60,18 @@ class Autosaver:
         self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
         self._thread.start()
         if resumed is None:
-            self._want(None)  # so that other programs know of the file
+            self.keep(None)  # so that other programs know of the file
 
-    def keep(self, content: _Content) -> None:
+    def keep(self, content: _Content | None) -> None:
         """Keep work that is not saved; only the newest counts, and it is asked for in the thread."""
-        self._want(content)
+        with self._changed:
+            if self._place is not None and not self._closed:
+                self._wanted = self._path, content
+                self._changed.notify_all()
 
     def settle(self, path: Path | None) -> None:
-        """Forget what was kept: the document was saved, or opened anew."""
         self._path = path
-        self._want(None)
+        self.keep(None)
 
     def flush(self, timeout: float = 5.0) -> bool:
         """Wait until everything is on the disk; return whether it is."""
@@ -106,22 +107,15 @@ class Autosaver:
                 place = folder / f"{datetime.now():%Y%m%d-%H%M%S}-{secrets.token_hex(4)}"
                 place.mkdir(mode=0o700)
                 self._lock.enter_context(locked(place))
+                self.trouble = ""
+                return place
             except (OSError, OutputError) as error:
                 # perhaps another program looks for what was left behind in just this moment
                 self.trouble = f"work is not kept aside: {error}"
-                continue
-            self.trouble = ""
-            return place
         return None
 
-    def _want(self, content: _Content | None) -> None:
-        with self._changed:
-            if self._place is not None and not self._closed:
-                self._wanted = self._path, content
-                self._changed.notify_all()
-
     def _work(self) -> None:
-        """Write what is wanted, the newest only, with pauses in which others can work."""
+        assert self._place is not None
         pause = 0.0
         while True:
             with self._changed:
@@ -131,8 +125,20 @@ class Autosaver:
                 if job is None:
                     return
                 self._writing, self._hurried = True, False
-            began = time.perf_counter()
-            trouble = self._written(*job)
+            (path, content), began, trouble = job, time.perf_counter(), ""
+            try:
+                record = {
+                    "format": self._kind,
+                    "version": 1,
+                    "path": None if path is None else str(path.absolute()),
+                    "when": datetime.now().astimezone().isoformat(timespec="seconds"),
+                    **(content() if content is not None else {}),
+                }
+                with written(self._place / _FILE) as part:
+                    part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
+                self._holds = content is not None
+            except (OSError, OutputError) as error:
+                trouble = f"work is not kept aside: {error}"
             pause = max(_PAUSE, _SHARE * (time.perf_counter() - began))
             with self._changed:
                 self._writing, self.trouble = False, trouble
@@ -140,53 +146,28 @@ class Autosaver:
                     self._wanted, pause = job, _PATIENCE  # perhaps there is room later
                 self._changed.notify_all()
 
-    def _written(self, path: Path | None, content: _Content | None) -> str:
-        assert self._place is not None
-        try:
-            record = {
-                "format": self._kind,
-                "version": 1,
-                "path": None if path is None else str(path.absolute()),
-                "when": datetime.now().astimezone().isoformat(timespec="seconds"),
-                **(content() if content is not None else {}),
-            }
-            with written(self._place / _FILE) as part:
-                part.write_text(json.dumps(record, ensure_ascii=False), encoding="utf-8")
-        except (OSError, OutputError) as error:
-            return f"work is not kept aside: {error}"
-        self._holds = content is not None
-        return ""
-
 
 def autosave_folder() -> Path | None:
-    """Return where work is kept; None where it is not to be."""
-    named = os.environ.get(FOLDER)
-    if named is not None:
-        return Path(named) if named else None
-    from platformdirs import user_state_path
-
-    return user_state_path("robocov", appauthor=False) / "drafts"
+    folder = os.environ.get(FOLDER, str(user_state_path("robocov", appauthor=False) / "drafts"))
+    return Path(folder) if folder else None
 
 
 def recoverable(folder: Path | None, kind: str, read: Callable[[Record], _Work | None]) -> tuple[_Work, ...]:
     """Return what `read` makes of work that ended programs left, the newest first; remove empty folders."""
     found = []
     for place in _places(folder):
-        try:
+        with suppress(OutputError, MapError, OSError):  # in use, or not to be read
             with locked(place):
                 record = read_record(place, kind) if (place / _FILE).exists() else None
                 work = None if record is None else read(record)
-        except (OutputError, MapError, OSError):  # in use, or not to be read
-            continue
-        if record is not None and work is not None:
-            found.append((record.when, work))
-        elif _age(place) > _YOUNG:
-            shutil.rmtree(place, ignore_errors=True)
+            if record is not None and work is not None:
+                found.append((record.when, work))
+            elif time.time() - place.stat().st_mtime > _YOUNG:
+                shutil.rmtree(place, ignore_errors=True)
     return tuple(work for _, work in sorted(found, key=lambda pair: pair[0], reverse=True))
 
 
 def discard(folder: Path) -> None:
-    """Remove the folder of a record for good."""
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -195,19 +176,16 @@ def opened_elsewhere(folder: Path | None, kind: str, path: Path) -> bool:
     wanted = path.resolve()
     for place in _places(folder):
         with suppress(MapError, OSError):
-            named = read_record(place, kind).path
-            if named is None or named.resolve() != wanted:
-                continue
-            try:
-                with locked(place):
-                    pass
-            except OutputError:
-                return True
+            if (named := read_record(place, kind).path) is not None and named.resolve() == wanted:
+                try:
+                    with locked(place):
+                        pass
+                except OutputError:
+                    return True
     return False
 
 
 def read_record(folder: Path, kind: str) -> Record:
-    """Return what a folder holds; MapError when that is no such record."""
     file = folder / _FILE
     held = parse(read_bytes(file), str(file))
     if not isinstance(held, dict) or held.get("format") != kind or held.get("version") != 1:
@@ -221,15 +199,7 @@ def read_record(folder: Path, kind: str) -> Record:
 
 
 def _places(folder: Path | None) -> list[Path]:
-    if folder is None:
+    try:
+        return sorted(place for place in folder.iterdir() if place.is_dir()) if folder is not None else []
+    except OSError:
         return []
-    with suppress(OSError):
-        return sorted(place for place in folder.iterdir() if place.is_dir())
-    return []
-
-
-def _age(place: Path) -> float:
-    """Return how many seconds ago a folder was changed last; 0 where it is gone."""
-    with suppress(OSError):
-        return time.time() - place.stat().st_mtime
-    return 0.0

@@ -1,23 +1,20 @@
 """Text on the system's clipboard, or within the program where the display has none."""
 
+from contextlib import suppress
+
 import pygame
 
 _ours = ""
 
 
 def get() -> str:
-    """Return the text on the clipboard."""
-    try:
+    with suppress(pygame.error, AttributeError):
         return (pygame.scrap.get_text() if pygame.scrap.has_text() else "") or _ours
-    except (pygame.error, AttributeError):
-        return _ours
+    return _ours
 
 
 def put(text: str) -> None:
-    """Put a text on the clipboard."""
     global _ours
     _ours = text
-    try:
+    with suppress(pygame.error, AttributeError):
         pygame.scrap.put_text(text)
-    except (pygame.error, AttributeError):
-        return

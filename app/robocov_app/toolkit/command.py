@@ -11,7 +11,7 @@ from pygame import Rect, Surface
 from robocov.errors import InputError, unknown_name
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import Theme, mix
-from robocov_app.toolkit.dialogs import Choice, Option
+from robocov_app.toolkit.dialogs import Choice, Dialog, Option
 from robocov_app.toolkit.input import key_of, key_words
 from robocov_app.toolkit.overlay import card, dim
 from robocov_app.toolkit.ui import SMALL, TEXT, Ui
@@ -42,7 +42,6 @@ class Command:
 
     @property
     def tip(self) -> str:
-        """Title and keys, as a tool tip says them."""
         keys = " or ".join(key_words(key) for key in self.keys)
         return f"{self.title} ({keys})" if keys else self.title
 
@@ -65,51 +64,28 @@ class Commands:
     def __getitem__(self, name: str) -> Command:
         return self._named[name]
 
-    def __contains__(self, name: object) -> bool:
-        return name in self._named
-
     def do(self, name: str) -> None:
-        """Do a command, or tell why it cannot be done."""
         self._do(self._named[name])
 
     def _do(self, command: Command) -> None:
         self._attempt(lambda: _done(command))
 
-    # keys
-
     def of_key(self, event: pygame.event.Event) -> Command | None:
         """Return the command of a key that goes down; None while it is held and does not repeat."""
-        command = self._keyed.get(key_of(event))
-        held = event.key in self._down
+        command, held = self._keyed.get(key_of(event)), event.key in self._down
         self._down.add(event.key)
         return None if command is None or (held and not command.repeats) else command
 
-    def press(self, event: pygame.event.Event) -> bool:
-        """Do the command of a key that goes down; return whether there is one."""
-        command = self.of_key(event)
-        if command is not None:
-            self._do(command)
-        return command is not None
-
     def release(self, event: pygame.event.Event) -> None:
-        """Take note of a key that comes up."""
         self._down.discard(event.key)
 
-    def hold(self, key: int) -> None:
-        """Take note of a key that is held down already."""
-        self._down.add(key)
-
-    def forget_keys(self) -> None:
-        """Take note that the window has lost the keyboard, or that something else has got its keys."""
-        self._down.clear()
-
-    # what is typed
+    def forget_keys(self, *held: int) -> None:
+        self._down = set(held)
 
     def _typable(self) -> dict[str, Command]:
         return {each.name: each for each in [*self._more(), *self.listed] if each.takes is not None}
 
     def typed(self, text: str) -> object:
-        """Do what was typed: a command's name and what it takes; RobocovError where that cannot be done."""
         word, rest = parted(text)
         known = self._typable()
         if word not in known:
@@ -153,11 +129,7 @@ def _done(command: Command, *typed: str) -> object:
 
 
 def parted(text: str) -> tuple[str, str]:
-    """Return the word and what follows it, after a blank or an equals sign.
-
-    >>> parted("k_rep = 0.5"), parted("map a=b.json"), parted("robots")
-    (('k_rep', '0.5'), ('map', 'a=b.json'), ('robots', ''))
-    """
+    """Return the word and what follows it, after a blank or an equals sign: ``k_rep = 0.5``."""
     word, *rest = re.split(r"\s*=\s*|\s+", text.strip(), maxsplit=1)
     return word, "".join(rest)
 
@@ -185,19 +157,19 @@ def palette(commands: Commands, ghost: str, told: Callable[[str], object]) -> Ch
     return Choice("", commands.offered, accept, ghost, hint)
 
 
-class Menu:
+class Menu(Dialog):
     """Commands to choose from at a place of the window, None for a line between groups."""
+
+    margin = 5.0, 5.0
+    veils, closes_beside = False, True
 
     def __init__(
         self, rows: Sequence[Command | None], at: tuple[int, int], do: Callable[[str], object]
     ) -> None:
         self.commands, self.at, self._do = rows, at, do
-        self.open = True
         self.chosen = -1
-        self._ui: Ui | None = None
 
-    def _page(self, ui: Ui) -> None:
-        ui.inset(5, 5, 5)
+    def page(self, ui: Ui) -> None:
         for k, command in enumerate(self.commands):
             ui.row(height=7 if command is None else 24, below=0)
             if command is None:
@@ -207,52 +179,27 @@ class Menu:
             if ui.option(command.title, _keys(command), key=command.name, chosen=chosen, why=why):
                 self._choose(command)
 
-    def _choose(self, command: Command) -> None:
-        self.open = False
-        self._do(command.name)
+    def _choose(self, command: Command | None) -> None:
+        self.done = True
+        if command is not None:
+            self._do(command.name)
 
-    def take(self, event: pygame.event.Event) -> bool:
-        """Take an event; return whether it was meant for the menu. A press beside it closes it."""
-        if event.type == pygame.KEYDOWN:
-            self._key(key_of(event))
-        elif event.type == pygame.MOUSEBUTTONDOWN and self._ui is not None:
-            self.open = self._ui.box.collidepoint(event.pos)
-            return self._ui.take(event) or not self.open
-        elif self._ui is not None:
-            self._ui.take(event)
-        keys = (pygame.KEYDOWN, pygame.KEYUP, pygame.TEXTINPUT)
-        return event.type in (*keys, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION)
-
-    def _key(self, name: str) -> None:
+    def key(self, name: str, ui: Ui) -> bool:
         usable = [k for k, each in enumerate(self.commands) if each is not None and not each.when()]
         by = {"up": -1, "down": 1}.get(name, 0)
-        if name == "escape":
-            self.open = False
-        elif by and usable:
+        if by and usable:
             k = usable.index(self.chosen) + by if self.chosen in usable else (0 if by > 0 else -1)
             self.chosen = usable[k % len(usable)]
         elif name in ("return", "enter") and self.chosen in usable:
-            command = self.commands[self.chosen]
-            assert command is not None
-            self._choose(command)
+            self._choose(self.commands[self.chosen])
+        return True
 
-    def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        """Draw it, whole in the window."""
-        if self._ui is None or self._ui.theme is not theme or self._ui.scale != scale:
-            self._ui = Ui(self._page, theme, scale)
-            self._ui.background = None
-        wide = round(50 * scale) + max(
-            text_width(each.title, round(TEXT * scale)) + text_width(_keys(each), round(SMALL * scale))
-            for each in self.commands
-            if each is not None
-        )
-        high = round(sum(7 if each is None else 24 for each in self.commands) * scale + 10 * scale)
-        box = Rect(*self.at, wide, high)
-        self._ui.box = box.clamp(screen.get_rect())
-        card(screen, self._ui.box, theme, scale)
-        self._ui.stale = True
-        self._ui.draw(screen)
-        self._ui.draw_over(screen)
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        title, keys = round(TEXT * scale), round(SMALL * scale)
+        listed = [each for each in self.commands if each is not None]
+        widths = [text_width(each.title, title) + text_width(_keys(each), keys) for each in listed]
+        box.update(self.at, (round(50 * scale) + max(widths), box.height))
+        box.clamp_ip(screen)
 
 
 def _keys(command: Command) -> str:
@@ -260,26 +207,20 @@ def _keys(command: Command) -> str:
 
 
 def draw_keys(
-    screen: Surface,
-    theme: Theme,
-    scale: float,
-    commands: Iterable[Command],
-    groups: Sequence[str],
-    words: str,
+    screen: Surface, theme: Theme, scale: float, commands: list[Command], groups: Sequence[str], words: str
 ) -> None:
-    """Show the keys of commands, group by group in columns, under a line with a hint."""
     dim(screen, theme)
-    keyed = [each for each in commands if each.keys and not each.hidden]
-    blocks: list[tuple[str, Command | None]] = []
+    lines: list[str | Command] = []
     for group in groups:
-        blocks.append((group, None))
-        blocks += [(group, each) for each in keyed if each.group == group]
+        lines += [
+            group,
+            *(each for each in commands if each.group == group and each.keys and not each.hidden),
+        ]
     width, height = screen.get_size()
-    row = 16.5 * scale
     columns = 4 if width >= 1150 * scale else 3
     # small windows get smaller letters rather than a page that does not fit
-    rows = -(-(len(blocks) + len(groups)) // columns) + 1
-    row = min(row, (height - 90 * scale) / rows)
+    rows = -(-(len(lines) + len(groups)) // columns) + 1
+    row = min(16.5 * scale, (height - 90 * scale) / rows)
     size = max(8, round(row * 0.66))
     box = Rect(0, 0, round(min(width - 24 * scale, 1240 * scale)), round(rows * row + 66 * scale))
     box.center = width // 2, height // 2
@@ -289,20 +230,19 @@ def draw_keys(
     hint = label(words, round(11 * scale), theme.faint)
     screen.blit(hint, hint.get_rect(midright=(box.right - round(20 * scale), box.top + round(22 * scale))))
     wide = (box.width - 40 * scale) / columns
-    x, y = box.left + 20 * scale, box.top + 44 * scale
-    limit = box.bottom - 14 * scale
-    for group, command in blocks:
+    x, y, limit = box.left + 20 * scale, box.top + 44 * scale, box.bottom - 14 * scale
+    for line in lines:
         # a heading does not stand alone at the foot of a column
-        if y + row * (2.6 if command is None else 1.0) > limit:
+        if y + row * (2.6 if isinstance(line, str) else 1.0) > limit:
             x, y = x + wide, box.top + 44 * scale
-        if command is None:
+        if isinstance(line, str):
             if y > box.top + 45 * scale:
                 y += 0.5 * row
-            heading = label(group.upper(), max(8, round(size * 0.92)), theme.final, True)
+            heading = label(line.upper(), max(8, round(size * 0.92)), theme.final, True)
             screen.blit(heading, (round(x), round(y)))
         else:
-            screen.blit(label(key_words(command.keys[0]), size, theme.ink, True), (round(x), round(y)))
-            told = shortened(command.title.partition(":")[0], size, wide - 92 * scale)
+            screen.blit(label(key_words(line.keys[0]), size, theme.ink, True), (round(x), round(y)))
+            told = shortened(line.title.partition(":")[0], size, wide - 92 * scale)
             meaning = label(told, size, mix(theme.panel, theme.ink, 0.8))
             screen.blit(meaning, (round(x + 84 * scale), round(y)))
         y += row

@@ -1,6 +1,6 @@
 """Dialogs over a window: questions with answers, lists to choose from by typing, files."""
 
-from abc import ABC, abstractmethod
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,29 +21,35 @@ from robocov_app.toolkit.ui import TEXT, Ui
 MOST_LISTED = 5000  # names of a folder that are looked at
 ROWS = 9  # lines of a list that are in sight
 _MOST_LINES = 14
-_MARGIN = 20.0
-
 _NOT_OURS = (pygame.QUIT, pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED)
 
 
-class Dialog(ABC):
+class Dialog:
     """Something that is asked, in a card over the window."""
 
     width = 560.0
+    margin = 20.0, 16.0  # beside and above what is in it, px at scale 1
+    veils = True  # whether all else steps back
+    closes_beside = False  # whether a press beside it gives it up
     done = False
 
-    @abstractmethod
     def page(self, ui: Ui) -> None:
         """Show it."""
 
-    @abstractmethod
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        box.midtop = screen.width // 2, max(round((screen.height - box.height) * 0.42), 0)
+
+    def framed(self, ui: Ui) -> None:
+        side, above = self.margin
+        ui.inset(side, above, side)
+        self.page(ui)
+        ui.space(above)
+
     def key(self, name: str, ui: Ui) -> bool:
         """Take a key; return whether it meant something."""
+        return False
 
-    def wheel(self, notches: float) -> None:  # noqa: B027 - most have nothing to scroll
-        """Take a turn of the wheel."""
-
-    def cancelled(self) -> None:  # noqa: B027 - most need not know
+    def cancelled(self) -> None:
         """Take note that it was given up."""
 
 
@@ -67,11 +73,9 @@ class Question(Dialog):
     chosen: int = 0
 
     def page(self, ui: Ui) -> None:
-        """Show title, words and buttons."""
         ui.words(self.title, size=16, bold=True)
         ui.space(6)
-        size = ui.px(TEXT + 1)
-        wide = ui.px(ui.wide)
+        size, wide = ui.px(TEXT + 1), ui.px(ui.wide)
         lines = [line for part in self.words.split("\n") for line in wrapped(part, size, wide) or [""]]
         for line in lines[:_MOST_LINES]:
             ui.words(line, size=TEXT + 1)
@@ -79,8 +83,7 @@ class Question(Dialog):
             ui.words(f"… and {len(lines) - _MOST_LINES} lines more", size=TEXT + 1, colour=ui.theme.faint)
         ui.space(12)
         widths = [text_width(each.text, ui.px(TEXT), True) / ui.scale + 36 for each in self.answers]
-        room = ui.wide - sum(widths) - 8 * len(widths)
-        ui.row(max(room, 1.0), *widths, height=30, gap=8, below=0)
+        ui.row(max(ui.wide - sum(widths) - 8 * len(widths), 1.0), *widths, height=30, gap=8, below=0)
         ui.cell()
         for k, answer in enumerate(self.answers):
             tip = f"Key {answer.key.upper()}" if answer.key else ""
@@ -92,7 +95,6 @@ class Question(Dialog):
         answer.call()
 
     def key(self, name: str, ui: Ui) -> bool:
-        """Choose by arrows and Tab, answer by Enter or an answer's own key."""
         by = {"left": -1, "shift+tab": -1, "right": 1, "tab": 1}.get(name, 0)
         self.chosen = (self.chosen + by) % len(self.answers)
         own = next((each for each in self.answers if each.key == name), None)
@@ -103,7 +105,6 @@ class Question(Dialog):
         return True
 
     def cancelled(self) -> None:
-        """Do what Escape does."""
         self.on_cancel()
 
 
@@ -122,7 +123,7 @@ class Option:
 class Choice(Dialog):
     """A list that typing narrows down; an error of `accept` is told below, and nothing typed is lost."""
 
-    width = 620.0
+    width, closes_beside = 620.0, True
 
     title: str
     options: Callable[[str], Sequence[Option]]  # the lines for what is typed
@@ -136,16 +137,13 @@ class Choice(Dialog):
     trouble: str = ""
 
     def page(self, ui: Ui) -> None:
-        """Show the field and the lines below it."""
-        if self.title:
-            ui.words(self.title, colour=ui.theme.faint, bold=True)
+        ui.words(self.title, colour=ui.theme.faint, bold=True)
         if ui.edit is None or ui.focus != "text":
             ui.focus, ui.edit = "text", TextEdit(self.text, len(self.text), len(self.text))
         ui.row(height=32, below=8)
         ui.text_entry("text", self.text, ghost=self.ghost)
         self.typed(ui)
-        if self.trouble:
-            ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
+        ui.words(self.trouble, colour=ui.theme.trajectory, bold=True)
         found = list(self.options(self.text))
         self.chosen = min(self.chosen, max(len(found) - 1, 0))
         ui.row(height=26, below=1)
@@ -157,6 +155,9 @@ class Choice(Dialog):
         ui.row(height=22, below=0)
         more = f"{len(found)} in all · " if len(found) > ROWS else ""
         ui.label(more + self.hint, style="unit", at="center")
+
+    def place(self, box: Rect, screen: Rect, scale: float) -> None:
+        box.midtop = screen.width // 2, round(64 * scale)
 
     def typed(self, ui: Ui) -> None:
         """Take note of what the field holds: letters and Enter may come within one frame."""
@@ -182,11 +183,9 @@ class Choice(Dialog):
         ui.edit = TextEdit(text, len(text), len(text))
 
     def key(self, name: str, ui: Ui) -> bool:
-        """Choose by arrows, complete by Tab, accept by Enter; other keys edit the text."""
         found = list(self.options(self.text))
         option = found[self.chosen] if self.chosen < len(found) else None
-        by = {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0)
-        if by:
+        if by := {"up": -1, "down": 1, "page up": -ROWS, "page down": ROWS}.get(name, 0):
             self.wheel(-by)
             self.chosen = min(max(self.chosen, 0), max(len(found) - 1, 0))
             self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
@@ -200,16 +199,13 @@ class Choice(Dialog):
         return True
 
     def wheel(self, notches: float) -> None:
-        """Move through the list."""
         self.chosen = max(self.chosen - round(notches), 0)
         self.top = min(max(self.top, self.chosen - ROWS + 1), self.chosen)
 
 
 def list_choice(
-    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object], ghost: str = ""
+    title: str, options: Callable[[], Iterable[Option]], accept: Callable[[Option], object]
 ) -> Choice:
-    """Return a choice of one of some lines: those that hold all words typed."""
-
     def found(typed: str) -> list[Option]:
         words = typed.lower().split()
         lines = [(each, f"{each.text} {each.aside}".lower()) for each in options()]
@@ -220,7 +216,7 @@ def list_choice(
             raise InputError(f"{typed!r}, but one of the list was wanted")
         accept(option)
 
-    return Choice(title, found, chosen, ghost or "type to find")
+    return Choice(title, found, chosen, "type to find")
 
 
 def file_choice(
@@ -236,15 +232,13 @@ def file_choice(
     saves = bool(text)
 
     def path_of(typed: str) -> Path:
-        try:
-            return folder / Path(typed).expanduser()
-        except RuntimeError:  # a user who is not there
-            return folder / typed
+        return folder / os.path.expanduser(typed)  # noqa: PTH111 - raises nothing where there is no such user
 
     @cache
     def options(typed: str) -> list[Option]:
-        before, slash, begun = typed.rpartition("/")
-        place, prefix = path_of(before + slash), before + slash
+        begun = typed.rpartition("/")[2]
+        prefix = typed.removesuffix(begun)
+        place = path_of(prefix)
         try:
             there = [(not each.is_dir(), each) for each in islice(place.iterdir(), MOST_LISTED)]
         except (OSError, ValueError):
@@ -271,7 +265,7 @@ def file_choice(
             accept(path_of(typed.strip()))
         return None
 
-    none = "Enter saves it there" if saves else "nothing of that name"
+    none = "Enter saves it there" if saves else Choice.none
     hint = "↑ ↓ choose · Tab completes · Enter accepts · Esc closes"
     return Choice(title, options, chosen, f"a path from {folder.absolute()}", hint, none, text)
 
@@ -282,17 +276,14 @@ class Dialogs:
     def __init__(self) -> None:
         self.asked: Dialog | None = None
         self._ui: Ui | None = None
-        self._high = 0.0
         self._swallow = ""
         self._drawn = False  # whether it was, since it is asked
 
     @property
     def open(self) -> bool:
-        """Whether something is asked."""
         return self.asked is not None
 
     def ask(self, dialog: Dialog) -> None:
-        """Ask something."""
         self.asked, self._ui, self._swallow, self._drawn = dialog, None, "", False
 
     def swallow(self, letter: str) -> None:
@@ -300,18 +291,18 @@ class Dialogs:
         self._swallow = letter if self.open else ""
 
     def close(self) -> None:
-        """Give up what is asked."""
         asked, self.asked = self.asked, None
         if asked is not None:
             asked.cancelled()
 
     def take(self, event: pygame.event.Event) -> bool:
-        """Take an event; return whether something is asked, which takes all of mouse and keyboard."""
-        asked, ui = self.asked, self._ui
+        asked = self.asked
         if asked is None:
             return False
-        if ui is None:  # keys come before it was drawn
-            ui = self._made(asked, LIGHT, 1.0)
+        if event.type == pygame.DROPFILE and not asked.veils:
+            self.close()
+            return False
+        ui = self._ui or self._made(asked, LIGHT, 1.0)  # keys come before it was drawn
         if not self._drawn and event.type in OF_THE_MOUSE:
             return True
         ui.stale = True
@@ -320,16 +311,20 @@ class Dialogs:
             if event.text == swallowed:
                 return True
         if event.type == pygame.KEYDOWN:
-            self._key(asked, ui, event)
+            name, self._swallow = key_of(event), ""
+            composing = ui.edit is not None and bool(ui.edit.composed)
+            if name == "escape" and not composing:
+                self.close()
+            elif composing or not asked.key(name, ui):
+                ui.take(event)
             if self.asked is not asked:  # it was answered, and that asks something else
                 self.swallow(event.unicode)
-        elif event.type == pygame.MOUSEWHEEL:
+        elif event.type == pygame.MOUSEWHEEL and isinstance(asked, Choice):
             asked.wheel(wheel_notches(event))
-        elif event.type == pygame.MOUSEBUTTONDOWN and not ui.box.collidepoint(event.pos):
-            if isinstance(asked, Choice):
-                self.close()
-        else:
+        elif event.type != pygame.MOUSEBUTTONDOWN or ui.box.collidepoint(event.pos):
             ui.take(event)
+        elif asked.closes_beside:
+            self.close()
         if isinstance(asked, Choice):
             asked.typed(ui)
         if asked.done and self.asked is asked:
@@ -337,42 +332,25 @@ class Dialogs:
         return event.type not in _NOT_OURS
 
     def _made(self, asked: Dialog, theme: Theme, scale: float) -> Ui:
-        def page(ui: Ui) -> None:
-            ui.inset(_MARGIN, _MARGIN - 4, _MARGIN)
-            asked.page(ui)
-            ui.end_row()
-            self._high = ui.y + _MARGIN - 4
-
-        self._ui = ui = Ui(page, theme, scale)
-        self._high = 0.0
+        self._ui = ui = Ui(asked.framed, theme, scale)
         ui.background = None
         ui.box = Rect(0, 0, round(asked.width * scale), 100)
         ui.run(None, None)
         return ui
 
-    def _key(self, asked: Dialog, ui: Ui, event: pygame.event.Event) -> None:
-        name, self._swallow = key_of(event), ""
-        composing = ui.edit is not None and bool(ui.edit.composed)
-        if name == "escape" and not composing:
-            self.close()
-        elif composing or not asked.key(name, ui):
-            ui.take(event)
-
     def draw(self, screen: Surface, theme: Theme, scale: float) -> None:
-        """Draw what is asked over everything else."""
-        asked = self.asked
+        asked, ui = self.asked, self._ui
         if asked is None:
             return
-        ui, self._drawn = self._ui, True
+        self._drawn = True
         if ui is None or ui.theme is not theme or ui.scale != scale:
             ui = self._made(asked, theme, scale)
-        dim(screen, theme)
+        if asked.veils:
+            dim(screen, theme)
         wide = min(asked.width * scale, screen.get_width() - 24 * scale)
         for _ in range(2):  # its height is known after it has run
-            high = min(round(self._high * scale) or 100, screen.get_height())
-            ui.box = Rect(0, 0, round(wide), high)
-            top = 64 * scale if isinstance(asked, Choice) else (screen.get_height() - high) * 0.42
-            ui.box.midtop = screen.get_width() // 2, max(round(top), 0)
+            ui.box = Rect(0, 0, round(wide), min(round(ui.y * scale), screen.get_height()))
+            asked.place(ui.box, screen.get_rect(), scale)
             ui.run(None, None)
         card(screen, ui.box, theme, scale)
         ui.stale = True

@@ -5,7 +5,6 @@ from math import dist
 from typing import TypeAlias
 
 Point: TypeAlias = tuple[float, float]
-
 SAME = 1e-6  # metres below which two points are one
 
 
@@ -24,8 +23,7 @@ class Outline:
 
     def press(self, point: Point, raw: Point, closing: float, same: float = SAME) -> bool:
         """Add a point; one within `closing` m of the first, or `same` m of the last, ends the outline."""
-        self.at = point
-        enough = len(self.points) >= self.least
+        self.at, enough = point, len(self.points) >= self.least
         if self.closes and enough and dist(point, self.points[0]) < closing:
             return True
         if self.points and dist(point, self.points[-1]) < same:
@@ -50,5 +48,4 @@ class Outline:
         return points
 
     def cancel(self) -> bool:
-        """Forget what was drawn; return whether there was something."""
         return bool(self.take())

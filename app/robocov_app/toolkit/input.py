@@ -8,27 +8,20 @@ KEY_REPEAT = (350, 40)  # milliseconds until a held key is pressed again, the fi
 DOUBLE = 0.35  # seconds between the two clicks of a double click, at most
 SLIP = 5.0  # pixels that a click may move
 WHEEL = 1.15  # magnification of one notch of the wheel
-
 OF_THE_MOUSE = (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION, pygame.MOUSEWHEEL)
-"""Types of events that the mouse makes."""
 
 
 def key_of(event: pygame.event.Event) -> str:
     """Return the name of a pressed key with its modifiers, as in ``ctrl+shift+z``."""
     name = pygame.key.name(event.key)
-    if name.startswith("[") and name.endswith("]") and len(name) > 2:
-        name = name[1:-1]  # of the key pad
+    name = name.strip("[]") or name  # those of the key pad stand in brackets
     ctrl = pygame.KMOD_CTRL | pygame.KMOD_META
     modifiers = {"ctrl": ctrl, "alt": pygame.KMOD_ALT, "shift": pygame.KMOD_SHIFT}
     return "+".join([*(held for held, mask in modifiers.items() if event.mod & mask), name])
 
 
 def key_words(key: str) -> str:
-    """Return a key as people write it.
-
-    >>> [key_words(key) for key in ("ctrl+shift+z", "page down", "f1", "space", "`", "left")]
-    ['Ctrl Shift Z', 'Page down', 'F1', 'Space', '`', '←']
-    """
+    """Return a key as people write it: Ctrl Shift Z."""
     arrows = {"left": "←", "right": "→", "up": "↑", "down": "↓", "return": "Enter"}
     parts = [*key[:-1].split("+")[:-1], "+"] if key.endswith("++") or key == "+" else key.split("+")
     return " ".join(arrows.get(part, part[:1].upper() + part[1:]) for part in parts)
@@ -48,7 +41,6 @@ def shown_cursor() -> int:
 
 
 def show_cursor(shape: int) -> None:
-    """Give the mouse's cursor one of the system's shapes."""
     global _cursor
     _cursor = shape
     with suppress(pygame.error):  # not every display has cursors

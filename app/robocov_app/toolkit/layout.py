@@ -39,31 +39,23 @@ def laid_out(
     legend_rows: int = 1,  # of the legend that several panes share
     plot: bool = True,  # whether it is shown
 ) -> Layout:
-    """Lay a window out, for panes of a map whose width by height is `aspect`, at a scale of text and lines.
-
-    >>> layout = laid_out((1280, 720), 1.0, 1, 4 / 3)
-    >>> layout.arena, layout.panel
-    ((0, 0, 960, 518), (960, 0, 320, 720))
-    """
+    """Lay a window out, for panes of a map whose width by height is `aspect`."""
     width, height = size
     scale = min(scale, largest_scale(size))
     wide = min(round(PANEL * scale), width - 1) if panel else 0
-    left = width - wide
-    status = round(STATUS * scale)
+    left, status = width - wide, round(STATUS * scale)
     track = round(TRACK * scale) if plot else 0
     chart = min(round(CHART * scale), height // 3) if plot else 0
     arena: Box = (0, 0, left, max(height - status - track - chart, 1))
     legend = round((6 + LEGEND_ROW * legend_rows) * scale) if panes > 1 else 0
     free = left, max(arena[3] - legend, 1)
     columns = columns_for(panes, aspect, free, around=68 * scale, beside=31 * scale)
-    rows = -(-panes // columns)
-    pane_width = (left - GAP * (columns - 1)) // columns
+    rows, pane_width = -(-panes // columns), (left - GAP * (columns - 1)) // columns
     pane_height = (arena[3] - legend - GAP * (rows - 1)) // rows
-    places = [divmod(k, columns) for k in range(panes)]
-    boxes: list[Box] = [
-        (k * (pane_width + GAP), legend + row * (pane_height + GAP), pane_width, max(pane_height, 1))
-        for row, k in places
-    ]
+    boxes: list[Box] = []
+    for row, k in (divmod(k, columns) for k in range(panes)):
+        top = legend + row * (pane_height + GAP)
+        boxes.append((k * (pane_width + GAP), top, pane_width, max(pane_height, 1)))
     return Layout(
         size=size,
         scale=scale,
@@ -78,20 +70,11 @@ def laid_out(
 
 
 def largest_scale(size: tuple[int, int]) -> float:
-    """Return the largest scale that a window has room for: in steps, so that text does not tremble.
-
-    >>> [largest_scale(size) for size in ((900, 600), (1280, 720), (3840, 2160), (640, 480), (1170, 2532))]
-    [1.0, 1.125, 3.5, 0.625, 2.5]
-    """
+    """Return the largest scale that a window has room for: in steps, so that text does not tremble."""
     least = SMALLEST if size[0] >= size[1] else UPRIGHT
     return max(floor(8 * min(size[0] / least[0], size[1] / least[1])) / 8, 0.25)
 
 
-def inside(box: Box, pixel: tuple[float, float]) -> bool:
-    """Return whether a pixel is in a box.
-
-    >>> inside((10, 10, 5, 5), (14, 10)), inside((10, 10, 5, 5), (15, 10))
-    (True, False)
-    """
+def inside(box: tuple[float, float, float, float], pixel: tuple[float, float]) -> bool:
     left, top, width, height = box
     return left <= pixel[0] < left + width and top <= pixel[1] < top + height

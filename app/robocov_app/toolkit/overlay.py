@@ -31,19 +31,16 @@ def _rounded(size: tuple[int, int], fill: Colour, edge: Colour, radius: int, wid
 
 
 def rounded(screen: Surface, box: Rect, fill: Colour, edge: Colour, radius: int, width: int = 1) -> None:
-    """Draw a box with smooth round corners."""
     if box.width > 0 and box.height > 0:
         picture = _rounded(box.size, fill, edge, min(radius, min(box.size) // 2), width)
         screen.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def on_accent(theme: Theme) -> Colour:
-    """Return the colour of words on the accent's."""
     return (255, 255, 255) if theme is LIGHT else theme.background
 
 
 def field_colour(theme: Theme) -> Colour:
-    """Return the fill of what can be pressed, typed into or dragged."""
     return theme.background if theme is LIGHT else mix(theme.panel, theme.background, 0.8)
 
 
@@ -63,20 +60,17 @@ def wrapped(text: str, size: int, width: float, bold: bool = False) -> list[str]
 
 
 def card(screen: Surface, box: Rect, theme: Theme, scale: float) -> None:
-    """Draw a card with a soft edge."""
     edge = mix(theme.panel, theme.ink, 0.28)
     rounded(screen, box, theme.panel, edge, round(8 * scale), max(1, round(scale)))
 
 
 def dim(screen: Surface, theme: Theme) -> None:
-    """Let everything so far step back."""
     veil = Surface(screen.get_size(), pygame.SRCALPHA, 32)
     veil.fill((*theme.background, 150))
     screen.blit(veil, (0, 0))
 
 
 def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scale: float) -> None:
-    """Write words on a small card that begins at a pixel, and stays on the surface."""
     size = round(theme.text * scale)
     box = Rect(0, 0, text_width(words, size) + round(12 * scale), round(20 * scale))
     box.midleft = round(at[0] - 6 * scale), round(at[1])
@@ -87,12 +81,10 @@ def tag(screen: Surface, words: str, at: tuple[float, float], theme: Theme, scal
 
 
 def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: list[str], hint: str) -> None:
-    """Draw the status line; what there is no room for is left out, from the end."""
     left, top, width, height = box
     screen.fill(mix(theme.panel, theme.ink, 0.06), Rect(box))
     canvas, size, y = flat_canvas(screen, theme, scale), theme.small_text, top + height / 2
-    room = width - 44 * scale - canvas.text_width(hint, size)
-    kept = list(facts)
+    room, kept = width - 44 * scale - canvas.text_width(hint, size), list(facts)
     while len(kept) > 1 and canvas.text_width("    ".join(kept), size) > room:
         kept.pop()
     words = shortened("    ".join(kept), canvas.text_size(size), room)
@@ -101,7 +93,6 @@ def draw_status(screen: Surface, box: Box, theme: Theme, scale: float, facts: li
 
 
 def draw_message(screen: Surface, words: str, arena: Box, theme: Theme, scale: float, trouble: bool) -> None:
-    """Show a message at the foot of a box; nothing where there is none."""
     if not words:
         return
     size = round(12.5 * scale)

@@ -4,33 +4,26 @@ import os
 from pathlib import Path
 from typing import TypeVar
 
+from platformdirs import user_config_path
 from pydantic import BaseModel
 
 from robocov.errors import OutputError
 from robocov.files.atomic import written
 
 FOLDER = "ROBOCOV_SETTINGS"  # environment variable with another folder for the settings; empty for none
-
 Kept = TypeVar("Kept", bound=BaseModel)
 
 
 def settings_file(name: str = "window.json") -> Path | None:
-    """Return where the settings are kept, None where they are not to be."""
-    named = os.environ.get(FOLDER)
-    if named is not None:
-        return Path(named) / name if named else None
-    from platformdirs import user_config_path
-
-    return user_config_path("robocov", appauthor=False) / name
+    folder = os.environ.get(FOLDER, str(user_config_path("robocov", appauthor=False)))
+    return Path(folder) / name if folder else None
 
 
 def loaded(kind: type[Kept], file: Path | None) -> tuple[Kept, str]:
     """Return settings of a kind, and what to tell if they could not be read: the defaults are used then."""
     try:
-        if file is not None:
+        if file is not None and file.exists():
             return kind.model_validate_json(file.read_bytes()), ""
-    except FileNotFoundError:
-        pass
     except (OSError, ValueError):
         return kind(), f"{file} could not be read: default settings"
     return kind(), ""
@@ -42,7 +35,6 @@ def changed_settings(before: Kept, opened: Kept, closed: Kept) -> Kept:
 
 
 def save_settings(settings: BaseModel, file: Path | None) -> str:
-    """Write the settings, whole or not at all; return what to tell if that failed."""
     if file is None:
         return ""
     try:

@@ -23,23 +23,19 @@ class TextEdit:
 
     @classmethod
     def of(cls, text: str) -> Self:
-        """Return an edit of a text, all of it selected."""
         return cls(text, len(text), 0)
 
     @property
     def selection(self) -> tuple[int, int]:
-        """Ends of what is selected, in order."""
         return min(self.caret, self.anchor), max(self.caret, self.anchor)
 
     def place(self, caret: int, *, extend: bool = False) -> None:
-        """Move the caret; what it passes is selected where it extends the selection."""
         self.caret = min(max(caret, 0), len(self.text))
         if not extend:
             self.anchor = self.caret
         self._typing = False
 
     def select_word(self, at: int) -> None:
-        """Select the word around a place."""
         for word in re.finditer(r"[\w.]+|\s+|[^\w.\s]+", self.text):
             if word.start() <= at <= word.end():
                 self.anchor, self.caret = word.span()
@@ -66,47 +62,33 @@ class TextEdit:
         after = re.match(r"\s*\S+", self.text[self.caret :])
         return self.caret + after.end() if after else len(self.text)
 
-    def key(self, name: str) -> bool:
-        """Take a key by its name, as ``ctrl+z``; return whether it means something here."""
+    def key(self, name: str) -> None:
         extend = "shift+" in name
         key = name.replace("shift+", "") if name != "ctrl+shift+z" else name
-        start, end = self.selection
-        moves = {
-            "left": start if start != end and not extend else self.caret - 1,
-            "right": end if start != end and not extend else self.caret + 1,
-            "ctrl+left": self._word(-1),
-            "ctrl+right": self._word(1),
-            "home": 0,
-            "end": len(self.text),
-        }
-        erased = {
-            "backspace": (self.caret - 1, self.caret),
-            "delete": (self.caret, self.caret + 1),
-            "ctrl+backspace": (self._word(-1), self.caret),
-            "ctrl+delete": (self.caret, self._word(1)),
-        }
+        (start, end), at = self.selection, self.caret
+        moves = {"left": at - 1, "right": at + 1, "home": 0, "end": len(self.text)}
+        moves |= {"ctrl+left": self._word(-1), "ctrl+right": self._word(1)}
+        erased = moves.get(key.replace("backspace", "left").replace("delete", "right"))
         if key in moves:
+            if start != end and not extend and key in ("left", "right"):
+                moves |= {"left": start, "right": end}
             self.place(moves[key], extend=extend)
-        elif key in erased:
-            low, high = (start, end) if start != end else erased[key]
+        elif erased is not None:
+            low, high = (start, end) if start != end else sorted((at, erased))
             if 0 <= low < high <= len(self.text):
                 self._replace(low, high, "")
         elif key == "ctrl+a":
             self.anchor, self.caret = 0, len(self.text)
-        elif key in ("ctrl+c", "ctrl+x"):
-            if start != end:
-                clipboard.put(self.text[start:end])
-                if key == "ctrl+x":
-                    self._replace(start, end, "")
+        elif key in ("ctrl+c", "ctrl+x") and start != end:
+            clipboard.put(self.text[start:end])
+            if key == "ctrl+x":
+                self._replace(start, end, "")
         elif key == "ctrl+v":
             self.type(clipboard.get())
         elif key == "ctrl+z":
             self._swap(self._undo, self._redo)
         elif key in ("ctrl+y", "ctrl+shift+z"):
             self._swap(self._redo, self._undo)
-        else:
-            return False
-        return True
 
     def _swap(self, source: list[_State], target: list[_State]) -> None:
         if source:

@@ -13,8 +13,7 @@ this run: a button True, others the new value, None where nothing happened::
 Keys of widgets are unique within a page. Where `why` is given a widget is disabled, and says so in its tip.
 """
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,7 +24,7 @@ from pygame import Rect, Surface
 
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.theme import LIGHT, Colour, Theme, mix
-from robocov_app.toolkit.input import DOUBLE, key_of, wheel_notches
+from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, key_of, wheel_notches
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import field_colour, on_accent, rounded, wrapped
 from robocov_app.toolkit.text_edit import TextEdit
@@ -34,11 +33,11 @@ from robocov_app.toolkit.text_edit import TextEdit
 TEXT = 12.0  # a widget's text
 SMALL = 11.0  # the text of small buttons, headings and units
 BAR = 10.0  # width of a scroll bar
+MARGIN = 12.0  # of a panel, in which its scroll bar is
 LONGEST_LIST = 268.0  # greatest height of an open list
 LIST_ROW = 24.0
-_KNOB, _TALLEST = 12.0, 32.0  # a slider's knob, a button in a row that is higher
+_TALLEST = 32.0  # a button in a row that is higher
 _NOTCH = 40.0
-
 TIP_AFTER = 0.6  # seconds for which the mouse rests before a tool tip appears
 _ENTER = ("return", "enter")
 
@@ -67,7 +66,7 @@ class _List:
     options: list[str]
     rect: Rect
     row: int
-    chosen: int
+    chosen: int = 0
     top: float = 0.0
     picked: str | None = None
 
@@ -76,7 +75,6 @@ class _List:
         return max(len(self.options) * self.row + 2 - self.rect.height, 0)
 
     def item(self, k: int) -> Rect:
-        """Return where the option of a number is, which may be outside of the list."""
         y = self.rect.top + 1 + k * self.row - round(self.top)
         return Rect(self.rect.left + 1, y, self.rect.width - 2, self.row)
 
@@ -87,7 +85,6 @@ class _List:
         return k if 0 <= k < len(self.options) else None
 
     def show(self, k: int) -> None:
-        """Choose an option, and scroll it into sight."""
         self.chosen = min(max(k, 0), len(self.options) - 1)
         low, high = self.chosen * self.row, (self.chosen + 1) * self.row + 2 - self.rect.height
         self.top = min(max(self.top, high, 0.0), low)
@@ -114,24 +111,23 @@ class Ui:
         self._folded: set[str] = set()
         self._scrolled: dict[str, float] = {}
         self._heights: dict[str, float] = {}
-        self._hot = ""
-        self._rested = perf_counter()
-        self._tipped = False
+        self._hot, self._rested = "", perf_counter()
         self._clicked = (-1.0, "")
-        self._order: list[str] = []
-        self._again = False
-        self._grabbed = 0.0
+        self._again, self._grabbed = False, 0.0
         self._begin()
-
-    # runs
 
     def _begin(self) -> None:
         self.x, self.y, self.wide = 0.0, 0.0, self.box.width / self.scale
         self._clip = self.box
         self._cells: list[tuple[float, float]] = []
         self._next, self._height, self._below = 0, 26.0, 6.0
-        self._order = []
         self.shown = {}
+
+    @property
+    def _order(self) -> list[str]:
+        """Keys of what can have the focus, in the order of Tab."""
+        shown = self.shown.values()
+        return [each.key for each in shown if each.enabled and each.kind not in ("label", "bar")]
 
     def run(self, event: pygame.event.Event | None, surface: Surface | None) -> None:
         """Run the page for an event, for a drawing, or to learn how high it is."""
@@ -149,27 +145,45 @@ class Ui:
         if kind in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
             self.at = event.pos
         if kind == pygame.MOUSEMOTION:
-            return self._moved(event)
-        if kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
+            if self.open_list is not None and (k := self.open_list.at(event.pos)) is not None:
+                self.open_list.chosen = k
+            if held is None:
+                under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
+                if under != self._hot:
+                    self._hot, self._rested, self.stale = under, perf_counter(), True
+                return self.box.collidepoint(event.pos)
+        elif kind == pygame.MOUSEBUTTONDOWN and event.button != 1:
             return self.box.collidepoint(event.pos)
         if kind in (pygame.MOUSEBUTTONDOWN, pygame.KEYDOWN):
-            self._rested, self._tipped = perf_counter(), False
+            self._rested = perf_counter()
         if self.open_list is not None and self._list_takes(event):
             return True
-        if kind == pygame.KEYDOWN and not self._key_is_ours(key_of(event)):
-            return False
+        if kind == pygame.KEYDOWN:
+            name = key_of(event)
+            if self.focus is None or (self.edit is not None and _is_function_key(name)):
+                return False
+            if name in ("tab", "shift+tab"):
+                order, by = self._order, -1 if "shift" in name else 1
+                k = order.index(self.focus) + by if self.focus in order else 0
+                self.set_focus(order[k % len(order)] if order else self.focus)
+            elif name == "escape":
+                self.stop_typing()
+            elif self.edit is None and name not in (*_ENTER, "space", "left", "right", "up", "down"):
+                return False
         if kind in (pygame.TEXTINPUT, pygame.TEXTEDITING):
-            if self.edit is not None and kind == pygame.TEXTEDITING:
+            if self.edit is None:
+                return False
+            if kind == pygame.TEXTEDITING:
                 self.edit.composed = event.text
-            elif self.edit is not None:
+            else:
                 self.edit.type(event.text)
-            self.stale |= self.edit is not None
-            return self.edit is not None
-        if kind not in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEWHEEL, pygame.KEYDOWN):
+            self.stale = True
+            return True
+        if kind not in (*OF_THE_MOUSE, pygame.KEYDOWN):
             return False
         if kind == pygame.MOUSEBUTTONDOWN and self.focus is not None:
-            pressed = [each.key for each in self.shown.values() if each.rect.collidepoint(event.pos)]
-            if self.focus not in pressed:
+            shown = self.shown.values()
+            if not any(each.key == self.focus and each.rect.collidepoint(event.pos) for each in shown):
                 self.stop_typing()
         self.stale = True
         self.run(event, None)
@@ -177,37 +191,11 @@ class Ui:
             self.active = None
         return held is not None or kind == pygame.KEYDOWN or self.box.collidepoint(self.at)
 
-    def _moved(self, event: pygame.event.Event) -> bool:
-        if self.open_list is not None and (k := self.open_list.at(event.pos)) is not None:
-            self.open_list.chosen = k
-        if self.active is not None:
-            self.stale = True
-            self.run(event, None)
-            return True
-        under = next((f"{each.kind}:{each.key}" for each in self._under()), "")
-        if under != self._hot:
-            self._hot, self._rested, self._tipped, self.stale = under, perf_counter(), False, True
-        return self.box.collidepoint(event.pos)
-
     def _under(self) -> Iterator[Shown]:
         if self.open_list is None and self.box.collidepoint(self.at):
             yield from (each for each in self.shown.values() if each.rect.collidepoint(self.at))
 
-    def _key_is_ours(self, name: str) -> bool:
-        if self.focus is None:
-            return False
-        if name in ("tab", "shift+tab"):
-            self.move_focus(-1 if "shift" in name else 1)
-            return True
-        if name == "escape":
-            self.stop_typing()
-            return True
-        if self.edit is not None:
-            return not _is_function_key(name)
-        return name in (*_ENTER, "space", "left", "right", "up", "down")
-
     def draw(self, screen: Surface) -> None:
-        """Draw the page, anew where something is different."""
         if self.stale or self._picture is None or self._picture.get_size() != self.box.size:
             self.stale = False
             for _ in range(3):  # what a page needs of height is known after it has run
@@ -222,28 +210,14 @@ class Ui:
             return
         screen.blit(self._picture, self.box)
 
-    @property
-    def due(self) -> float | None:
-        """Seconds until a tool tip appears, None where none will."""
-        shown = self._tip_of()
-        return max(self._rested + TIP_AFTER - perf_counter(), 0.0) if shown and not self._tipped else None
-
-    def _tip_of(self) -> Shown | None:
-        return next((each for each in self._under() if each.tip), None) if self.active is None else None
-
     def draw_over(self, screen: Surface) -> None:
-        """Draw what hangs over other things: the open list, the tool tip."""
         if self.open_list is not None:
             self._draw_list(screen, self.open_list)
-        tipped = self._tip_of()
-        if tipped is not None and perf_counter() - self._rested >= TIP_AFTER:
-            self._tipped = True
-            self._draw_tip(screen, tipped)
-
-    def _draw_tip(self, screen: Surface, tipped: Shown) -> None:
+        tipped = next((each for each in self._under() if each.tip), None)
+        if tipped is None or self.active is not None or perf_counter() - self._rested < TIP_AFTER:
+            return
         size, theme = self.px(SMALL), self.theme
-        lines = wrapped(tipped.tip, size, self.px(240))
-        high = self.px(SMALL + 5)
+        lines, high = wrapped(tipped.tip, size, self.px(240)), self.px(SMALL + 5)
         box = Rect(0, 0, max(text_width(line, size) for line in lines) + self.px(14), 0)
         box.height = high * len(lines) + self.px(9)
         box.topleft = self.at[0], tipped.rect.bottom + self.px(5)
@@ -256,45 +230,27 @@ class Ui:
             picture = label(line, size, (245, 247, 250))
             screen.blit(picture, (box.left + self.px(7), box.top + self.px(5) + k * high))
 
-    # focus
-
     @property
     def typing(self) -> bool:
-        """Whether letters go into a field."""
         return self.edit is not None
 
     @property
     def busy(self) -> bool:
-        """Whether somebody holds a widget, types or chooses."""
         return self.active is not None or self.typing or self.open_list is not None
 
     def stop_typing(self) -> None:
-        """Take the keys away from all widgets, and close the open list."""
         self.focus = self.edit = self.open_list = None
         self.stale = True
 
-    def move_focus(self, by: int) -> None:
-        """Give the focus to the next widget; a field is edited at once."""
-        order = self._order
-        if not order:
-            return
-        k = order.index(self.focus) + by if self.focus in order else (0 if by > 0 else -1)
-        self.set_focus(order[k % len(order)])
-
     def set_focus(self, key: str) -> None:
-        """Give the focus to a widget."""
         self.focus, self.open_list, self.stale = key, None, True
         entry = self.shown.get(f"entry:{key}")
         self.edit = TextEdit.of(entry.text) if entry is not None else None
 
-    # layout
-
     def px(self, length: float) -> int:
-        """Return a length in pixels."""
         return round(length * self.scale)
 
     def inset(self, left: float, top: float, right: float = 0.0) -> None:
-        """Leave some room free at the sides and above what is to come."""
         self.end_row()
         self.x, self.y, self.wide = self.x + left, self.y + top, self.wide - left - right
 
@@ -302,8 +258,7 @@ class Ui:
         """Lay the next widgets side by side, again and again; a width of 0 shares what is left."""
         self.end_row()
         widths = widths or (0.0,)
-        free = self.wide - sum(widths) - gap * (len(widths) - 1)
-        share = free / max(widths.count(0), 1)
+        share = (self.wide - sum(widths) - gap * (len(widths) - 1)) / max(widths.count(0), 1)
         self._cells, x = [], self.x
         for width in widths:
             self._cells.append((x, width or share))
@@ -311,18 +266,15 @@ class Ui:
         self._height, self._below = height, below
 
     def end_row(self) -> None:
-        """Go on below the row that was begun."""
         if self._next:
             self.y += self._height + self._below
         self._next = 0
 
     def space(self, height: float) -> None:
-        """Leave some height free."""
         self.end_row()
         self.y += height
 
     def cell(self) -> Rect:
-        """Take the next cell, px."""
         if not self._cells:
             self.row()
         if self._next == len(self._cells):
@@ -334,16 +286,14 @@ class Ui:
 
     @property
     def rest(self) -> Rect:
-        """Rest of the box below the last row, px."""
-        top = self.box.top + self.px(self.y + (self._height + self._below if self._next else 0.0))
-        left = self.box.left + self.px(self.x)
+        """Rest of the box below the last row that was ended, px."""
+        left, top = self.box.left + self.px(self.x), self.box.top + self.px(self.y)
         return Rect(left, top, self.px(self.wide), max(self.box.bottom - top, 0))
 
     @contextmanager
-    def scroll(self, key: str, height: float | None = None, margin: float = 12.0) -> Iterator[None]:
-        """Scroll what is within, where it needs more height than there is; `margin` is right of the bar."""
+    def scroll(self, key: str) -> Iterator[None]:
         self.end_row()
-        room = self.rest.height / self.scale if height is None else height
+        room = self.rest.height / self.scale
         before = self.x, self.y, self.wide, self._clip
         rect = Rect(self.box.left, self.rest.top, self.box.width, self.px(room))
         needed = self._heights.get(key, 0.0)
@@ -351,7 +301,7 @@ class Ui:
         top = self._scrolled[key] = min(max(self._scrolled.get(key, 0.0), 0.0), beyond)
         if beyond:
             top = self._bar(key, rect, needed, top)
-            self.wide -= max(BAR + 4 - margin, 0.0)
+            self.wide -= BAR + 4 - MARGIN
         self._clip = self._clip.clip(rect)
         if self.surface is not None:
             self.surface.set_clip(self._clip)
@@ -368,10 +318,9 @@ class Ui:
             self.surface.set_clip(None)
 
     def visible_rows(self, count: int, height: float) -> Iterator[int]:
-        """Yield the numbers of those of many equal rows that are in sight."""
         self.end_row()
-        top = self._clip.top - self.box.top - self.px(self.y)
-        first = min(max(int(top / self.px(height)), 0), count)
+        first = int((self._clip.top - self.box.top - self.px(self.y)) / self.px(height))
+        first = min(max(first, 0), count)
         last = min(first + self._clip.height // self.px(height) + 2, count)
         self.y += first * height
         self.row(height=height, below=0)
@@ -380,7 +329,6 @@ class Ui:
         self.y += (count - last) * height
 
     def _bar(self, key: str, rect: Rect, needed: float, top: float) -> float:
-        """Show a scroll bar, and take wheel and drags for it; return how far it is scrolled."""
         room = rect.height / self.scale
         event, name = self._event, f"bar:{key}"
         track = Rect(rect.right - self.px(BAR + 1), rect.top, self.px(BAR), rect.height)
@@ -403,8 +351,6 @@ class Ui:
         self._round(knob.inflate(-self.px(4), -self.px(2)), fill, radius=BAR / 2)
         return top
 
-    # what widgets share
-
     def _shade(self, part: float) -> Colour:
         return mix(self.theme.panel, self.theme.ink, part)
 
@@ -422,10 +368,8 @@ class Ui:
         return self._is(pygame.MOUSEBUTTONDOWN) and self._hovers(rect)
 
     def _key(self, key: str) -> str:
-        """Return the name of the key that is pressed for a widget; empty if none is."""
-        event = self._event
-        for_it = event is not None and event.type == pygame.KEYDOWN and self.focus == key
-        return key_of(event) if event is not None and for_it else ""
+        event = self._event if self.focus == key else None
+        return key_of(event) if event is not None and event.type == pygame.KEYDOWN else ""
 
     def _note(
         self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
@@ -436,11 +380,9 @@ class Ui:
     def _clicks(
         self, kind: str, key: str, rect: Rect, text: str, value: object, tip: str = "", why: str = ""
     ) -> bool:
-        """Show a widget; return whether it was clicked in this run, or pressed by a key."""
         self._note(kind, key, rect, text, value, tip, why)
         if why:
             return False
-        self._order.append(key)
         if self._pressed(rect):
             self.active, self._event = key, None
         elif self._is(pygame.MOUSEBUTTONUP) and self.active == key:
@@ -458,7 +400,6 @@ class Ui:
             rounded(self.surface, rect, fill, edge or fill, self.px(radius), width)
 
     def _face(self, rect: Rect, key: str, why: str, *, chosen: bool = False) -> Colour:
-        """Draw the box of something to press; return the colour of what is on it."""
         theme, hovered = self.theme, self._hovers(rect)
         held = self.active == key and rect.collidepoint(self.at)
         if why:
@@ -487,10 +428,7 @@ class Ui:
             side = "center" if at == "center" else f"mid{at}"
             self.surface.blit(picture, picture.get_rect(**{side: getattr(rect, side)}))
 
-    # widgets
-
     def header(self, text: str) -> None:
-        """Write a heading."""
         self.row(height=18, below=2)
         self.label(text, style="header")
         self.row()
@@ -512,7 +450,6 @@ class Ui:
         bold: bool = False,
         indent: float = 0.0,
     ) -> None:
-        """Write a paragraph over the whole width, in as many lines as it needs."""
         self.row(*((indent, 0.0) if indent else (0.0,)), height=size + 4, gap=0, below=1)
         for line in wrapped(text, self.px(size), self.px(self.wide - indent), bold):
             if indent:
@@ -530,7 +467,6 @@ class Ui:
         chosen: bool = False,
         small: bool = False,
     ) -> bool:
-        """Show a button; return whether it was pressed."""
         key, rect = key or text, self.cell()
         rect.height = min(rect.height, self.px(_TALLEST))
         clicked = self._clicks("button", key, rect, text, chosen, tip, why)
@@ -540,7 +476,6 @@ class Ui:
         return clicked
 
     def option(self, text: str, aside: str = "", *, key: str, chosen: bool = False, why: str = "") -> bool:
-        """Show a line of a list, with words at its right end; return whether it was clicked."""
         rect = self.cell()
         clicked = self._clicks("option", key, rect, text, chosen, "", why)
         if self._draws(rect):
@@ -560,23 +495,20 @@ class Ui:
         rect = self.cell()
         return rect, self._clicks("area", key, rect, "", None)
 
-    def tabs(self, key: str, names: Sequence[str], now: str, *widths: float) -> str | None:
-        """Show buttons side by side of which one is chosen; return another one that was."""
+    def tabs(
+        self, key: str, names: Sequence[str], now: str, *widths: float, titles: Mapping[str, str] = {}
+    ) -> str | None:
         self.row(*(widths or [0.0] * len(names)), below=8)
         found = None
         for name in names:
-            title = name[:1].upper() + name[1:]
-            if self.button(title, key=f"{key}:{name}", chosen=name == now, small=True) and name != now:
+            title, chosen = titles.get(name, name.capitalize()), name == now
+            if self.button(title, key=f"{key}:{name}", chosen=chosen, small=True) and not chosen:
                 found = name
         self.row()
         return found
 
-    def section(self, title: str, *, key: str = "", folded: bool = False) -> bool:
-        """Show a heading that folds what belongs to it; return whether that is to be shown."""
+    def section(self, title: str, *, key: str = "") -> bool:
         key = f"section:{key or title}"
-        if folded and key not in self._heights:
-            self._folded.add(key)
-        self._heights[key] = 0.0
         self.row(height=20, below=4)
         rect = self.cell()
         if self._clicks("section", key, rect, title, None):
@@ -602,78 +534,58 @@ class Ui:
             field = mix(field_colour(theme), theme.final, 0.14 if hovered else 0.0)
             edge = theme.final if now or hovered else self._shade(0.35)
             self._round(box, theme.final if now else field, edge, 3, max(1, self.px(0.75)))
-            if now:
-                self._tick(box)
+            if now and self.surface is not None:
+                side = 4 * box.width
+                large = Surface((side, side), pygame.SRCALPHA, 32)
+                corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
+                for start, end in pairwise(corners):
+                    pygame.draw.line(large, on_accent(theme), start, end, max(4, round(side / 8)))
+                tick = pygame.transform.smoothscale(large.premul_alpha(), box.size)
+                self.surface.blit(tick, box, special_flags=pygame.BLEND_PREMULTIPLIED)
             words = rect.move(self.px(23), 0)
             words.width -= self.px(23)
             self._write(text, words, theme.ink, TEXT)
             self._ring(key, rect)
         return (not now) if clicked else None
 
-    def _tick(self, box: Rect) -> None:
-        assert self.surface is not None
-        side = 4 * box.width
-        large = Surface((side, side), pygame.SRCALPHA, 32)
-        corners = [(x * side, y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
-        for start, end in pairwise(corners):
-            pygame.draw.line(large, on_accent(self.theme), start, end, max(4, round(side / 8)))
-        picture = pygame.transform.smoothscale(large.premul_alpha(), box.size)
-        self.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-
     def slider(
-        self,
-        key: str,
-        now: float,
-        low: float,
-        high: float,
-        *,
-        step: float = 0.0,
-        tip: str = "",
-        why: str = "",
+        self, key: str, now: float, low: float, high: float, *, step: float = 0.0, why: str = ""
     ) -> float | None:
         """Show a slider; return where it was moved to. Arrows move it by `step`, or a fiftieth."""
-        rect = self.cell()
-        track = Rect(rect.left, 0, rect.width, self.px(14))
+        rect, theme = self.cell(), self.theme
+        track, knob = Rect(rect.left, 0, rect.width, self.px(14)), Rect(0, 0, self.px(12), self.px(14))
         track.centery = rect.centery
-        knob_wide = self.px(_KNOB)
-        free, span = max(track.width - knob_wide, 1), max(high - low, 1e-300)
-        value: float | None = None
+        free, span = max(track.width - knob.width, 1), max(high - low, 1e-300)
+        value = now
         if not why:
-            self._order.append(key)
             place = track.left + free * min(max((now - low) / span, 0.0), 1.0)
             pressed = self._pressed(track)
-            on_knob = pressed and place <= self.at[0] <= place + knob_wide
+            on_knob = pressed and place <= self.at[0] <= place + knob.width
             if pressed:
                 self.active, self._event = key, None
-                self._grabbed = self.at[0] - place if on_knob else knob_wide / 2
+                self._grabbed = self.at[0] - place if on_knob else knob.width / 2
             if (pressed and not on_knob) or (self.active == key and self._is(pygame.MOUSEMOTION)):
                 value = low + span * (self.at[0] - self._grabbed - track.left) / free
             elif by := {"left": -1, "down": -1, "right": 1, "up": 1}.get(self._key(key), 0):
                 value = now + by * (step or span / 50)
-        if value is not None:
+        if value != now:
             value = min(max(value, low), high)
             if step:
                 value = min(max(low + round((value - low) / step) * step, low), high)
-            value = value if value != now else None
-        shown = now if value is None else value
-        self._note("slider", key, track, "", shown, tip, why)
+        self._note("slider", key, track, "", value, "", why)
         if self._draws(rect):
-            self._draw_slider(key, track, min(max((shown - low) / span, 0.0), 1.0), why)
-        return value
-
-    def _draw_slider(self, key: str, track: Rect, part: float, why: str) -> None:
-        theme, groove = self.theme, track.inflate(0, -self.px(8))
-        half = groove.height // 2 / self.scale
-        self._round(groove, self._shade(0.18), radius=half)
-        filled = groove.copy()
-        filled.width = max(round(part * (track.width - self.px(_KNOB))) + self.px(_KNOB / 2), groove.height)
-        accent = self._shade(0.35) if why else theme.final
-        self._round(filled, mix(theme.panel, accent, 0.6), radius=half)
-        strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
-        knob = Rect(0, 0, self.px(_KNOB), self.px(14))
-        knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
-        self._round(knob, mix(accent, theme.ink, strength), radius=5)
-        self._ring(key, track)
+            part = min(max((value - low) / span, 0.0), 1.0)
+            groove = track.inflate(0, -self.px(8))
+            half = groove.height // 2 / self.scale
+            self._round(groove, self._shade(0.18), radius=half)
+            groove.width = max(round(part * (track.width - knob.width)) + self.px(6), groove.height)
+            accent = self._shade(0.35) if why else theme.final
+            self._round(groove, mix(theme.panel, accent, 0.6), radius=half)
+            strength = 0.3 if self.active == key else 0.2 if self._hovers(track) and not why else 0.0
+            knob.topleft = track.left + round(part * (track.width - knob.width)), track.top
+            self._round(knob, mix(accent, theme.ink, strength), radius=5)
+            self._ring(key, track)
+        return value if value != now else None
 
     def text_entry(
         self, key: str, text: str, *, ghost: str = "", tip: str = "", live: bool = False
@@ -681,9 +593,17 @@ class Ui:
         """Show a field; return its text after Enter, with `live` after each letter."""
         rect = self.cell()
         given: str | None = None
-        self._order.append(key)
         if self._pressed(rect):
-            self._press_field(key, text, rect)
+            self._event, now = None, perf_counter()
+            double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
+            self._clicked = now, key
+            if self.focus == key and self.edit is not None:
+                self.active = key
+                self.edit.place(self._caret_at(self.edit, rect))
+                if double:
+                    self.edit.select_word(self.edit.caret)
+            else:
+                self.focus, self.edit = key, TextEdit.of(text)
         edit = self.edit if self.focus == key else None
         if edit is not None:
             if self._is(pygame.MOUSEMOTION) and self.active == key:
@@ -704,23 +624,9 @@ class Ui:
             self._draw_field(rect, edit, shown, ghost)
         return given
 
-    def _press_field(self, key: str, text: str, rect: Rect) -> None:
-        self._event = None
-        now = perf_counter()
-        double = now - self._clicked[0] < DOUBLE and self._clicked[1] == key
-        self._clicked = now, key
-        if self.focus != key or self.edit is None:
-            self.focus, self.edit = key, TextEdit.of(text)
-            return
-        self.active = key
-        self.edit.place(self._caret_at(self.edit, rect))
-        if double:
-            self.edit.select_word(self.edit.caret)
-
     def _caret_at(self, edit: TextEdit, rect: Rect) -> int:
-        size = self.px(TEXT)
         x = self.at[0] - rect.left - self.px(6) + self._shifted(edit, rect)
-        widths = [text_width(edit.text[:k], size) for k in range(len(edit.text) + 1)]
+        widths = [text_width(edit.text[:k], self.px(TEXT)) for k in range(len(edit.text) + 1)]
         return min(range(len(widths)), key=lambda k: abs(widths[k] - x))
 
     def _shifted(self, edit: TextEdit, rect: Rect) -> int:
@@ -731,14 +637,12 @@ class Ui:
     def _draw_field(self, rect: Rect, edit: TextEdit | None, text: str, ghost: str) -> None:
         screen, theme, size = self.surface, self.theme, self.px(TEXT)
         assert screen is not None
-        stands_out = edit is not None or self._hovers(rect)
-        edge = theme.final if stands_out else self._shade(0.24)
+        edge = theme.final if edit is not None or self._hovers(rect) else self._shade(0.24)
         width = max(1, self.px(0.75)) if edit is None else max(2, self.px(1.25))
         self._round(rect, field_colour(theme), edge, width=width)
         inner = rect.inflate(-self.px(12), -self.px(4))
         if edit is None:
-            ink = theme.ink if text else theme.faint
-            self._write(text or ghost, inner, ink, TEXT)
+            self._write(text or ghost, inner, theme.ink if text else theme.faint, TEXT)
             return
         clip = screen.get_clip()
         screen.set_clip(inner.inflate(self.px(4), 0).clip(clip))
@@ -760,8 +664,6 @@ class Ui:
         screen.fill(theme.ink, (x, tall.top, max(1, self.px(1)), tall.height))
         screen.set_clip(clip)
 
-    # lists that drop down
-
     def dropdown(self, key: str, options: Sequence[str], now: str, *, tip: str = "") -> str | None:
         """Show a menu that drops down; return what was chosen of it, if that is another."""
         rect = self.cell()
@@ -770,11 +672,20 @@ class Ui:
             self.open_list = None
         opened = self._clicks("menu", key, rect, now, now, tip) or self._key(key) == "down"
         if opened and picked is None:
-            self._event = None
-            self._unfold(key, rect, list(options), now)
+            row = self.px(LIST_ROW)
+            high = min(len(options) * row + 2, self.px(LONGEST_LIST))
+            below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
+            place = Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
+            if below < high and above > below:
+                place.bottom = rect.top - self.px(2)
+            wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
+            place.width = min(max(wide, rect.width), self.box.width - self.px(16))
+            place.right = min(place.right, self.box.right - self.px(8))
+            self.open_list, self._open_key = _List(list(options), place, row), key
+            self.open_list.show(self.open_list.options.index(now) if now in options else 0)
+            self.focus, self.edit, self._event = key, None, None
         if self.surface is not None and self._draws(rect):
-            ink = self._face(rect, key, "")
-            words = rect.inflate(-self.px(18), 0)
+            ink, words = self._face(rect, key, ""), rect.inflate(-self.px(18), 0)
             words.width -= self.px(12)
             self._write(now, words, ink, TEXT)
             x, y, side = rect.right - self.px(13), rect.centery + self.px(1), self.px(4)
@@ -782,28 +693,12 @@ class Ui:
             pygame.draw.polygon(self.surface, ink, corners)
         return picked if picked != now else None
 
-    def _unfold(self, key: str, rect: Rect, options: list[str], now: str) -> None:
-        row = self.px(LIST_ROW)
-        high = min(len(options) * row + 2, self.px(LONGEST_LIST))
-        below, above = self.box.bottom - rect.bottom - self.px(8), rect.top - self.box.top - self.px(8)
-        place = Rect(rect.left, rect.bottom + self.px(2), rect.width, min(high, max(below, above)))
-        if below < high and above > below:
-            place.bottom = rect.top - self.px(2)
-        wide = max((text_width(each, self.px(TEXT)) for each in options), default=0) + self.px(34)
-        place.width = min(max(wide, rect.width), self.box.width - self.px(16))
-        place.right = min(place.right, self.box.right - self.px(8))
-        self.open_list, self._open_key = _List(options, place, row, 0), key
-        self.open_list.show(options.index(now) if now in options else 0)
-        self.focus, self.edit = key, None
-
     def _list_takes(self, event: pygame.event.Event) -> bool:
-        """Give an event to the open list; it takes all presses, and keys but the function keys."""
         found = self.open_list
         assert found is not None
         self.stale = True
         if event.type == pygame.MOUSEBUTTONDOWN:
-            k = found.at(event.pos)
-            if k is None:
+            if (k := found.at(event.pos)) is None:
                 self.stop_typing()
             else:
                 self._pick(found, k)
@@ -828,8 +723,7 @@ class Ui:
         return True
 
     def _pick(self, found: _List, k: int) -> None:
-        found.picked = found.options[k]
-        self.focus = None
+        found.picked, self.focus = found.options[k], None
         self.run(None, None)
         self.open_list = None
 
@@ -855,26 +749,22 @@ class Ui:
         screen.set_clip(None)
 
     def find(self, kind: str, key: str) -> Shown | None:
-        """Return a widget that is shown, None if there is none of that kind and key."""
         return self.shown.get(f"{kind}:{key}")
 
 
-class SidePanel(ABC):
+class SidePanel:
     """A panel beside the arena whose page is drawn anew when the layout, or what it shows, is different."""
 
     def __init__(self, tab: str) -> None:
         self.tab = tab  # the page that is open
         self.covered = False  # something else is drawn in its place, or takes the events
-        self.hidden = False
-        self.ui = Ui(self._page, LIGHT)
+        self.hidden, self.ui = False, Ui(self._page, LIGHT)
         self._drawn: object = None  # what the page showed when it was drawn
 
-    @abstractmethod
     def _page(self, ui: Ui) -> None:
         """Show it."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Fit another layout and theme."""
         self.hidden = not layout.panel[2]
         if self.hidden:
             self.ui.stop_typing()
@@ -883,10 +773,8 @@ class SidePanel(ABC):
         self.ui.box, self.ui.stale = Rect(layout.panel), True
 
     def draw(self, screen: Surface) -> None:
-        """Draw the panel and what hangs over it."""
         self.ui.draw(screen)
         self.ui.draw_over(screen)
 
     def take(self, event: pygame.event.Event) -> bool:
-        """Give an event to the widgets; return whether one of them took it."""
         return not self.covered and not self.hidden and self.ui.take(event)

@@ -4,7 +4,6 @@ import gc
 import os
 import sys
 import warnings
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import BytesIO
@@ -40,44 +39,38 @@ class Remote(Protocol):
         """Show what is in the window now."""
 
 
-class BaseWindow(ABC):
+class BaseWindow:
     """A window that is drawn while something moves, and otherwise only when something is different."""
 
     def __init__(self, size: tuple[int, int], screen: Surface | None = None) -> None:
         self.screen = screen or open_window(size)
         self.windowed: tuple[int, int] | None = None  # the size before full screen
         self.closed = False
+        self.inner: BaseWindow | None = None  # one that is shown in its place for a while
         self.remote: Remote | None = None
-        self.rate = float(FPS)
-        self._calm = 0.0
-        self._touched = False
+        self.rate, self._calm, self._touched = float(FPS), 0.0, False
         self._drawn: object = None
 
-    @abstractmethod
     def take(self, event: pygame.event.Event) -> None:
         """Take one event."""
 
-    @abstractmethod
     def update(self, seconds: float) -> None:
         """Let so many seconds pass."""
 
-    @abstractmethod
     def draw(self) -> None:
         """Draw everything, and show it."""
 
-    @abstractmethod
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
+        return None
 
-    @abstractmethod
     def close(self) -> None:
         """End what is going on beside the window."""
 
-    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:  # noqa: B027 - some have one look
+    def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
         """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
 
     def run(self) -> None:
-        """Go on until the window is closed."""
         clock, before = pygame.time.Clock(), perf_counter()
         try:
             with undisturbed():
@@ -86,8 +79,7 @@ class BaseWindow(ABC):
                     self.frame(now - before)
                     before = now
                     if self.remote is not None:
-                        pause = PAUSE if self.resting else 1.0 / FPS
-                        self.remote.wait(now + pause - perf_counter())
+                        self.remote.wait(now + (PAUSE if self.resting else 1.0 / FPS) - perf_counter())
                         continue
                     clock.tick(FPS)
                     # SDL's own way to wait for events looks for them a thousand times a second
@@ -98,25 +90,23 @@ class BaseWindow(ABC):
 
     @property
     def resting(self) -> bool:
-        """Whether nothing has moved or come for a while."""
         return self._calm >= CALM
 
     def frame(self, seconds: float) -> None:
-        """Take what has happened, let so many seconds pass, and draw what is different."""
         rested = self.resting
         self.advance(seconds)
         if self.closed:
             return
-        look = self.look()
+        shown = self.inner or self
+        look = shown.look()
         self._calm = 0.0 if self._touched or look is None else self._calm + seconds
         if not (rested and self.resting and look == self._drawn):
-            self.draw()
+            shown.draw()
         self._drawn = look
         if self.remote is not None:
             self.remote.send(self.screen)
 
     def advance(self, seconds: float) -> None:
-        """Take what has happened, and let so many seconds pass."""
         if self.remote is not None:
             self.remote.receive(self)
         events = pygame.event.get()
@@ -124,7 +114,7 @@ class BaseWindow(ABC):
         for event in events:
             if event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
                 self.screen = pygame.display.get_surface() or self.screen
-            self.take(event)
+            (self.inner or self).take(event)
         if self.closed:
             return
         if seconds > 0 and not self.resting:
@@ -132,7 +122,6 @@ class BaseWindow(ABC):
         self.update(seconds)
 
     def toggle_fullscreen(self) -> None:
-        """Fill the screen, or be a window again."""
         if self.remote is not None:  # it has the size of a page, which can do this by itself
             return
         # pygame's own toggle keeps the size: the window would stand in the middle of a black screen
@@ -141,7 +130,6 @@ class BaseWindow(ABC):
         self.screen = open_window(windowed) if windowed else pygame.display.set_mode((0, 0), full)
 
     def save_screenshot(self, folder: Path) -> str:
-        """Save what is in the window as a PNG in a folder; return words for it."""
         target, picture = free_name(folder, "robocov", ".png"), BytesIO()
         pygame.image.save(self.screen, picture, ".png")
         with written(target) as part:
@@ -182,13 +170,11 @@ def screen_scale() -> float:
 
 
 def fitting(size: tuple[int, int]) -> tuple[int, int]:
-    """Return the size, or what of it the desktop has room for."""
     wide, high = max(pygame.display.get_desktop_sizes(), default=size)
     return min(size[0], wide), min(size[1], high)
 
 
 def open_window(size: tuple[int, int]) -> Surface:
-    """Show a window of a size, or give the one that is there another; return its surface."""
     screen = pygame.display.set_mode(size, pygame.RESIZABLE)
     with suppress(AttributeError, pygame.error), warnings.catch_warnings():
         # pygame-ce has no other way yet to give a window of the display module a least size
@@ -198,7 +184,6 @@ def open_window(size: tuple[int, int]) -> Surface:
 
 
 def show_compiling(size: tuple[int, int]) -> None:
-    """Say on the window, or on a new one of a size, why nothing else is there yet."""
     with suppress(pygame.error):
         pygame.display.init()
         screen = pygame.display.get_surface() or open_window(size)

@@ -10,12 +10,12 @@ import importlib
 import os
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 import threading
 import time
 import traceback
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
@@ -24,10 +24,7 @@ from typing import IO, Any, BinaryIO, Generic, Protocol, TypeAlias, TypeVar
 from robocov.errors import RobocovError
 
 _Answer = TypeVar("_Answer")
-
 READY = "ready"  # first message of a process: its service is loaded
-
-_LENGTH = struct.Struct("<Q")
 _PIPE = 1 << 20
 _SET_DEATH_SIGNAL = 1
 
@@ -45,11 +42,9 @@ class Wire:
     """Translates between the window and one process; called on threads, in order, anew for each process."""
 
     def encode(self, question: Any) -> object:
-        """Return what the process is told."""
         return question
 
     def decode(self, answer: Any) -> Any:
-        """Return the answer for the window."""
         return answer
 
 
@@ -72,25 +67,31 @@ class LatestWorker(Generic[_Answer]):
 
     def __init__(self, service: str, doing: str, wire: type[Wire] = Wire, *, patience: float = inf) -> None:
         self.trouble = ""
+        self.process: subprocess.Popen[bytes] | None = (
+            None  # with a thread that writes to it and one that reads
+        )
         self._service, self._doing, self._wire, self._patience = service, doing, wire, patience
         self._since = 0.0
         self._number = self._answered = 0
-        self._talk: _Talk | None = None
+        self._ended = False
+        self._told: Reply | None = None
+        self._replies: deque[Reply] = deque(maxlen=1)
+        self._questions: deque[tuple[int, object]] = deque(maxlen=1)
+        self._asked = threading.Event()
+        self._threads: list[threading.Thread] = []
 
     @property
     def lives(self) -> bool:
-        """Whether there is a process."""
-        return self._talk is not None and not self._talk.ended
+        return self.process is not None and not self._ended
 
     @property
     def busy(self) -> bool:
-        """Whether the newest question is not answered yet."""
         return self._answered < self._number
 
     @property
     def progress(self) -> Any:
         """Progress of the newest question, as the service tells; None if it has not told yet."""
-        told = None if self._talk is None else self._talk.progress
+        told = self._told
         return told.answer if told is not None and told.number == self._number else None
 
     def put(self, question: object) -> None:
@@ -98,19 +99,24 @@ class LatestWorker(Generic[_Answer]):
         now = time.monotonic()
         if not self.busy:
             self._since = now
-        talk = self._talk
-        if talk is None or talk.ended or now - self._since > self._patience:
+        if not self.lives or now - self._since > self._patience:
             self.close()
             self._since = now
-            talk = self._talk = _Talk(self._service, self._wire())
+            self.process, self._ended = started(self._service), False
+            known = self.process, self._wire()
+            calls = self._write, self._read
+            self._threads = [threading.Thread(target=call, args=known, daemon=True) for call in calls]
+            for thread in self._threads:
+                thread.start()
         self._number += 1
-        talk.ask(self._number, question)
+        self._questions.append((self._number, question))
+        self._asked.set()
 
     def poll(self) -> _Answer | None:
         """Return the newest answer since the last call, once; while `busy`, it is to an older question."""
-        if self._talk is None:
+        if self.process is None:
             return None
-        ended, reply = self._talk.ended, self._talk.heard()
+        ended, reply = self._ended, self._replies.pop() if self._replies else None
         if reply is not None:
             self._answered, self.trouble, self._since = reply.number, reply.trouble, time.monotonic()
         if ended and self.busy:
@@ -119,18 +125,46 @@ class LatestWorker(Generic[_Answer]):
         return None if reply is None else reply.answer
 
     def close(self) -> None:
-        """End the process."""
-        if self._talk is not None:
-            self._talk.close()
-            self._talk = None
+        if self.process is not None:
+            process, self.process = self.process, None
+            self._asked.set()
+            process.kill()
+            process.wait()
+            for thread in self._threads:
+                thread.join()
+            self._questions.clear()
+            self._replies.clear()
+
+    def _write(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+        assert process.stdin is not None
+        # when the process has ended, reading says so
+        with suppress(OSError), process.stdin as stream:
+            while self._asked.wait() and self.process is process:
+                self._asked.clear()
+                if self._questions:
+                    number, question = self._questions.pop()
+                    send(stream, (number, wire.encode(question)))
+
+    def _read(self, process: subprocess.Popen[bytes], wire: Wire) -> None:
+        assert process.stdout is not None
+        try:
+            with process.stdout as stream:
+                receive(stream)  # READY
+                while (reply := receive(stream)) is not None:
+                    if not reply.final:
+                        self._told = reply
+                        continue
+                    if reply.answer is not None:
+                        reply = Reply(reply.number, wire.decode(reply.answer), reply.trouble)
+                    self._replies.append(reply)
+        finally:
+            self._ended = True
 
 
 class DirectWorker(Generic[_Answer]):
     """A service that answers in this process at once: for pictures without a display, and for tests."""
 
-    busy = False
-    lives = True
-    progress = None
+    busy, lives, progress = False, True, None
 
     def __init__(self, service: Service, wire: Wire | None = None) -> None:
         self._service, self._wire = service, wire or Wire()
@@ -138,15 +172,12 @@ class DirectWorker(Generic[_Answer]):
 
     @property
     def trouble(self) -> str:
-        """Why the last question has no answer, in words; empty if it has one."""
         return self._reply.trouble
 
     def put(self, question: object) -> None:
-        """Answer."""
         self._reply = reply_of(self._service, [(0, self._wire.encode(question))], Line())
 
     def poll(self) -> _Answer | None:
-        """Return the answer, once."""
         reply, self._reply = self._reply, Reply(0, None, self.trouble)
         answer: _Answer | None = None if reply.answer is None else self._wire.decode(reply.answer)
         return answer
@@ -156,82 +187,12 @@ class DirectWorker(Generic[_Answer]):
 
 
 Worker: TypeAlias = LatestWorker[_Answer] | DirectWorker[_Answer]
-"""Worker that answers a window's questions."""
-
-
-class _Talk:
-    """One process, with a thread that writes to it and one that reads."""
-
-    def __init__(self, service: str, wire: Wire) -> None:
-        self.process = started(service)
-        self.ended = False
-        self.progress: Reply | None = None
-        self._wire = wire
-        self._changed = threading.Condition()
-        self._closed = False
-        self._wanted: tuple[int, object] | None = None
-        self._reply: Reply | None = None
-        self._threads = [threading.Thread(target=call, daemon=True) for call in (self._write, self._read)]
-        for thread in self._threads:
-            thread.start()
-
-    def ask(self, number: int, question: object) -> None:
-        with self._changed:
-            self._wanted = number, question
-            self._changed.notify()
-
-    def heard(self) -> Reply | None:
-        with self._changed:
-            reply, self._reply = self._reply, None
-        return reply
-
-    def close(self) -> None:
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        self.process.kill()
-        self.process.wait()
-        for thread in self._threads:
-            thread.join()
-
-    def _write(self) -> None:
-        assert self.process.stdin is not None
-        # when the process has ended, reading says so
-        with suppress(OSError), self.process.stdin as stream:
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._closed or self._wanted is not None)
-                    wanted, self._wanted = self._wanted, None
-                    if self._closed or wanted is None:
-                        return
-                number, question = wanted
-                send(stream, (number, self._wire.encode(question)))
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        try:
-            with self.process.stdout as stream:
-                receive(stream)  # READY
-                while (reply := receive(stream)) is not None:
-                    if not reply.final:
-                        self.progress = reply
-                        continue
-                    if reply.answer is not None:
-                        reply = Reply(reply.number, self._wire.decode(reply.answer), reply.trouble)
-                    with self._changed:
-                        self._reply = reply
-        finally:
-            self.ended = True
-
-
-# the process
 
 
 class Line:
     """Channel of a service while it works: newer questions in, progress out."""
 
     def newer(self) -> list[Any]:
-        """Return the questions that have come since."""
         return []
 
     def tell(self, progress: object) -> None:
@@ -265,7 +226,6 @@ class _PipeLine(Line):
         return questions
 
     def listen(self) -> None:
-        """Take questions in; end the process when the parent's end of the pipe is closed."""
         while (question := receive(self._source)) is not None:
             with self._asked:
                 self._questions.append(question)
@@ -274,7 +234,6 @@ class _PipeLine(Line):
 
 
 def reply_of(service: Service, questions: list[tuple[int, Any]], line: Line) -> Reply:
-    """Return the reply of a service to numbered questions."""
     number = questions[-1][0]
     try:
         return Reply(number, service([question for _, question in questions], line))
@@ -293,7 +252,12 @@ def serve(service: str) -> None:
         faulthandler.enable()
     with suppress(OSError, AttributeError, TypeError):  # where the kernel can end it with its parent
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL)
-    line = _PipeLine(*own_streams())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    # code that is called reads nothing, and prints to stderr
+    source, target = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    line = _PipeLine(source, target)
     threading.Thread(target=line.listen, daemon=True).start()
     module, _, name = service.partition(":")
     answering = getattr(importlib.import_module(module), name)()
@@ -332,7 +296,6 @@ def asked(process: subprocess.Popen[bytes], question: object) -> Reply | None:
 
 
 def ended(process: subprocess.Popen[bytes]) -> int:
-    """Let a process end, which it does without its streams; return its status."""
     for stream in (process.stdin, process.stdout):
         assert stream is not None
         with suppress(OSError):
@@ -340,29 +303,14 @@ def ended(process: subprocess.Popen[bytes]) -> int:
     return process.wait()
 
 
-def own_streams() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes from and to the parent; code that is called reads nothing, and prints to stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    source, target = (os.fdopen(os.dup(fd), mode) for fd, mode in ((0, "rb"), (1, "wb")))
-    with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - it is no file
-        os.dup2(nothing.fileno(), 0)
-    os.dup2(2, 1)
-    return source, target  # type: ignore[return-value]
-
-
 def send(stream: IO[bytes], message: object) -> None:
-    """Write one message."""
-    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
-    stream.write(_LENGTH.pack(len(data)))
-    stream.write(data)
+    stream.write(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
     stream.flush()
 
 
 def receive(stream: IO[bytes]) -> Any:
     """Read one message; None at the end, also in the midst of one."""
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
+    try:
+        return pickle.load(stream)
+    except (EOFError, pickle.UnpicklingError):
         return None
-    (length,) = _LENGTH.unpack(head)
-    data = stream.read(length)
-    return pickle.loads(data) if len(data) == length else None

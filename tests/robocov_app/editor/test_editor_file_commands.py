@@ -106,6 +106,7 @@ def test_discarding_is_for_good_but_for_what_is_in_files(hands: Hands, tmp_path:
     hands.key("ctrl+n")
     hands.key("d")
     assert hands.shapes == [] and hands.editor.document.title == "Untitled"
+    assert hands.said.startswith("a new map: 10 x 10 m")
     assert recoverable(tmp_path / "drafts") == ()
 
 

@@ -52,7 +52,7 @@ def test_what_is_cut_off_is_hatched_and_told(tmp_path: Path) -> None:
         hands.turn("map")
         assert len(hands.editor.measurement.components) == 2
         assert not hands.editor.measurement.sealed.is_empty
-        words = [entry.text for entry in hands.window.canvas.strips._entries]
+        words = [entry.text for entry in hands.window.canvas.entries]
         assert "cut off" in words
 
 

@@ -104,7 +104,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     asked = question(plan, worker)
     for text in ("0", "0.", "0.1"):
         asked.set("cell", text)
-    process = worker._talk.process
+    process = worker.process
     waited(asked)
     assert free(asked) == pytest.approx(80 - 1)
     asked.keep_inside((15.0, 5.0))
@@ -112,7 +112,7 @@ def test_the_newest_settings_win_beside_the_window(plan: Path) -> None:
     waited(asked)
     taken = asked.poll()
     assert taken is not None and taken.environment.free_area == pytest.approx(56)
-    assert worker._talk.process is process
+    assert worker.process is process
     asked.cancelled()
     assert process.poll() is not None
 

@@ -72,11 +72,11 @@ def test_escape_in_the_middle_of_a_drag_leaves_all_as_it_was(hands: Hands) -> No
     before = hands.sketch
     hands.press(*hands.pixel((3, 3)))
     hands.go((4, 4), (5, 5), held=1)
-    assert hands.editor.pending is not None
+    assert hands.editor.preview[0] is not hands.sketch
     hands.key("escape")
     hands.go((6, 6), held=1)
     hands.release()
-    assert hands.sketch is before and hands.editor.pending is None
+    assert hands.sketch is before and hands.editor.preview[0] is hands.sketch
 
 
 def test_alt_drag_copies(hands: Hands) -> None:
@@ -231,7 +231,9 @@ def test_many_things_are_moved_as_a_picture_and_come_out_the_same(tmp_path: Path
         hands.select(0, 1)
         hands.press(*hands.pixel((3, 3)))
         hands.go((3.5, 3.2), (4, 3.5), held=1)
-        assert hands.editor.pending is None and hands.editor.selector.drag.offset == pytest.approx((1.0, 0.5))
+        assert hands.editor.preview[0] is hands.sketch and hands.editor.selector.drag.offset == pytest.approx(
+            (1.0, 0.5)
+        )
         hands.release()
         assert hands.shapes == [item.shape for item in wanted.obstacles]
 

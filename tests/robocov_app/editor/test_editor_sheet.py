@@ -27,6 +27,7 @@ from robocov_app.editor.canvas.map_layers import (
 from robocov_app.editor.edits import create, properties, transform
 from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.selection import Selection
+from robocov_app.editor.model.sketch import Sketch
 from robocov_app.render.camera import Camera
 from robocov_app.render.theme import DARK, LIGHT
 from robocov_app.toolkit.window import display
@@ -92,21 +93,34 @@ def test_patches_and_scrolling_give_the_same_page_as_drawing_anew(steps, dark: b
         assert (apart > 40).sum() <= 6, (kind, x, y)
 
 
+class Watched(Sheet):
+    """Tells what it has painted since it was asked last: all of it, or how many patches."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.boxes: list[pygame.Rect] = []
+
+    def _paint(self, page: pygame.Surface, view: View, *what) -> None:
+        self.boxes.append(what[-1])
+        super()._paint(page, view, *what)
+
+    def painted(self, at: View, sketch: Sketch) -> str | int:
+        self.boxes.clear()
+        self.page(at, sketch)
+        return "all" if self.boxes == [at.clip] else len(self.boxes)
+
+
 def test_only_what_changed_is_drawn_anew() -> None:
     sketch = sheet(*SHAPES)
-    page = Sheet()
-    page.page(view(), sketch)
-    assert (page.full, page.patched, page.scrolled) == (1, 0, 0)
-    page.page(view(), sketch)
+    page = Watched()
+    assert page.painted(view(), sketch) == "all"
+    assert page.painted(view(), sketch) == 0
     moved = transform.moved(sketch, Selection.of(1), 0.1, 0.0).sketch
-    page.page(view(), moved)
-    assert page.full == 1 and page.patched == 1
-    page.page(view((5.0 + 3 / 28.0, 5.0)), moved)
-    assert page.full == 1 and page.scrolled == 1
-    page.page(view(zoom=40.0), moved)
-    assert page.full == 2
-    page.page(view(zoom=40.0, theme=DARK), moved)
-    assert page.full == 3
+    assert page.painted(view(), moved) == 1
+    assert page.painted(view((5.0 + 3 / 28.0, 5.0)), moved) == 1
+    assert page.boxes[0].width == 3, "it was scrolled"
+    assert page.painted(view(zoom=40.0), moved) == "all"
+    assert page.painted(view(zoom=40.0, theme=DARK), moved) == "all"
 
 
 def test_what_is_lifted_is_not_on_the_page() -> None:
@@ -176,6 +190,7 @@ def test_a_picture_that_cannot_be_read_is_told_and_all_else_is_drawn(tmp_path: P
 
 
 def test_grid_lines_are_multiples_of_the_grid_and_far_enough_apart() -> None:
+    assert grid_steps(0.1, 60.0, 1.0) == (0.2, 1.0)
     for grid in (0.01, 0.1, 0.25, 1.0, 5.0):
         for zoom in (0.5, 3.0, 28.0, 400.0, 9000.0):
             fine, coarse = grid_steps(grid, zoom, 1.0)

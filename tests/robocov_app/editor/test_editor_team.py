@@ -6,7 +6,7 @@ import numpy as np
 from driven_editor import of_map, sheet
 
 from robocov.environment import PolygonObstacle
-from robocov_app.editor.ui.team import Team, TeamThread, placed
+from robocov_app.editor.ui.editor import Team, TeamThread, placed
 
 
 def test_the_team_stands_where_a_run_would_begin() -> None:
@@ -40,7 +40,7 @@ def test_only_the_newest_question_is_answered_and_the_same_one_once() -> None:
         answer = answered(thread)
         while answer.robots != 5:
             answer = answered(thread)
-        assert len(answer.places) == 5 and not thread.busy
+        assert len(answer.places) == 5 and thread._answer is None
         thread.ask(sketch, None, 5, 0, 0.1)
         time.sleep(0.05)
         assert thread.poll() is None

@@ -13,10 +13,11 @@ from robocov_app.editor.canvas import canvas
 from robocov_app.editor.edits.create import circle_drawn, polygon_drawn
 from robocov_app.editor.model.selection import Selection, Vertex
 from robocov_app.editor.model.sketch import Sketch
-from robocov_app.editor.ui.panel import TABS
+from robocov_app.editor.ui.panel import TABS, number
 from robocov_app.editor.ui.window import facts
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit import command as help_page
+from robocov_app.toolkit.command import Menu
 from robocov_app.toolkit.dialogs import Choice
 from robocov_app.toolkit.layout import SMALLEST
 
@@ -62,6 +63,10 @@ def test_the_map_page_takes_name_radius_and_team(hands: Hands) -> None:
     assert hands.editor.robots == 7
     hands.tick("show:robots")
     assert "robots" in hands.editor.shown
+
+
+def test_numbers_stand_in_fields_without_needless_zeros() -> None:
+    assert [number(value) for value in (2.0, 0.30004, -0.00001, None)] == ["2", "0.3", "0", ""]
 
 
 def test_the_object_page_takes_names_places_and_sizes(hands: Hands) -> None:
@@ -203,7 +208,7 @@ def test_wheel_and_right_button_zoom_and_pan(hands: Hands) -> None:
     center = hands.window.canvas.camera.center
     hands.drag((300, 300), (330, 310), (360, 320), button=3)
     moved = hands.window.canvas.camera.center
-    assert moved[0] < center[0] and hands.window.menu is None
+    assert moved[0] < center[0] and hands.editor.asked is None
     hands.key("f")
     assert hands.window.canvas.camera.zoom == pytest.approx(zoom)
 
@@ -240,30 +245,34 @@ def test_the_map_cannot_be_lost_from_sight(hands: Hands) -> None:
 
 def test_the_menu_offers_what_applies_and_does_it(hands: Hands) -> None:
     hands.click_at((3, 3), button=3)
-    menu = hands.window.menu
-    assert menu is not None and hands.editor.selection == Selection.of(0)
+    menu = hands.editor.asked
+    assert isinstance(menu, Menu) and hands.editor.selection == Selection.of(0)
     hands.window.draw()
     names = [action.name if action else "" for action in menu.commands]
     row = names.index("duplicate")
     hands.key("down", times=sum(1 for name in names[: row + 1] if name))
     hands.key("return")
-    assert len(hands.shapes) == 3 and hands.window.menu is None
+    assert len(hands.shapes) == 3 and hands.editor.asked is None
     hands.click_at((9.5, 5), button=3)
     hands.window.draw()
     assert not hands.editor.selection
-    assert "paste" in [action.name for action in hands.window.menu.commands if action]
-    hands.click(*hands.window.menu._ui.shown["option:select:all"].rect.center)
-    assert hands.window.menu is None and hands.editor.selection
+    assert "paste" in [action.name for action in hands.editor.asked.commands if action]
+    hands.click(*hands.window.dialogs._ui.shown["option:select:all"].rect.center)
+    assert hands.editor.asked is None and hands.editor.selection
     hands.click_at((3, 3), button=3)
     hands.key("escape")
-    assert hands.window.menu is None
+    assert hands.editor.asked is None
+    hands.click_at((3, 3), button=3)
+    hands.post(pygame.DROPFILE, file="nowhere.txt")
+    hands.settle()
+    assert hands.editor.asked is None and "nowhere.txt" in hands.said
 
 
 def test_a_right_click_ends_what_is_being_drawn(hands: Hands) -> None:
     hands.key("p")
     hands.click_all((5, 1), (6, 1), (6, 2))
     hands.click_at((6, 2), button=3)
-    assert len(hands.shapes) == 3 and hands.window.menu is None
+    assert len(hands.shapes) == 3 and hands.editor.asked is None
 
 
 # palette, help, look
@@ -359,13 +368,15 @@ def test_dragging_one_of_a_thousand_obstacles_does_not_draw_the_others_again(tmp
         spot = sketch.obstacles[500].geometry.representative_point()
         x, y = hands.pixel((spot.x, spot.y))
         hands.press(x, y)
-        full = sheet.full
+        paint, boxes = sheet._paint, []
+        sheet._paint = lambda *what: (boxes.append(what[-1]), paint(*what))  # type: ignore[method-assign]
         for k in range(20):
             at = round(x + 2 * k), round(y + k % 7)
             hands.post(pygame.MOUSEMOTION, pos=at, rel=(2, 0), buttons=(1, 0, 0))
             window.frame(1 / 60)
-        assert hands.editor.pending is not None
-        assert sheet.full == full
+        assert hands.editor.preview[0] is not hands.sketch
+        whole = window.canvas.camera.view[2] * window.canvas.camera.view[3]
+        assert boxes and all(box.width * box.height < whole / 10 for box in boxes)
 
 
 class NoReadings:

@@ -223,10 +223,12 @@ class Done:
 
 def test_keys_do_commands_once_and_tell_why_they_cannot_be_done() -> None:
     its = Done()
-    assert its.commands.press(key("space"))
-    its.commands.press(key("space"))  # held down
+    command = its.commands.of_key(key("space"))
+    assert command is not None and command.name == "pause"
+    assert its.commands.of_key(key("space")) is None, "it is held down"
     its.commands.release(key("space"))
-    its.commands.press(key("ctrl+z"))
+    its.commands.do("pause")
+    its.commands.do("undo")
     assert its.done == ["pause"] and its.said == ["nothing to undo"]
     assert its.commands["undo"].tip == "Undo (Ctrl Z)"
 
@@ -282,13 +284,13 @@ def test_files_are_found_in_folders(screen: pygame.Surface, tmp_path: Any) -> No
 def test_a_menu_at_the_cursor_stays_in_the_window_and_passes_over_what_cannot_be_done(
     screen: pygame.Surface,
 ) -> None:
-    its = Done()
-    menu = Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.do)
-    menu.draw(screen, LIGHT, 1.0)
-    assert menu._ui is not None and screen.get_rect().contains(menu._ui.box)
-    menu.take(key("down"))
-    menu.take(key("return"))
-    assert its.done == ["pause"] and not menu.open
+    its, dialogs = Done(), Dialogs()
+    dialogs.ask(Menu([its.commands["undo"], None, its.commands["pause"]], (310, 290), its.commands.do))
+    dialogs.draw(screen, LIGHT, 1.0)
+    assert dialogs._ui is not None and screen.get_rect().contains(dialogs._ui.box)
+    dialogs.take(key("down"))
+    dialogs.take(key("return"))
+    assert its.done == ["pause"] and not dialogs.open
 
 
 def test_a_command_that_is_typed_within_one_frame_is_done(tmp_path: Path) -> None:

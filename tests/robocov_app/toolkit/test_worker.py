@@ -58,7 +58,7 @@ def test_questions_are_answered_by_one_process(worker):
     assert answer_of(worker, 4) == 8
     assert (worker.poll(), worker.lives, worker.trouble) == (None, True, "")
     pid = answer_of(worker, "print")
-    assert pid == worker._talk.process.pid != os.getpid()
+    assert pid == worker.process.pid != os.getpid()
     assert answer_of(worker, "bad") is None
     assert worker.trouble == "bad: it is"
     assert answer_of(worker, None) is None
@@ -84,7 +84,7 @@ def test_how_far_it_is_and_that_there_is_a_newer_one(worker):
 def test_patience_ends_with_an_older_question():
     with closing(LatestWorker(SERVICE, "doubles", patience=0.0)) as worker:
         worker.put("sleep")
-        first = worker._talk.process
+        first = worker.process
         time.sleep(0.01)
         assert answer_of(worker, 3) == 6
         assert first.poll() is not None
@@ -97,7 +97,7 @@ def test_patience_ends_with_an_older_question():
 def test_a_process_that_dies_is_said_and_replaced(worker):
     assert answer_of(worker, 1) == 2
     worker.put("sleep")
-    worker._talk.process.kill()
+    worker.process.kill()
     assert until(lambda: worker.poll() or worker.trouble) == "the process that doubles has ended"
     assert not worker.busy and not worker.lives
     assert answer_of(worker, 2) == 4
@@ -183,7 +183,7 @@ worker.put(1)
 while worker.poll() is None:
     time.sleep(0.01)
 worker.put("sleep")
-print(worker._talk.process.pid, flush=True)
+print(worker.process.pid, flush=True)
 while True:  # a signal just before a sleep does not end it
     time.sleep(0.1)
 """

@@ -378,7 +378,7 @@ def test_a_process_that_dies_is_replaced(worker_costs):
     worker_costs.environment(HALL)
     worker_costs.ask(0, 1.0, PLACES)
     answered(worker_costs)
-    os.kill(worker_costs._worker._talk.process.pid, signal.SIGKILL)
+    os.kill(worker_costs._worker.process.pid, signal.SIGKILL)
     end = time.monotonic() + PATIENCE
     answers = []
     while not answers and time.monotonic() < end:

@@ -13,18 +13,16 @@ from robocov.environment import Point
 from robocov.errors import counted
 from robocov_app.editor.canvas import overlay
 from robocov_app.editor.canvas.map_layers import Sheet, View, beyond
-from robocov_app.editor.canvas.overlay import accent, legend_entries
+from robocov_app.editor.canvas.overlay import legend_entries
 from robocov_app.editor.edits.paths import goes, moving
 from robocov_app.editor.edits.transform import bounds_of
 from robocov_app.editor.model.geometry import distance
-from robocov_app.editor.model.measurement import Measurement
 from robocov_app.editor.model.selection import Change, Selection
-from robocov_app.editor.model.sketch import BOUNDARY, Item, Owner, Sketch
+from robocov_app.editor.model.sketch import BOUNDARY, Owner, Sketch
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.select import Moving
 from robocov_app.editor.tools.tool import KNOB, frame_of, handles
-from robocov_app.editor.ui.editor import Editor
-from robocov_app.editor.ui.team import Team
+from robocov_app.editor.ui.editor import Editor, Team
 from robocov_app.render import annotations, sprites
 from robocov_app.render.camera import Camera
 from robocov_app.render.canvas import Canvas, LegendEntry
@@ -35,73 +33,10 @@ from robocov_app.render.layout import fitted_radii
 from robocov_app.render.marks import READABLE
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Colour, Theme, mix
-from robocov_app.toolkit.layout import Box, Layout
-
-
-class Strips:
-    """Draws the strips, and says what they leave to the sheet."""
-
-    def __init__(self, editor: Editor) -> None:
-        self._editor = editor
-        self._entries: list[LegendEntry] = []
-        self._rows = 1
-        self._rows_for: object = None
-        self._unfree: Latest[bool] = Latest()
-        self._legend: Latest[Surface] = Latest()
-
-    def room(self, box: Box, scale: float) -> tuple[float, float, float, float]:
-        """Return what of a box is left: left, top, width and height, px."""
-        left, top, width, height = box
-        has_legend = "legend" in self._editor.shown
-        above = round((10 + annotations.LEGEND_ROW * self._rows) * scale) if has_legend else 0
-        below = max(height - above - round(annotations.STRIP * scale), 1)
-        return float(left), float(top + above), float(width), float(below)
-
-    def update(self, canvas: Canvas, team: Team | None) -> None:
-        """Look what there is to tell, on a canvas as wide as the sheet."""
-        editor = self._editor
-        self._entries = self._found(team)
-        rows = max(len(annotations.legend_rows(canvas, self._entries)), 1)
-        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
-        # while things come and go the legend does not become lower again: the map is not to jump
-        self._rows = max(rows, self._rows) if key == self._rows_for else rows
-        self._rows_for = key
-
-    def _found(self, team: Team | None) -> list[LegendEntry]:
-        sketch, shown = self._editor.sketch, self._editor.shown
-        if "legend" not in shown:
-            return []
-        unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
-        standing = "robots" in shown and team is not None and bool(team.places)
-        measurement = self._editor.measurement if "impassable" in shown else None
-        found = legend_entries(measurement, starts=bool(sketch.starts), team=standing, unfree=unfree)
-        density = sketch.density
-        if density is not None and not density.uniform and sketch.boundary:
-            x, y = zip(*sketch.boundary, strict=True)
-            span = value_range(density, (min(x), min(y), max(x), max(y)))
-            found.append(density_entry(range_label(span)))
-        return found
-
-    def draw(self, screen: Surface, canvas: Canvas, box: Box) -> None:
-        """Draw both strips."""
-        left, top, width, height = box
-        if self._entries:
-            key = (tuple(entry.text for entry in self._entries), width, canvas.theme.name, canvas.scale)
-            wide = replace(canvas, surface=Surface((width, 1)))
-            legend = self._legend.of(None, key, lambda: annotations.legend_strip(self._entries, wide))
-            screen.blit(legend, (left, top))
-        high = round(annotations.STRIP * canvas.scale)
-        foot = screen.subsurface(Rect(left, top + height - high, width, high))
-        own = replace(canvas, surface=foot)
-        annotations.draw_scale_bar(own)
-        taken = (annotations.EDGE + 90) * canvas.scale + annotations.bar_length(own) * canvas.camera.zoom
-        size = canvas.text_size(canvas.theme.text)
-        words = shortened(map_words(self._editor), size, width - taken - annotations.EDGE * canvas.scale)
-        own.text(words, (width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
+from robocov_app.toolkit.layout import Layout, inside
 
 
 def map_words(editor: Editor) -> str:
-    """Return what the strip below the sheet says: whose map it is, and what it is like."""
     sketch, measurement = editor.sketch, editor.measurement
     unsaved = "● " if editor.document.unsaved else ""
     said = [f"{unsaved}{editor.document.title}", counted(len(sketch.obstacles), "obstacle")]
@@ -117,7 +52,6 @@ REACH = 12.0  # pixels at scale 1 that a finger is wide
 MARGIN = 26.0  # pixels at scale 1 around the map when all of it is shown
 STAYS = 0.45  # part of the view by which the map can be moved out of its middle
 EMPTY = (0.0, 0.0, 10.0, 10.0)  # m; what is shown of a sheet with nothing on it
-
 _BLEND = pygame.BLEND_PREMULTIPLIED
 
 
@@ -125,69 +59,73 @@ class EditorCanvas:
     """Draws what is in the editor, and finds what is under the cursor."""
 
     def __init__(self, editor: Editor) -> None:
-        self.editor = editor
-        self.sheet = Sheet()
-        self.strips = Strips(editor)
+        self.editor, self.sheet = editor, Sheet()
+        self.entries: list[LegendEntry] = []  # of the legend
+        self._rows = 1
+        self._rows_for: object = None
+        self._unfree: Latest[bool] = Latest()
         self.team: Team | None = None
         self.hovered: Problem | None = None
         self.at: Point | None = None  # where the mouse is, px; None where it is elsewhere
-        self._camera: Camera | None = None
+        self.camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, 1.0, 1.0))
         self._hatched: Latest[tuple[Surface, Rect] | None] = Latest()
-        self._carried: Latest[Surface] = Latest()
-        self._outlined: Latest[Surface] = Latest()
-
-    # cameras
+        self._legend, self._carried, self._outlined = Latest[Surface](), Latest[Surface](), Latest[Surface]()
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Fit another layout or theme; what was zoomed or panned stays so."""
         self.layout, self.theme = layout, theme
-        if self._camera is not None:
-            self._camera = self._camera.within(self._view_box())
+        self._look(self.camera.within(self._view_box()))
 
     def _view_box(self) -> tuple[float, float, float, float]:
-        return self.strips.room(self.layout.arena, self.layout.scale)
+        """Return what the legend and the strip at the foot leave: left, top, width and height, px."""
+        (left, top, width, height), scale = self.layout.arena, self.layout.scale
+        has_legend = "legend" in self.editor.shown
+        above = round((10 + annotations.LEGEND_ROW * self._rows) * scale) if has_legend else 0
+        below = max(height - above - round(annotations.STRIP * scale), 1)
+        return float(left), float(top + above), float(width), float(below)
 
-    @property
-    def camera(self) -> Camera:
-        """The camera, from world coordinates to pixels."""
-        if self._camera is None:
-            self.fit()
-        assert self._camera is not None
-        return self._camera
-
-    def fit(self) -> None:
-        """Show the whole map."""
-        self._show(self._bounds)
-
-    def fit_selection(self) -> None:
-        """Show what is selected, or all."""
-        self._show(bounds_of(self.editor.sketch, self.editor.selection) or self._bounds)
+    def _update_legend(self, canvas: Canvas) -> None:
+        editor, sketch, density = self.editor, self.editor.sketch, self.editor.sketch.density
+        self.entries = []
+        if "legend" in editor.shown:
+            unfree = self._unfree.of(sketch.boundary, None, lambda: beyond(sketch).area > 1e-6)
+            standing = "robots" in editor.shown and self.team is not None and bool(self.team.places)
+            found = editor.measurement if "impassable" in editor.shown else None
+            self.entries = legend_entries(found, starts=bool(sketch.starts), team=standing, unfree=unfree)
+            if density is not None and not density.uniform and sketch.boundary:
+                x, y = zip(*sketch.boundary, strict=True)
+                span = value_range(density, (min(x), min(y), max(x), max(y)))
+                self.entries.append(density_entry(range_label(span)))
+        rows = max(len(annotations.legend_rows(canvas, self.entries)), 1)
+        key = (canvas.surface.get_width(), canvas.scale, editor.document, "legend" in editor.shown)
+        # while things come and go the legend does not become lower again: the map is not to jump
+        self._rows = max(rows, self._rows) if key == self._rows_for else rows
+        self._rows_for = key
 
     @property
     def _bounds(self) -> tuple[float, float, float, float]:
         return self.editor.sketch.bounds or EMPTY
 
-    def _show(self, bounds: tuple[float, float, float, float]) -> None:
-        low_x, low_y, high_x, high_y = bounds
-        least = 0.2
-        grow_x, grow_y = max(least - (high_x - low_x), 0) / 2, max(least - (high_y - low_y), 0) / 2
+    def fit(self, selection: Selection | None = None) -> None:
+        """Show what is selected, or the whole map."""
+        bounds = bounds_of(self.editor.sketch, selection) if selection else None
+        low_x, low_y, high_x, high_y = bounds or self._bounds
+        grow_x, grow_y = max(0.2 - (high_x - low_x), 0) / 2, max(0.2 - (high_y - low_y), 0) / 2  # m
         grown = (low_x - grow_x, low_y - grow_y, high_x + grow_x, high_y + grow_y)
         self._look(Camera.fit(grown, self._view_box(), MARGIN * self.layout.scale))
 
-    def go_to(self, problem: Problem) -> None:
-        """Bring a problem into sight."""
-        where = problem.where
-        if where is None or where.is_empty:
+    def go_to(self, problem: Problem | None) -> None:
+        if problem is None or problem.where is None or problem.where.is_empty:
             return
-        spot = where.representative_point()
+        spot = problem.where.representative_point()
         x, y = self.to_pixel((spot.x, spot.y))
-        left, top, width, height = self.camera.view
-        edge = 40 * self.layout.scale
-        if not (left + edge < x < left + width - edge and top + edge < y < top + height - edge):
+        edge = round(80 * self.layout.scale)
+        if not Rect(self.camera.view).inflate(-edge, -edge).collidepoint(x, y):
             self._look(replace(self.camera, center=(spot.x, spot.y)))
 
-    def zoom(self, factor: float, at: Point) -> None:
-        """Magnify what is under a pixel of the window."""
+    def zoom(self, factor: float, at: Point | None = None) -> None:
+        """Magnify what is under a pixel of the window: by default under the cursor, or in the middle."""
+        if at is None:
+            at = self.at if self.at is not None and self.over(self.at) else self.camera.middle
         low_x, low_y, high_x, high_y = self._bounds
         whole = max(high_x - low_x, high_y - low_y, 1.0)
         # neither a dot nor a single wall's paint
@@ -195,32 +133,24 @@ class EditorCanvas:
         self._look(self.camera.zoomed(factor, at))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move the sheet by so many pixels; the map stays within reach."""
         camera = self.camera.panned(dx, dy)
         low_x, low_y, high_x, high_y = self._bounds
         far_x, far_y = (STAYS * side / camera.zoom for side in camera.view[2:])
-        x = float(np.clip(camera.center[0], low_x - far_x, high_x + far_x))
-        y = float(np.clip(camera.center[1], low_y - far_y, high_y + far_y))
+        low, high = (low_x - far_x, low_y - far_y), (high_x + far_x, high_y + far_y)
+        x, y = np.clip(camera.center, low, high).tolist()
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
-        self._camera = camera
-        self.editor.pixel = self.layout.scale / camera.zoom
-
-    # what is where
+        self.camera, self.editor.pixel = camera, self.layout.scale / camera.zoom
 
     def over(self, pixel: Point) -> bool:
-        """Return whether a pixel of the window shows the sheet."""
-        left, top, width, height = self.camera.view
-        return left <= pixel[0] < left + width and top <= pixel[1] < top + height
+        return inside(self.camera.view, pixel)
 
     def to_world(self, pixel: Point) -> Point:
-        """Return the place under a pixel of the window, m."""
         x, y = self.camera.to_world(np.array(pixel, dtype=float)).tolist()
         return x, y
 
     def to_pixel(self, point: Point) -> Point:
-        """Return the pixel of the window where a place is."""
         x, y = self.camera.to_pixels(np.array(point)).tolist()
         return x, y
 
@@ -230,15 +160,9 @@ class EditorCanvas:
         return REACH * self.layout.scale / self.camera.zoom
 
     def problem_at(self, pixel: Point) -> Problem | None:
-        """Return the problem whose badge is under a pixel."""
-        if "problems" not in self.editor.shown:
-            return None
-        for problem, at in overlay.badge_places(self.editor.problems, self._view()):
-            if distance(at, pixel) < 10 * self.layout.scale:
-                return problem
-        return None
-
-    # drawing
+        found = self.editor.problems if "problems" in self.editor.shown else ()
+        places, reach = overlay.badge_places(found, self._view()), 10 * self.layout.scale
+        return next((problem for problem, at in places if distance(at, pixel) < reach), None)
 
     def _view(self) -> View:
         editor, layout = self.editor, self.layout
@@ -247,30 +171,29 @@ class EditorCanvas:
         return View(self.camera, self.theme, layout.scale, layout.size, shown, editor.grid, folder)
 
     def draw(self, screen: Surface) -> None:
-        """Draw all of it."""
         editor, shown, theme = self.editor, self.editor.shown, self.theme
         box = Rect(self.layout.arena)
-        self.strips.update(self._view().canvas(Surface((box.width, 1))), self.team)
-        if self.camera.view != self._view_box():
-            self._look(self.camera.within(self._view_box()))
+        self._update_legend(self._view().canvas(Surface((box.width, 1))))
+        self._look(self.camera.within(self._view_box()))
         view = self._view()
         base, (now, chosen) = editor.sketch, editor.preview
         moved = getattr(editor.tools["picture"], "moved", None)
-        weighed = getattr(editor.tool, "change", None)
-        drag = editor.selector.drag
+        weighed, drag = getattr(editor.tool, "change", None), editor.selector.drag
         carried = drag if isinstance(drag, Moving) and drag.offset is not None else None
-        lifted = _changed(base, now)
-        if carried is not None:
-            lifted = frozenset() if carried.copies else carried.moving.items
+        lifted: frozenset[int] = frozenset()
+        if carried is not None and not carried.copies:
+            lifted = carried.moving.items
+        elif carried is None and now is not base:  # those that are others by now, or gone
+            items = {item.key: item for item in now.obstacles}
+            lifted = frozenset(item.key for item in base.obstacles if items.get(item.key) is not item)
         under = now if now.boundary is not base.boundary else base
         if moved is not None:
             under = replace(under, background=moved)
         if isinstance(weighed, Change):
             under = replace(under, density=weighed.sketch.density)
-        page = self.sheet.page(view, under, lifted)
         screen.fill(theme.background, box)
         clip = view.clip
-        screen.blit(page, clip, clip)
+        screen.blit(self.sheet.page(view, under, lifted), clip, clip)
         screen.set_clip(clip)
         # words keep to the canvas
         canvas = view.canvas(screen.subsurface(box))
@@ -279,64 +202,73 @@ class EditorCanvas:
             self._carry(screen, view, carried)
         elif now is not base:
             there = [item for item in now.obstacles if item.key in lifted or item.key not in base.places]
-            self.sheet.draw_items(canvas, there, self._lifted_fill)
+            self.sheet.draw_items(canvas, there, mix(theme.obstacle, theme.final, 0.22))
         measurement = editor.measurement if "impassable" in shown else None
+        gap = measurement.gap if measurement is not None else None
         if measurement is not None:
-            self._hatch(screen, view, measurement)
-            if measurement.gap is not None:
-                overlay.draw_gap(canvas, measurement.gap, measurement.radius)
+            look = view.camera, theme.name, view.scale, view.size
+            patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
+            if patch is not None:
+                screen.blit(*patch, special_flags=_BLEND)
+        if measurement is not None and gap is not None:
+            overlay.draw_gap(canvas, gap, measurement.radius)
         self._draw_paths(canvas, weighed.sketch if isinstance(weighed, Change) else now)
         for k, (name, spec) in enumerate(now.starts):
             overlay.draw_start(canvas, spec, name, chosen=name in editor.selection.starts, first=k == 0)
         if self.team is not None and self.team.places and "robots" in shown:
             self._draw_team(canvas, self.team)
         if carried is None:
-            self._draw_selection(screen, view, canvas, now, chosen)
-        if measurement is not None and measurement.gap is not None:
+            self._draw_selection(view, canvas, now, chosen)
+        if measurement is not None and gap is not None:
             busy = editor.tool is not editor.selector or drag is not None
-            overlay.tag_gap(canvas, measurement.gap, measurement.radius, self.at if busy else None)
+            overlay.tag_gap(canvas, gap, measurement.radius, self.at if busy else None)
         if "problems" in shown:
             overlay.draw_problems(canvas, view, editor.problems, editor.problem, self.hovered)
-        self._draw_tool(canvas)
+        overlay.draw_guides(canvas, editor.tool.guides)
+        if (preview := editor.tool.preview(editor)) is not None:
+            overlay.draw_preview(canvas, preview, self.at)
+        if editor.typed:
+            overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
         screen.set_clip(None)
-        self.strips.draw(screen, canvas, self.layout.arena)
+        self._draw_strips(screen, canvas, box)
 
-    @property
-    def _lifted_fill(self) -> Colour:
-        return mix(self.theme.obstacle, accent(self.theme), 0.22)
-
-    def _hatch(self, screen: Surface, view: View, measurement: Measurement) -> None:
-        look = view.camera, view.theme.name, view.scale, view.size
-        patch = self._hatched.of(measurement, look, lambda: overlay.hatched(view, measurement))
-        if patch is not None:
-            screen.blit(*patch, special_flags=_BLEND)
+    def _draw_strips(self, screen: Surface, canvas: Canvas, box: Rect) -> None:
+        if self.entries:
+            key = (tuple(entry.text for entry in self.entries), box.width, canvas.theme.name, canvas.scale)
+            wide = replace(canvas, surface=Surface((box.width, 1)))
+            screen.blit(self._legend.of(None, key, lambda: annotations.legend_strip(self.entries, wide)), box)
+        high = round(annotations.STRIP * canvas.scale)
+        own = replace(canvas, surface=screen.subsurface(Rect(box.left, box.bottom - high, box.width, high)))
+        annotations.draw_scale_bar(own)
+        taken = (annotations.EDGE + 90) * canvas.scale + annotations.bar_length(own) * canvas.camera.zoom
+        size = canvas.text_size(canvas.theme.text)
+        words = shortened(map_words(self.editor), size, box.width - taken - annotations.EDGE * canvas.scale)
+        own.text(words, (box.width - annotations.EDGE * canvas.scale, high / 2), anchor="right")
 
     def _carry(self, screen: Surface, view: View, drag: Moving) -> None:
-        """Draw many things that are being moved: once, and then the picture of them."""
         assert drag.offset is not None
-        sketch, colour = self.editor.sketch, accent(self.theme)
+        sketch, colour = self.editor.sketch, self.theme.final
+        fill = mix(self.theme.obstacle, colour, 0.22)
 
         def drawn() -> Surface:
-            page = Surface(view.size, pygame.SRCALPHA, 32)
+            page = view.page()
             there = [item for item in sketch.obstacles if item.key in drag.moving.items]
-            self.sheet.draw_items(view.canvas(page), there, self._lifted_fill, colour)
+            self.sheet.draw_items(page, there, fill, colour)
             for owner in drag.moving.owners - drag.moving.items:
-                self._draw_owner(view.canvas(page), sketch, owner, colour, 2.0)
-            return page
+                self._draw_owner(page, sketch, owner, colour, 2.0)
+            return page.surface
 
         dx, dy = (view.camera.zoom * by for by in drag.offset)
         screen.blit(self._carried.of(drag, view.camera, drawn), (round(dx), round(-dy)), special_flags=_BLEND)
 
     def _draw_paths(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw the ways of obstacles that move, and while they are shown moving where they get to."""
         theme, since = canvas.theme, self.editor.moves_since
         for key in moving(sketch):
             item = sketch.item(key)
             path = item.shape.path
             assert path is not None
             chosen = key in self.editor.selection.items
-            colour = accent(theme) if chosen else mix(theme.background, theme.ink, 0.6)
-            overlay.draw_path(canvas, path, colour)
+            overlay.draw_path(canvas, path, theme.final if chosen else mix(theme.background, theme.ink, 0.6))
             if since is not None and goes(path):
                 shift = path.shift(self.editor.now - since)
                 moved = shapely.transform(item.geometry, lambda places, by=shift: places + by)
@@ -356,64 +288,39 @@ class EditorCanvas:
             rim = min(1.4 * scale, 0.3 * size)
             canvas.stamp(partial(sprites.disc, size, fill, theme.robot_ring, rim, edge, text), at)
 
-    def _draw_selection(
-        self, screen: Surface, view: View, canvas: Canvas, sketch: Sketch, selection: Selection
-    ) -> None:
-        editor, selector, colour = self.editor, self.editor.selector, accent(self.theme)
-        floor = self.theme.background
-        selection = selection.within(sketch)
+    def _draw_selection(self, view: View, canvas: Canvas, sketch: Sketch, selection: Selection) -> None:
+        editor, selector, colour = self.editor, self.editor.selector, self.theme.final
+        floor, selection = self.theme.background, selection.within(sketch)
         owners: set[Owner] = set(selection.owners) | {vertex.of for vertex in selection.vertices}
         hovered = selector.hovered if editor.tool is selector and not selector.busy and self.at else None
-        if hovered is not None and hovered not in owners:
+        if hovered is not None and hovered not in owners and Selection.of(hovered).within(sketch):
             self._draw_owner(canvas, sketch, hovered, mix(floor, colour, 0.7), 1.5)
 
-        def outline(canvas: Canvas) -> None:
+        def outline(on: Canvas) -> Surface:
             for owner in owners:
-                self._draw_owner(canvas, sketch, owner, colour, 2.0)
-
-        def outlined() -> Surface:
-            page = Surface(view.size, pygame.SRCALPHA, 32)
-            outline(view.canvas(page))
-            return page
+                self._draw_owner(on, sketch, owner, colour, 2.0)
+            return on.surface
 
         if len(owners) > MANY:
             look = (selection, view.camera, view.theme.name, view.scale)
-            screen.blit(self._outlined.of(sketch, look, outlined), (0, 0), special_flags=_BLEND)
+            page = self._outlined.of(sketch, look, lambda: outline(view.page()))
+            canvas.surface.blit(page, (0, 0), special_flags=_BLEND)
         else:
             outline(canvas)
         if "handles" not in editor.shown or editor.tool is not selector or not selection:
             return
-        box = frame_of(sketch, selection, editor.pixel)
-        if box is not None:
-            overlay.draw_box(canvas, box, mix(floor, colour, 0.6))
+        if (box := frame_of(sketch, selection, editor.pixel)) is not None:
+            rim = overlay.pixels(canvas, shapely.box(*box).exterior.coords).tolist()
+            overlay.dashed(canvas, rim, mix(floor, colour, 0.6), 3.0)
         found = editor.handles if sketch is editor.sketch else handles(sketch, selection, editor.pixel)
-        chosen = frozenset(selection.vertices)
-        overlay.draw_grips(canvas, found, chosen, selector.near, KNOB * canvas.scale)
+        overlay.draw_grips(canvas, found, selection.vertices, selector.near, KNOB * canvas.scale)
 
     def _draw_owner(self, canvas: Canvas, sketch: Sketch, owner: Owner, colour: Colour, width: float) -> None:
         if isinstance(owner, str):
-            if owner in dict(sketch.starts):
-                overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
+            overlay.draw_start(canvas, sketch.start(owner), "", chosen=True, dots=1.3)
         elif owner == BOUNDARY:
-            if sketch.boundary is not None:
-                ring = np.asarray(sketch.boundary, dtype=float)
-                overlay.draw_outline(canvas, [ring], colour, width + 0.5)
-        elif owner in sketch.places:
-            overlay.draw_outline(canvas, self.sheet.outlines.of(sketch.item(owner)).rings, colour, width)
-
-    def _draw_tool(self, canvas: Canvas) -> None:
-        editor = self.editor
-        overlay.draw_guides(canvas, editor.tool.guides)
-        preview = editor.tool.preview(editor)
-        if preview is not None:
-            overlay.draw_preview(canvas, preview, self.at)
-        if editor.typed:
-            overlay.draw_typed(canvas, editor.typed, self.at or Rect(self.camera.view).center)
-
-
-def _changed(base: Sketch, now: Sketch) -> frozenset[int]:
-    """Return the obstacles of a sketch that are others, or gone, in another."""
-    if now is base:
-        return frozenset()
-    there: dict[int, Item] = {item.key: item for item in now.obstacles}
-    return frozenset(item.key for item in base.obstacles if there.get(item.key) is not item)
+            ring = overlay.pixels(canvas, sketch.boundary or ())
+            canvas.outline(ring, colour, canvas.width(width + 0.5))
+        else:
+            for ring in self.sheet.outlines.of(sketch.item(owner)).rings:
+                canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))

@@ -3,16 +3,18 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pygame
 import shapely
+from PIL import Image, ImageOps
 from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
-from robocov_app.editor.canvas.reference_image import ReferenceImage
+from robocov_app.editor.model.background import Background
 from robocov_app.editor.model.sketch import Item, Sketch
 from robocov_app.render.camera import Camera, round_length
 from robocov_app.render.canvas import FAR, Canvas
@@ -36,7 +38,6 @@ class Outline:
 
     @cached_property
     def name_place(self) -> tuple[float, float, float, float]:
-        """The place with most room for a name: x, y, width, height, m."""
         return name_place(self.geometry)
 
 
@@ -62,7 +63,6 @@ def _cut(geometry: BaseGeometry, axis: int, at: float) -> Iterable[BaseGeometry]
 
 
 def outline_of(geometry: BaseGeometry) -> Outline:
-    """Return the outline of a geometry."""
     rings: list[Array] = []
     outer: list[bool] = []
     lines: list[Array] = []
@@ -83,24 +83,20 @@ class Outlines:
         self._bounds: Latest[Array] = Latest()
 
     def of(self, item: Item) -> Outline:
-        """Return the outline of an obstacle."""
         known = self._known.get(id(item))
         if known is None or known[0] is not item:
             known = self._known[id(item)] = (item, outline_of(item.geometry))
         return known[1]
 
-    def bounds(self, sketch: Sketch) -> Array:
-        """Return the bounds of all obstacles of a sketch, (n, 4) m, in their order."""
-        return self._bounds.of(sketch, None, lambda: self._all_bounds(sketch))
-
-    def _all_bounds(self, sketch: Sketch) -> Array:
-        if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
-            self._known = {}
-        return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
-
     def touching(self, sketch: Sketch, box: tuple[float, float, float, float]) -> list[Item]:
         """Return the obstacles whose bounds touch a box, m, in their order, but for hidden ones."""
-        low_x, low_y, high_x, high_y = self.bounds(sketch).T
+
+        def bounds() -> Array:
+            if len(self._known) > _FORGOTTEN * len(sketch.obstacles) + 1000:
+                self._known = {}
+            return np.array([self.of(item).bounds for item in sketch.obstacles]).reshape(-1, 4)
+
+        low_x, low_y, high_x, high_y = self._bounds.of(sketch, None, bounds).T
         there = (low_x <= box[2]) & (high_x >= box[0]) & (low_y <= box[3]) & (high_y >= box[1])
         return [sketch.obstacles[k] for k in np.flatnonzero(there) if not sketch.obstacles[k].hidden]
 
@@ -109,11 +105,12 @@ class Outlines:
 FINE, COARSE = 11.0, 55.0  # between the fine and the strong lines of the grid, at least
 _EDGE = 6  # around what changed that are drawn anew too
 _ROOM = 8.0  # that a name leaves free beside it
-
 BIAS = 1e-4  # pixels by which all is shifted: round numbers would else lie between two, and fall anyhow
 PATCHES = 0.5  # part of the page from which on it is drawn anew as a whole
 LEAST_LETTERS = 6  # of a shortened name
 SEEN_THROUGH = 0.62  # opacity of obstacles over a picture
+LARGEST = 4096  # pixels of a side that are kept of a larger picture
+_LARGEST_SHOWN = 8192  # of a side of what is made of it at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,27 +127,93 @@ class View:
 
     @property
     def clip(self) -> Rect:
-        """The pixels that show the world."""
         left, top, width, height = (round(value) for value in self.camera.view)
         return Rect(left, top, width, height)
 
     def canvas(self, surface: Surface) -> Canvas:
-        """Return a canvas for a surface."""
         return Canvas(surface, self.camera, self.theme, self.scale, robot_hues(0))
+
+    def page(self) -> Canvas:
+        """Return a clear canvas as large as the window."""
+        return self.canvas(Surface(self.size, pygame.SRCALPHA, 32))
 
 
 def outside_colour(theme: Theme) -> Colour:
-    """Return the colour of what lies outside the boundary."""
     return mix(theme.panel, theme.ink, 0.05) if theme is LIGHT else mix(theme.background, (0, 0, 0), 0.28)
+
+
+class ReferenceImage:
+    """Keeps the picture that was loaded last, and draws it."""
+
+    def __init__(self) -> None:
+        self._of: Path | None = None
+        self._picture: Surface | None = None
+        self._shrunk, self.trouble = 1.0, ""
+
+    def draw(self, page: Surface, background: Background, folder: Path, camera: Camera, clip: Rect) -> None:
+        """Draw the picture on a page; `folder` is where its path counts from."""
+        self._load(folder / background.path)
+        picture = self._picture
+        if picture is None or not background.shown or background.opacity <= 0.0:
+            return
+        factor = background.scale * camera.zoom * self._shrunk
+        if background.turn % 360.0:
+            if factor * max(picture.get_size()) > _LARGEST_SHOWN:
+                return
+            shown = pygame.transform.rotozoom(picture.convert_alpha(), background.turn, factor)
+            corners = camera.to_pixels(np.array(background.corners))
+            x, y = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+            at = shown.get_rect(center=(round(x), round(y)))
+        else:  # the part that can be seen: magnified, the whole may be huge
+            left, top = camera.to_pixels(np.array(background.corners[3])).tolist()
+            width, height = picture.get_size()
+            first_x = max(int((clip.left - left) / factor) - 1, 0)
+            first_y = max(int((clip.top - top) / factor) - 1, 0)
+            last_x = min(int((clip.right - left) / factor) + 2, width)
+            last_y = min(int((clip.bottom - top) / factor) + 2, height)
+            at = Rect(round(left + first_x * factor), round(top + first_y * factor), 0, 0)
+            to_x, to_y = round(left + last_x * factor), round(top + last_y * factor)
+            size = max(to_x - at.x, 1), max(to_y - at.y, 1)
+            if last_x <= first_x or last_y <= first_y or max(size) > _LARGEST_SHOWN:
+                return
+            part = picture.subsurface((first_x, first_y, last_x - first_x, last_y - first_y))
+            shown = (pygame.transform.smoothscale if factor < 4.0 else pygame.transform.scale)(part, size)
+        shown.set_alpha(round(255 * background.opacity))
+        page.blit(shown, at)
+
+    def _load(self, path: Path) -> None:
+        if path == self._of:
+            return
+        self._of, self._picture, self.trouble = path, None, ""
+        try:
+            with Image.open(path) as opened:
+                full = ImageOps.exif_transpose(opened)
+                width, rgb = full.size[0], _on_white(full)
+        except Exception as error:  # whatever a broken picture makes its decoder raise
+            self.trouble = f"the picture {path.name} cannot be shown: {error}"
+            return
+        rgb.thumbnail((LARGEST, LARGEST))
+        self._shrunk = width / rgb.size[0]
+        self._picture = pygame.image.frombytes(rgb.tobytes(), rgb.size, "RGB").convert()
+
+
+def _on_white(picture: Image.Image) -> Image.Image:
+    if picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info:
+        clear = picture.convert("RGBA")
+        page = Image.new("RGBA", clear.size, (255, 255, 255, 255))
+        return Image.alpha_composite(page, clear).convert("RGB")
+    if picture.mode.startswith("I") or picture.mode == "F":
+        values = np.asarray(picture, dtype=float)
+        grey = (values - values.min()) * (255.0 / max(float(np.ptp(values)), 1e-9))
+        return Image.fromarray(grey.astype(np.uint8)).convert("RGB")
+    return picture.convert("RGB")
 
 
 class Sheet:
     """Draws the page, and keeps it."""
 
     def __init__(self) -> None:
-        self.outlines = Outlines()
-        self.underlaid = ReferenceImage()
-        self.full = self.patched = self.scrolled = 0  # how often it was drawn whole, in part, and moved
+        self.outlines, self.underlaid = Outlines(), ReferenceImage()
         self._page: Surface | None = None
         self._look: object = None
         self._camera: Camera | None = None
@@ -167,50 +230,44 @@ class Sheet:
             *(sketch.boundary, sketch.density),
         )
         items = {i.key: i for i in sketch.obstacles if i.key not in lifted and not i.hidden}
-        page = self._page
-        if page is None or look != self._look or self._camera is None:
-            return self._all(view, sketch, items, look)
-        boxes: list[Rect] = []
-        if view.camera.center != self._camera.center:
-            moved = self._scroll(page, view)
-            if moved is None:
-                return self._all(view, sketch, items, look)
-            boxes += moved
-        drawn, self._drawn = self._drawn, items
-        boxes += [self._box(view, item) for key, item in drawn.items() if items.get(key) is not item]
-        boxes += [self._box(view, item) for key, item in items.items() if drawn.get(key) is not item]
-        boxes = [box for box in (each.clip(view.clip) for each in boxes) if box.width and box.height]
-        whole = view.clip
-        if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
-            return self._all(view, sketch, items, look)
-        for box in _merged(boxes):
-            self._paint(page, view, sketch, items, box)
-            self.patched += 1
-        return page
-
-    def _all(self, view: View, sketch: Sketch, items: dict[int, Item], look: object) -> Surface:
+        boxes = self._boxes(view, items) if look == self._look else None
         if self._page is None or self._page.get_size() != view.size:
             self._page = Surface(view.size, 0, 32)
         self._look, self._camera, self._drawn = look, view.camera, items
-        self._paint(self._page, view, sketch, items, view.clip)
-        self.full += 1
+        for box in boxes if boxes is not None else [view.clip]:
+            self._paint(self._page, view, sketch, items, box)
         return self._page
 
-    def _scroll(self, page: Surface, view: View) -> list[Rect] | None:
+    def _boxes(self, view: View, items: dict[int, Item]) -> list[Rect] | None:
+        """Return what is to be painted anew, after the page was moved with the camera; None where all is."""
+        boxes: list[Rect] = []
+        if self._camera is not None and view.camera.center != self._camera.center:
+            if (moved := self._scroll(self._camera, view)) is None:
+                return None
+            boxes += moved
+        changed = [item for key, item in self._drawn.items() if items.get(key) is not item]
+        changed += [item for key, item in items.items() if self._drawn.get(key) is not item]
+        edge = 2 * round(_EDGE * view.scale)
+        bounds = [self.outlines.of(item).bounds for item in changed]
+        boxes += [pixel_box(view.camera, b).inflate(edge, edge) for b in bounds if np.isfinite(b[0])]
+        whole = view.clip
+        boxes = [box for box in (each.clip(whole) for each in boxes) if box]
+        if sum(box.width * box.height for box in boxes) > PATCHES * whole.width * whole.height:
+            return None
+        return _merged(boxes)
+
+    def _scroll(self, camera: Camera, view: View) -> list[Rect] | None:
         """Move the page with the camera; return what came into sight, None where it cannot be moved."""
-        assert self._camera is not None
-        before = self._camera.to_pixels(np.array(view.camera.center))
-        dx, dy = (np.array(view.camera.middle) - before).tolist()
+        dx, dy = (np.array(view.camera.middle) - camera.to_pixels(np.array(view.camera.center))).tolist()
         whole_x, whole_y = round(dx), round(dy)
         clip = view.clip
         far = abs(whole_x) >= clip.width / 2 or abs(whole_y) >= clip.height / 2
         if far or abs(dx - whole_x) > 0.02 or abs(dy - whole_y) > 0.02:
             return None
-        self._camera = view.camera
-        self.scrolled += 1
-        page.set_clip(clip)
-        page.scroll(whole_x, whole_y)
-        page.set_clip(None)
+        assert self._page is not None
+        self._page.set_clip(clip)
+        self._page.scroll(whole_x, whole_y)
+        self._page.set_clip(None)
         boxes = []
         if whole_x:
             left = clip.left if whole_x > 0 else clip.right + whole_x
@@ -221,18 +278,6 @@ class Sheet:
             left = clip.left + max(whole_x, 0)
             boxes.append(Rect(left, top, clip.width - abs(whole_x), abs(whole_y)))
         return boxes
-
-    def _box(self, view: View, item: Item) -> Rect:
-        low_x, low_y, high_x, high_y = self.outlines.of(item).bounds.tolist()
-        if not np.isfinite(low_x):
-            return Rect(0, 0, 0, 0)
-        ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-        (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
-        edge = round(_EDGE * view.scale)
-        box = Rect(int(left), int(top), int(right - left) + 2, int(bottom - top) + 2)
-        return box.inflate(2 * edge, 2 * edge)
-
-    # painting
 
     def _paint(self, page: Surface, view: View, sketch: Sketch, items: dict[int, Item], box: Rect) -> None:
         page.set_clip(box)
@@ -250,9 +295,15 @@ class Sheet:
         density = sketch.density
         if density is not None and not density.uniform and sketch.boundary is not None and ring is not None:
             draw_shading(canvas, density, np.asarray(sketch.boundary, dtype=float))
-        self._draw_beyond(canvas, sketch)
-        corners = np.array([box.bottomleft, box.topright], dtype=float)
-        (low_x, low_y), (high_x, high_y) = camera.to_world(corners).tolist()
+        # what robots take for free although it lies outside the boundary: it is in their hull
+        fill = mix(outside_colour(theme), theme.obstacle, 0.55)
+        for part in shapely.get_parts(self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))):
+            if isinstance(part, shapely.Polygon):
+                corners = camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
+                canvas.polygon(corners, fill)
+                canvas.outline(corners, mix(fill, theme.obstacle_edge, 0.5), 1)
+        ends = np.array([box.bottomleft, box.topright], dtype=float)
+        (low_x, low_y), (high_x, high_y) = camera.to_world(ends).tolist()
         edge = _EDGE * view.scale / camera.zoom
         wanted = (low_x - edge, low_y - edge, high_x + edge, high_y + edge)
         there = [item for item in self.outlines.touching(sketch, wanted) if items.get(item.key) is item]
@@ -261,7 +312,7 @@ class Sheet:
         else:
             over = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = camera.within((camera.view[0] - box.x, camera.view[1] - box.y, *camera.view[2:]))
-            self.draw_items(Canvas(over, shifted, theme, view.scale, robot_hues(0)), there)
+            self.draw_items(replace(canvas, surface=over, camera=shifted), there)
             over.set_alpha(round(255 * SEEN_THROUGH))
             page.blit(over, box)
         if ring is not None:
@@ -271,12 +322,9 @@ class Sheet:
         page.set_clip(None)
 
     def _grid(self, page: Surface, view: View, box: Rect, *, fine: bool) -> None:
-        """Draw the grid: lines where it snaps if they are far enough apart, strong ones at round places."""
-        zoom, theme = view.camera.zoom, view.theme
-        close, wide = grid_steps(view.grid, zoom, view.scale)
-        floor = theme.background
-        parts = (0.32, 0.75) if theme is LIGHT else (0.2, 0.5)
-        soft, strong = (mix(floor, theme.grid, part) for part in parts)
+        theme, parts = view.theme, (0.32, 0.75) if view.theme is LIGHT else (0.2, 0.5)
+        close, wide = grid_steps(view.grid, view.camera.zoom, view.scale)
+        soft, strong = (mix(theme.background, theme.grid, part) for part in parts)
         low_x, low_y, high_x, high_y = view.camera.visible()
         width = max(1, round(view.scale))
         for step, colour in ((close, soft), (wide, strong))[0 if fine else 1 :]:
@@ -289,32 +337,24 @@ class Sheet:
             for y in rows[(rows >= box.top - 2) & (rows <= box.bottom + 2)].tolist():
                 page.fill(colour, Rect(box.left, round(y - width / 2), box.width, width))
 
-    def _draw_beyond(self, canvas: Canvas, sketch: Sketch) -> None:
-        """Draw what robots take for free although it lies outside the boundary: it is in their hull."""
-        geometry = self._beyond.of(sketch.boundary, None, lambda: beyond(sketch))
-        fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
-        for part in shapely.get_parts(geometry):
-            if isinstance(part, shapely.Polygon):
-                corners = canvas.camera.to_pixels(np.asarray(part.exterior.coords)[:-1])
-                canvas.polygon(corners, fill)
-                canvas.outline(corners, mix(fill, canvas.theme.obstacle_edge, 0.5), 1)
-
     def draw_items(
         self, canvas: Canvas, items: list[Item], fill: Colour | None = None, edge: Colour | None = None
     ) -> None:
-        """Draw obstacles: first what they cover, then their edges, so that each can be told apart."""
         fill, edge = fill or canvas.theme.obstacle, edge or canvas.theme.obstacle_edge
         plain = [self.outlines.of(item) for item in items]
-        rings = [ring for each in plain if all(each.outer) for ring in each.rings]
-        if rings:
-            corners, ends = _joined(canvas, rings)
-            canvas.polygons(corners, ends, [fill] * len(ends))
-        for each in plain:
-            if not all(each.outer):
-                _draw_holed(canvas, each, fill)
-        rings = [ring for each in plain for ring in each.rings]
-        if rings:
-            corners, ends = _joined(canvas, rings)
+        if rings := [ring for each in plain for ring in each.rings]:
+            ends: list[int] = np.cumsum([len(ring) for ring in rings]).tolist()
+            corners = canvas.camera.to_pixels(np.concatenate(rings))
+            fills = [fill if all(each.outer) else None for each in plain for _ in each.rings]
+            canvas.polygons(corners, ends, fills)
+            clip = canvas.surface.get_clip()
+            for each in (each for each in plain if not all(each.outer)):
+                # on a page of its own, so that what lies below shows in the holes
+                own = replace(canvas, surface=Surface(clip.size, pygame.SRCALPHA, 32))
+                for ring, outer in zip(each.rings, each.outer, strict=True):
+                    inside = canvas.camera.to_pixels(ring) - np.array(clip.topleft)
+                    own.polygon(inside, (*fill, 255) if outer else (0, 0, 0, 0))
+                canvas.surface.blit(own.surface, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
             _draw_rings(canvas, corners, ends, edge)
         for each in plain:
             for line in each.lines:
@@ -326,19 +366,23 @@ class Sheet:
         size = canvas.text_size(canvas.theme.small_text)
         colour = mix(canvas.theme.obstacle, canvas.theme.ink, 0.9)
         for item in items:
-            name = item.shape.name
-            if not name:
-                continue
-            outline = self.outlines.of(item)
+            name, outline, zoom = item.shape.name, self.outlines.of(item), canvas.camera.zoom
             low_x, low_y, high_x, high_y = outline.bounds.tolist()
-            zoom = canvas.camera.zoom
-            if (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
+            if not name or (high_y - low_y) * zoom < size + 4 or (high_x - low_x) * zoom < 3 * size:
                 continue
             x, y, room, high = outline.name_place
             words = shortened(name, size, room * zoom - _ROOM * canvas.scale)
             if high * zoom > size + 2 and (words == name or len(words) > LEAST_LETTERS):
                 at = canvas.camera.to_pixels(np.array([x, y])).tolist()
                 canvas.text(words, at, size=canvas.theme.small_text, colour=colour, anchor="middle")
+
+
+def pixel_box(camera: Camera, bounds: Iterable[float]) -> Rect:
+    """Return the pixels that bounds, m, cover, and one or two around them."""
+    low_x, low_y, high_x, high_y = bounds
+    ends = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+    (left, top), (right, bottom) = np.clip(ends, -30000, 30000).tolist()
+    return Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
 
 
 def beyond(sketch: Sketch) -> shapely.Geometry:
@@ -348,13 +392,8 @@ def beyond(sketch: Sketch) -> shapely.Geometry:
 
 
 def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
-    """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear.
-
-    >>> grid_steps(0.1, 60.0, 1.0)
-    (0.2, 1.0)
-    """
-    least = FINE * scale / zoom
-    fine = grid
+    """Return the distances of fine and strong lines, m: multiples of the grid, no closer than is clear."""
+    least, fine = FINE * scale / zoom, grid
     if fine < least:
         times = round_length(least / grid)
         fine = grid * (times if times >= least / grid else round_length(2.5001 * times))
@@ -363,19 +402,13 @@ def grid_steps(grid: float, zoom: float, scale: float) -> tuple[float, float]:
     return float(f"{fine:.12g}"), float(f"{coarse:.12g}")
 
 
-def _joined(canvas: Canvas, rings: list[Array]) -> tuple[Array, list[int]]:
-    ends = np.cumsum([len(ring) for ring in rings]).tolist()
-    return canvas.camera.to_pixels(np.concatenate(rings)), ends
-
-
 def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour) -> None:
     width = canvas.width(canvas.theme.line)
     if width == 1 and (not len(corners) or np.abs(corners).max() <= FAR):
-        points, begin = corners.tolist(), 0
-        for end in ends:
+        points = corners.tolist()
+        for begin, end in pairwise((0, *ends)):
             if end - begin > 1:
                 pygame.draw.aalines(canvas.surface, colour, True, points[begin:end])
-            begin = end
         return
     following = np.arange(1, len(corners) + 1)
     following[np.array(ends) - 1] = [0, *ends[:-1]]
@@ -386,17 +419,6 @@ def _draw_rings(canvas: Canvas, corners: Array, ends: list[int], colour: Colour)
     seen = (high[:, 0] >= clip.left - 2) & (low[:, 0] <= clip.right + 2)
     seen &= (high[:, 1] >= clip.top - 2) & (low[:, 1] <= clip.bottom + 2)
     canvas.segments(edges[seen], colour, width)
-
-
-def _draw_holed(canvas: Canvas, outline: Outline, fill: Colour) -> None:
-    """Draw an obstacle with holes on a page of its own, so that what lies below shows in them."""
-    clip = canvas.surface.get_clip()
-    page = Surface(clip.size, pygame.SRCALPHA, 32)
-    shift = np.array(clip.topleft, dtype=float)
-    own = Canvas(page, canvas.camera, canvas.theme, canvas.scale, canvas.hues)
-    for ring, outer in zip(outline.rings, outline.outer, strict=True):
-        own.polygon(canvas.camera.to_pixels(ring) - shift, (*fill, 255) if outer else (0, 0, 0, 0))
-    canvas.surface.blit(page, clip, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _merged(boxes: list[Rect]) -> list[Rect]:

@@ -1,6 +1,6 @@
 """Overlay of the sheet: selection and its handles, guides, what is drawn; what validation found."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -12,35 +12,31 @@ from shapely.geometry.base import BaseGeometry
 
 from robocov.arrays import Array
 from robocov.environment import DiscStart, Gap, ObstaclePath, Point, PointsStart, StartSpec
-from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour
+from robocov_app.editor.canvas.map_layers import View, outline_of, outside_colour, pixel_box
 from robocov_app.editor.model.geometry import distance, length_words
 from robocov_app.editor.model.measurement import Measurement
+from robocov_app.editor.model.selection import Vertex
 from robocov_app.editor.model.validation import Problem
 from robocov_app.editor.tools.snapping import Guide
 from robocov_app.editor.tools.tool import Handle, Preview
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, bounded
+from robocov_app.render.canvas import Canvas, Glyph, LegendEntry
+from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.overlay import tag
 
 # pixels at scale 1
 SQUARE = 3.5  # half the side of a handle
-MOST_RADIUS = 300.0  # up to which circles are sprites
+MOST_RADIUS = 300.0  # up to which circles are sprites, which are smoother than many short lines
 HATCH = 7  # from one slanted line to the next
 BADGE = 8.0  # radius of a problem's badge
 STEM = 17.0  # that it is above its place
-
 MOST_LENGTHS = 40  # edges of what is drawn whose lengths are told
 MOST_BADGES = 200
-
-
-def accent(theme: Theme) -> Colour:
-    """Return the colour of what is selected."""
-    return theme.final
+SEALED = "repulsion_robots"  # the force with the colour of what no robot comes to from the largest part
 
 
 def problem_colour(theme: Theme, *, grave: bool) -> Colour:
-    """Return the colour of a problem."""
     return theme.trajectory if grave else theme.others[1]
 
 
@@ -54,12 +50,7 @@ def _ring(canvas: Canvas, at: Point, radius: float, colour: Colour, width: float
 
 
 def _disc(
-    canvas: Canvas,
-    at: Point,
-    radius: float,
-    colours: tuple[Colour, Colour, Colour],
-    width: float,
-    text: str = "",
+    canvas: Canvas, at: Point, radius: float, colours: Sequence[Colour], width: float, text: str = ""
 ) -> None:
     """Draw a disc: colours of its inside, of the ring around it, of what is around that."""
     fill, ring, edge = colours
@@ -67,34 +58,17 @@ def _disc(
     canvas.stamp(partial(sprites.disc, radius * canvas.scale, fill, ring, width, edge, text), at)
 
 
-def _tag(canvas: Canvas, words: str, at: Point) -> None:
-    tag(canvas.surface, words, at, canvas.theme, canvas.scale)
-
-
-# what is selected
-
-
-def draw_outline(canvas: Canvas, rings: Iterable[Array], colour: Colour, width: float = 2.0) -> None:
-    """Draw the rings of something, (k, 2) m each."""
-    for ring in rings:
-        canvas.outline(canvas.camera.to_pixels(ring), colour, canvas.width(width))
-
-
-def draw_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Colour) -> None:
-    """Draw a dashed box, m."""
-    low_x, low_y, high_x, high_y = box
-    ring = ((low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y), (low_x, low_y))
-    for a, b in pairwise(pixels(canvas, ring).tolist()):
-        canvas.dashes(a, b, colour, canvas.width(1.0), dash=3.0)
+def dashed(canvas: Canvas, points: Iterable[Pixel], colour: Colour, dash: float = 4.0) -> None:
+    for a, b in pairwise(points):
+        canvas.dashes(a, b, colour, canvas.width(1.0), dash=dash)
 
 
 def draw_grips(
-    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[object], near: Handle | None, stem: float
+    canvas: Canvas, found: tuple[Handle, ...], chosen: frozenset[Vertex], near: Handle | None, stem: float
 ) -> None:
     """Draw the handles; `stem` is how far the knob is from the box, px."""
-    floor, edge = canvas.theme.background, accent(canvas.theme)
-    places = pixels(canvas, (handle.at for handle in found)).tolist()
-    for handle, (x, y) in zip(found, places, strict=True):
+    floor, edge = canvas.theme.background, canvas.theme.final
+    for handle, (x, y) in zip(found, pixels(canvas, (each.at for each in found)).tolist(), strict=True):
         large = handle == near
         if handle.kind == "turn":
             canvas.line((x, y), (x, y + stem), edge, canvas.width(1.0))
@@ -111,19 +85,16 @@ def _square(canvas: Canvas, at: Point, fill: Colour, *, large: bool = False, rou
     if canvas.surface.get_rect().colliderect(box):
         radius = round(half) if rounded else 0
         pygame.draw.rect(canvas.surface, fill, box, border_radius=radius)
-        edge = accent(canvas.theme)
-        pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.5), border_radius=radius)
+        pygame.draw.rect(canvas.surface, canvas.theme.final, box, canvas.width(1.5), border_radius=radius)
 
 
 def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
-    """Draw why a point is where it is."""
     colour = canvas.theme.forces["repulsion_obstacle"]
     words: list[str] = []
     last: Point | None = None
     for guide in guides:
         line = pixels(canvas, guide.line).tolist()
-        for a, b in pairwise(line):
-            canvas.dashes(a, b, colour, canvas.width(1.0), dash=4.0)
+        dashed(canvas, line, colour)
         if line:
             last = line[-1][0], line[-1][1]
             if guide.kind in ("vertex", "middle", "centre", "crossing", "edge"):
@@ -135,31 +106,21 @@ def draw_guides(canvas: Canvas, guides: Iterable[Guide]) -> None:
         canvas.text(" · ".join(words), at, size=canvas.theme.small_text, colour=colour)
 
 
-# starts, paths, what is drawn
-
-
-def draw_circle(canvas: Canvas, center: Array, radius: float, colour: Colour, width: float) -> None:
-    """Draw a circle's line; as a sprite, which is smoother than many short lines, unless it is huge."""
-    if radius < MOST_RADIUS:
-        rounded = round(2 * radius) / 2
-        canvas.stamp(partial(sprites.ring, rounded, colour, width * canvas.scale), center.tolist())
-        return
-    sides = int(min(radius, 720))
-    angle = np.arange(sides) * (2 * np.pi / sides)
-    ring = center + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    canvas.outline(ring, colour, canvas.width(width))
-
-
 def draw_start(
     canvas: Canvas, spec: StartSpec, name: str, *, chosen: bool, first: bool = False, dots: float = 1.0
 ) -> None:
-    """Draw where a team may start, with its name; `dots` enlarges its places."""
     theme, scale, width = canvas.theme, canvas.scale, 2.2 if chosen else 1.6
     if isinstance(spec, DiscStart):
-        (center,) = pixels(canvas, (spec.center,))
+        ((x, y),) = pixels(canvas, (spec.center,)).tolist()
         radius = spec.radius * canvas.camera.zoom
-        draw_circle(canvas, center, radius, theme.start, width)
-        x, y = center.tolist()
+        if radius < MOST_RADIUS:
+            ring = partial(sprites.ring, round(2 * radius) / 2, theme.start, width * scale)
+            canvas.stamp(ring, (x, y))
+        else:
+            sides = int(min(radius, 720))
+            angle = np.arange(sides) * (2 * np.pi / sides)
+            rim = (x, y) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+            canvas.outline(rim, theme.start, canvas.width(width))
         at, anchor = (x, y - radius - 10 * scale), "middle"  # above, where no robot stands
     elif isinstance(spec, PointsStart) and spec.positions:
         places = pixels(canvas, spec.positions).tolist()
@@ -174,7 +135,6 @@ def draw_start(
 
 
 def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
-    """Draw the way of an obstacle: dashed, with an arrow in each leg; the last one of a loop is fainter."""
     points = pixels(canvas, path.points)
     legs = list(pairwise(points))
     if path.repeat == "loop" and len(points) > 2:
@@ -195,14 +155,11 @@ def draw_path(canvas: Canvas, path: ObstaclePath, colour: Colour) -> None:
 
 
 def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
-    """Draw where something will be."""
-    colour = accent(canvas.theme)
+    colour = canvas.theme.final
     for ring in outline_of(geometry).rings:
         corners = canvas.camera.to_pixels(ring)
-        low, high = np.floor(corners.min(axis=0)), np.ceil(corners.max(axis=0))
-        box = Rect(*np.clip([*low, *(high - low + 1)], -30000, 30000).astype(int).tolist())
-        box = box.clip(canvas.surface.get_clip())
-        if box.width and box.height:
+        box = pixel_box(canvas.camera, [*ring.min(axis=0), *ring.max(axis=0)]).clip(canvas.surface.get_clip())
+        if box:
             page = Surface(box.size, pygame.SRCALPHA, 32)
             shifted = np.rint(np.clip(corners - np.array(box.topleft), -30000, 30000)).tolist()
             pygame.draw.polygon(page, (*mix(canvas.theme.obstacle, colour, 0.35), 130), shifted)
@@ -211,8 +168,7 @@ def draw_ghost(canvas: Canvas, geometry: BaseGeometry) -> None:
 
 
 def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
-    """Draw what a tool is about to do; words stand beside the cursor, px."""
-    floor, scale, colour = canvas.theme.background, canvas.scale, accent(canvas.theme)
+    floor, scale, colour = canvas.theme.background, canvas.scale, canvas.theme.final
     for shape in preview.shapes:
         draw_ghost(canvas, shape.polygon)
     if preview.start is not None:
@@ -233,18 +189,16 @@ def draw_preview(canvas: Canvas, preview: Preview, at: Point | None) -> None:
     if preview.box is not None:
         _draw_selecting(canvas, preview.box, touched=preview.touched)
     if preview.words and at is not None:
-        _tag(canvas, preview.words, (at[0] + 18 * scale, at[1] - 22 * scale))
+        place = at[0] + 18 * scale, at[1] - 22 * scale
+        tag(canvas.surface, preview.words, place, canvas.theme, scale)
 
 
 def _draw_lengths(canvas: Canvas, line: tuple[Point, ...]) -> None:
-    """Write the length of each edge beside it, but of the last, which stands beside the cursor."""
     ink, size = mix(canvas.theme.background, canvas.theme.ink, 0.85), canvas.theme.small_text
     for a, b in list(pairwise(line[:-1]))[-MOST_LENGTHS:]:
-        ends = pixels(canvas, (a, b))
-        words = length_words(distance(a, b))
+        ends, words = pixels(canvas, (a, b)), length_words(distance(a, b))
         along, wide = ends[1] - ends[0], canvas.text_width(words, size)
-        length = float(np.hypot(*along))
-        if length < wide:
+        if (length := float(np.hypot(*along))) < wide:
             continue
         across = np.array([along[1], -along[0]]) / max(length, 1e-9)
         if across[1] > 0 or (across[1] == 0 and across[0] < 0):
@@ -258,21 +212,19 @@ def _draw_selecting(canvas: Canvas, corners: tuple[Point, Point], *, touched: bo
     ends = pixels(canvas, corners)
     low, high = ends.min(axis=0), ends.max(axis=0)
     box = Rect(*np.rint([*low, *(high - low)]).astype(int).tolist()).clip(canvas.surface.get_clip())
-    colour = canvas.theme.start if touched else accent(canvas.theme)
-    if box.width and box.height:
+    colour = canvas.theme.start if touched else canvas.theme.final
+    if box:
         page = Surface(box.size, pygame.SRCALPHA, 32)
         page.fill((*colour, 34))
         canvas.surface.blit(page, box)
-    (left, top), (right, bottom) = low.tolist(), high.tolist()
-    for a, b in pairwise([(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]):
-        if touched:
-            canvas.dashes(a, b, colour, canvas.width(1.0), dash=4.0)
-        else:
-            canvas.line(a, b, colour, canvas.width(1.0))
+    rim = shapely.get_coordinates(shapely.box(*low, *high, ccw=False))
+    if touched:
+        dashed(canvas, rim.tolist(), colour)
+    else:
+        canvas.outline(rim, colour, canvas.width(1.0), closed=False)
 
 
 def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
-    """Show what is being typed, below the cursor."""
     theme, scale, surface = canvas.theme, canvas.scale, canvas.surface
     words, hint, large = f"{text}▏", "Enter", theme.text * 1.1
     wide = canvas.text_width(words, large, bold=True) + canvas.text_width(hint, theme.small_text)
@@ -280,65 +232,40 @@ def draw_typed(canvas: Canvas, text: str, at: Point) -> None:
     box.topleft = round(at[0] + 14 * scale), round(at[1] + 14 * scale)
     box.clamp_ip(surface.get_rect())
     pygame.draw.rect(surface, theme.panel, box, border_radius=round(5 * scale))
-    pygame.draw.rect(surface, accent(theme), box, canvas.width(1.5), border_radius=round(5 * scale))
+    pygame.draw.rect(surface, theme.final, box, canvas.width(1.5), border_radius=round(5 * scale))
     size, y = canvas.text_size(large) / scale, box.centery
     canvas.text(words, (box.left + 8 * scale, y), size=size, bold=True)
-    right = box.right - 8 * scale
-    canvas.text(hint, (right, y), size=theme.small_text, colour=theme.faint, anchor="right")
-
-
-# where robots do not pass
+    canvas.text(hint, (box.right - 8 * scale, y), size=theme.small_text, colour=theme.faint, anchor="right")
 
 
 def hatched(view: View, measurement: Measurement) -> tuple[Surface, Rect] | None:
     """Return a picture of where robots do not pass, and of what is cut off, and its place, px."""
-    theme = view.theme
-    areas = ((measurement.sealed, sealed_colour(theme), 0.5), (measurement.impassable, theme.trajectory, 1.0))
-    parts = [(_polygons(area), colour, strength) for area, colour, strength in areas if _polygons(area)]
+    theme, white = view.theme, (255, 255, 255)
+    areas = ((measurement.sealed, theme.forces[SEALED], 0.5), (measurement.impassable, theme.trajectory, 1.0))
+    parts = [(outline_of(area), colour, strength) for area, colour, strength in areas]
+    parts = [part for part in parts if part[0].rings]
     if not parts:
         return None
-    every = [each for polygons, _, _ in parts for each in polygons]
-    low_x, low_y, high_x, high_y = shapely.total_bounds(every)
-    ends = view.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    (left, top), (right, bottom) = bounded(ends).tolist()
-    box = Rect(int(left) - 1, int(top) - 1, int(right - left) + 3, int(bottom - top) + 3)
-    box = box.clip(view.clip)
-    if not (box.width and box.height):
+    bounds = shapely.total_bounds([outline.geometry for outline, _, _ in parts])
+    box = pixel_box(view.camera, bounds).clip(view.clip)
+    if not box:
         return None
     patch = Surface(box.size, pygame.SRCALPHA, 32)
     edged = view.canvas(patch)
-    for polygons, colour, strength in parts:
-        mask = Surface(box.size, pygame.SRCALPHA, 32)
-        for each in polygons:
-            _stencil(view.canvas(mask), each, box.topleft)
+    for outline, colour, strength in parts:
+        mask = view.canvas(Surface(box.size, pygame.SRCALPHA, 32))
+        rings = [view.camera.to_pixels(ring) - np.array(box.topleft) for ring in outline.rings]
+        for ring, outer in zip(rings, outline.outer, strict=True):
+            mask.polygon(ring, (*white, 255) if outer else (0, 0, 0, 0))
+            if outer:  # what is thinner than a pixel is a line
+                mask.outline(ring, white, 1)
         lines = _lines(box.size, colour, view.scale, box.topleft, strength)
-        mask.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
-        patch.blit(mask.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        for each in polygons:
-            ring = view.camera.to_pixels(np.asarray(each.exterior.coords)[:-1]) - np.array(box.topleft)
-            edged.outline(ring, colour, edged.width(1.0))
+        mask.surface.blit(lines, (0, 0), special_flags=pygame.BLEND_RGBA_MULT)
+        patch.blit(mask.surface.premul_alpha(), (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        for ring, outer in zip(rings, outline.outer, strict=True):
+            if outer:
+                edged.outline(ring, colour, edged.width(1.0))
     return patch, box
-
-
-def _polygons(area: BaseGeometry) -> list[shapely.Polygon]:
-    parts = shapely.get_parts(area)
-    return [each for each in parts if isinstance(each, shapely.Polygon) and not each.is_empty]
-
-
-def sealed_colour(theme: Theme) -> Colour:
-    """Return the colour of what no robot comes to from the largest part."""
-    return theme.forces["repulsion_robots"]
-
-
-def _stencil(canvas: Canvas, area: shapely.Polygon, corner: tuple[int, int]) -> None:
-    """Paint an area white, its holes clear; what is thinner than a pixel as a line."""
-    white = (255, 255, 255, 255)
-    rings = [np.asarray(each.coords)[:-1] for each in (area.exterior, *area.interiors)]
-    ring, *holes = (canvas.camera.to_pixels(each) - np.array(corner, dtype=float) for each in rings)
-    canvas.polygon(ring, white)
-    for hole in holes:
-        canvas.polygon(hole, (0, 0, 0, 0))
-    canvas.outline(ring, white[:3], 1)
 
 
 def _lines(
@@ -355,7 +282,6 @@ def _lines(
 
 
 def draw_gap(canvas: Canvas, gap: Gap, radius: float) -> None:
-    """Draw the narrowest gap."""
     a, b, across = _gap(canvas, gap)
     colour = canvas.theme.trajectory if gap.width < 2 * radius else canvas.theme.start
     for start, end in ((a, b), (a - across, a + across), (b - across, b + across)):
@@ -378,7 +304,7 @@ def tag_gap(canvas: Canvas, gap: Gap, radius: float, cursor: Point | None = None
         near = beside - canvas.text_width(words) - 20 * scale < x < beside + 200 * scale
         if near and abs(y - level) < 24 * scale:
             y = level - 24 * scale
-    _tag(canvas, words, (x, y))
+    tag(canvas.surface, words, (x, y), canvas.theme, scale)
 
 
 def _gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
@@ -388,11 +314,7 @@ def _gap(canvas: Canvas, gap: Gap) -> tuple[Array, Array, Array]:
     return a, b, np.array([b[1] - a[1], a[0] - b[0]]) / length * 5 * canvas.scale
 
 
-# problems
-
-
 def badge_places(found: tuple[Problem, ...], view: View) -> list[tuple[Problem, Point]]:
-    """Return where the badges of problems are, px: above the place, which can be seen then."""
     places = []
     for problem in found[:MOST_BADGES]:
         if problem.where is not None and not problem.where.is_empty:
@@ -405,11 +327,15 @@ def badge_places(found: tuple[Problem, ...], view: View) -> list[tuple[Problem, 
 def draw_problems(
     canvas: Canvas, view: View, found: tuple[Problem, ...], told: Problem | None, hovered: Problem | None
 ) -> None:
-    """Draw a badge for each problem, and the words of those that are asked about."""
     theme, scale = canvas.theme, canvas.scale
     for problem in found[:MOST_BADGES]:
-        if problem.where is not None and (problem.grave or problem in (told, hovered)):
-            _draw_place(canvas, problem)
+        colour = problem_colour(theme, grave=problem.grave)
+        shown = problem.grave or problem in (told, hovered)
+        for part in shapely.get_parts(problem.where) if problem.where is not None and shown else ():
+            for ring in [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]:
+                points = canvas.camera.to_pixels(shapely.get_coordinates(ring))
+                if len(points) > 1:
+                    canvas.outline(points, colour, canvas.width(2), closed=False)
     places = badge_places(found, view)
     for problem, (x, y) in reversed(places):
         colour, foot = problem_colour(theme, grave=problem.grave), y + STEM * scale
@@ -422,71 +348,46 @@ def draw_problems(
             beside = x + (BADGE + 10) * scale
             room = canvas.surface.get_width() - beside - 8 * scale > canvas.text_width(problem.words)
             # where there is no room beside the badge, above it
-            _tag(canvas, problem.words, (beside, y if room else y - (BADGE + 14) * scale))
+            at = beside, y if room else y - (BADGE + 14) * scale
+            tag(canvas.surface, problem.words, at, theme, scale)
             if problem is told:
                 _ring(canvas, (x, y), BADGE + 4, theme.ink, 1.6)
-
-
-def _draw_place(canvas: Canvas, problem: Problem) -> None:
-    colour = problem_colour(canvas.theme, grave=problem.grave)
-    for part in shapely.get_parts(problem.where):
-        for ring in [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]:
-            points = shapely.get_coordinates(ring)
-            if len(points) > 1:
-                canvas.outline(canvas.camera.to_pixels(points), colour, canvas.width(2), closed=False)
 
 
 def draw_badge(
     canvas: Canvas, x: float, y: float, *, grave: bool, radius: float = BADGE, rim: float = 1.4
 ) -> None:
-    """Draw a disc with an exclamation mark."""
     theme, fill = canvas.theme, problem_colour(canvas.theme, grave=grave)
     _disc(canvas, (x, y), radius, (fill, theme.background, mix(fill, theme.ink, 0.3)), rim, "!")
 
 
-# the legend
-
-
 def legend_entries(found: Measurement | None, *, starts: bool, team: bool, unfree: bool) -> list[LegendEntry]:
-    """Return what the legend explains."""
-    rows: list[tuple[object, str, Glyph]] = [
-        (True, "obstacle", lambda on, x, y: _swatch(on, x, y, on.theme.obstacle, on.theme.obstacle_edge)),
-        (True, "boundary", _boundary_glyph),
-        (unfree, "outside, in the robots' hull", _beyond_glyph),
-        (starts, "start", lambda canvas, x, y: _ring(canvas, (x, y), 5.0, canvas.theme.start, 1.6)),
-        (team, "robot", _robot_glyph),
-        (found and found.impassable, "too narrow for a robot", partial(_hatch_glyph, narrow=True)),
-        (found and found.sealed, "cut off", partial(_hatch_glyph, narrow=False)),
+    def boundary(canvas: Canvas, x: float, y: float) -> None:
+        half, width = 9 * canvas.scale, canvas.width(canvas.theme.boundary_line)
+        canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, width)
+
+    def beyond(canvas: Canvas, x: float, y: float) -> None:
+        fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
+        canvas.swatch(x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
+
+    def robot(canvas: Canvas, x: float, y: float) -> None:
+        edge = mix(canvas.theme.background, canvas.theme.ink, 0.55)
+        _disc(canvas, (x, y), 6.5, (canvas.theme.robots[0], canvas.theme.robot_ring, edge), 1.4)
+
+    def hatch(canvas: Canvas, x: float, y: float, *, narrow: bool) -> None:
+        size = round(12 * canvas.scale)
+        colour = canvas.theme.trajectory if narrow else canvas.theme.forces[SEALED]
+        page = _lines((size, size), colour, canvas.scale, (0, 0))
+        canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))
+
+    rows: tuple[tuple[object, str, Glyph], ...] = (
+        (True, "obstacle", lambda on, x, y: on.swatch(x, y, on.theme.obstacle, on.theme.obstacle_edge)),
+        (True, "boundary", boundary),
+        (unfree, "outside, in the robots' hull", beyond),
+        (starts, "start", lambda on, x, y: _ring(on, (x, y), 5.0, on.theme.start, 1.6)),
+        (team, "robot", robot),
+        (found and found.impassable, "too narrow for a robot", partial(hatch, narrow=True)),
+        (found and found.sealed, "cut off", partial(hatch, narrow=False)),
         (found and found.problems, "problem", partial(draw_badge, grave=True, radius=6.5, rim=1.0)),
-    ]
+    )
     return [LegendEntry(text, glyph) for is_there, text, glyph in rows if is_there]
-
-
-def _swatch(canvas: Canvas, x: float, y: float, fill: Colour, edge: Colour) -> None:
-    size = 11 * canvas.scale
-    box = Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
-    pygame.draw.rect(canvas.surface, fill, box)
-    pygame.draw.rect(canvas.surface, edge, box, canvas.width(1.0))
-
-
-def _beyond_glyph(canvas: Canvas, x: float, y: float) -> None:
-    fill = mix(outside_colour(canvas.theme), canvas.theme.obstacle, 0.55)
-    _swatch(canvas, x, y, fill, mix(fill, canvas.theme.obstacle_edge, 0.5))
-
-
-def _boundary_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 9 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))
-
-
-def _robot_glyph(canvas: Canvas, x: float, y: float) -> None:
-    theme = canvas.theme
-    edge = mix(theme.background, theme.ink, 0.55)
-    _disc(canvas, (x, y), 6.5, (theme.robots[0], theme.robot_ring, edge), 1.4)
-
-
-def _hatch_glyph(canvas: Canvas, x: float, y: float, *, narrow: bool) -> None:
-    size = round(12 * canvas.scale)
-    colour = canvas.theme.trajectory if narrow else sealed_colour(canvas.theme)
-    page = _lines((size, size), colour, canvas.scale, (0, 0))
-    canvas.surface.blit(page, (round(x - size / 2), round(y - size / 2)))

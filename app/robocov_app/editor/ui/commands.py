@@ -1,11 +1,12 @@
 """Everything that the editor does, by key, menu, button, palette or typed value."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TypeVar
 
 from robocov.environment import Point, PolygonObstacle, WallObstacle
 from robocov.errors import MapError
+from robocov_app.editor.canvas.canvas import EditorCanvas
 from robocov_app.editor.edits import boolean, density, paths, properties, transform, vertices
 from robocov_app.editor.edits.clipboard import copied, pasted
 from robocov_app.editor.edits.create import anywhere_added
@@ -18,46 +19,38 @@ from robocov_app.editor.tools.density import DensityTool
 from robocov_app.editor.tools.draw import MeasureTool
 from robocov_app.editor.tools.snapping import SNAPS
 from robocov_app.editor.ui.editor import SHOWN, Editor
+from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.command import Command, Takes
 
 FAR = 10  # how many times farther arrows nudge with Shift
 FINGER = 12.0  # pixels at scale 1 that a finger is wide
 WIDER = 1.25
+_PAN = 60  # pixels that a key pans
 TOLERANCE = 0.02  # metres that simplified outlines may be off
-
 GHOST = "Type a command, or  rotate 30 · grid 0.25 · width 0.2 · size 3 x 2 · robots 8"
-
 Edit = Callable[..., Change]
-Run = Callable[[Editor], object]
+Run = Callable[[], object]
 RunWith = Callable[[Editor, str], object]
+Row = tuple[str, str, str, Run]  # name, title and keys of a command, separated by commas, and what it does
 _Number = TypeVar("_Number", int, float)
 
 
-# what commands do
+def require(there: object, words: str) -> None:
+    """Raise MapError with these words where something is missing."""
+    if not there:
+        raise MapError(words)
 
 
 def selected(editor: Editor) -> Selection:
-    """Return the selected things, and of selected vertices what they belong to; MapError without any."""
-    if selection := whole(editor.selection):
-        return selection
-    raise MapError("nothing is selected: click something first, or press Ctrl A")
-
-
-def edited(edit: Edit, *rest: object) -> Run:
-    """Return what makes an edit of the selected things."""
-    return lambda editor: editor.change(edit(editor.sketch, selected(editor), *rest))
+    selection = whole(editor.selection)
+    require(selection, "nothing is selected: click something first, or press Ctrl A")
+    return selection
 
 
 def align(editor: Editor, side: transform.Side) -> None:
-    """Align the selected vertices, or else the selected things."""
     selection = editor.selection if editor.selection.vertices else selected(editor)
     editor.change(transform.aligned(editor.sketch, selection, side))
-
-
-def of_map(edit: Edit, *rest: object) -> Run:
-    """Return what makes an edit of the whole map."""
-    return lambda editor: editor.change(edit(editor.sketch, *rest))
 
 
 def whole(selection: Selection) -> Selection:
@@ -66,94 +59,73 @@ def whole(selection: Selection) -> Selection:
 
 
 def vertices_or_things(selection: Selection) -> Selection:
-    """Return the selected vertices alone, or else the selected things."""
     return Selection(vertices=selection.vertices) if selection.vertices else selection
 
 
 def play(editor: Editor) -> str:
-    """Show where obstacles that move get to, or show them no more."""
     if editor.moves_since is not None:
         editor.moves_since = None
         return "obstacles stand as they are at time zero"
-    if not paths.moving(editor.sketch):
-        raise MapError("no obstacle moves: the tool Path gives one a path")
+    require(paths.moving(editor.sketch), "no obstacle moves: the tool Path gives one a path")
     editor.moves_since = editor.now
     return "obstacles move as they will; L ends it"
 
 
 def back(editor: Editor) -> None:
-    """Take the last point back, else delete what is selected."""
     if not editor.tool.back(editor) and not editor.tool.busy and editor.selection:
         delete(editor)
 
 
 def delete(editor: Editor) -> None:
-    """Delete the selected vertices, or else the selected things."""
     selection = editor.selection
-    if not selection:
-        raise MapError("nothing is selected: click something first")
+    require(selection, "nothing is selected: click something first")
     act = vertices.deleted if selection.vertices else properties.deleted
     editor.change(act(editor.sketch, vertices_or_things(selection)))
 
 
 def copy(editor: Editor) -> str:
-    """Copy what is selected to the clipboard."""
     selection = whole(editor.selection)
     clipboard.put(copied(editor.sketch, selection))
     return f"copied: {selection.words(editor.sketch)}"
 
 
 def cut(editor: Editor) -> None:
-    """Copy what is selected, and delete it."""
     copy(editor)
     editor.change(properties.deleted(editor.sketch, whole(editor.selection)))
 
 
 def paste(editor: Editor, at: Point | None) -> None:
-    """Paste what is in the clipboard, its middle at a place."""
     text = clipboard.get()
-    if not text.strip():
-        raise MapError("the clipboard is empty")
+    require(text.strip(), "the clipboard is empty")
     editor.change(pasted(editor.sketch, text, at, editor.grid if "grid" in editor.snaps else None))
 
 
 def duplicate(editor: Editor) -> None:
-    """Duplicate what is selected, to its lower right."""
     by = editor.grid * FAR / 2
     editor.change(transform.duplicated(editor.sketch, selected(editor), by, -by))
 
 
 def level(editor: Editor) -> None:
-    """Turn the whole map so that the line that was measured is level or upright."""
     tape = editor.tools["measure"]
     assert isinstance(tape, MeasureTool)
-    if len(tape.measured) != 2:
-        raise MapError("measure along a wall first: the tool Measure, two clicks")
+    require(len(tape.measured) == 2, "measure along a wall first: the tool Measure, two clicks")
     editor.change(transform.levelled(editor.sketch, *tape.measured))
     tape.cancel(editor)
 
 
-def nudge(x: int, y: int) -> Run:
-    """Return what moves the selection by so many spacings of the grid."""
-
-    def run(editor: Editor) -> None:
-        selection = editor.selection
-        if not selection:
-            raise MapError("nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
-        moved = move(editor, x * editor.grid, y * editor.grid, vertices_or_things(selection))
-        editor.change(moved, drag=("nudge", selection))
-
-    return run
+def nudge(editor: Editor, steps: int, x: int, y: int) -> None:
+    selection = editor.selection
+    require(selection, "nothing is selected: arrows move what is; Ctrl and arrows move the sheet")
+    by = steps * editor.grid
+    editor.change(move(editor, x * by, y * by, vertices_or_things(selection)), drag=("nudge", selection))
 
 
 def move(editor: Editor, dx: float, dy: float, selection: Selection) -> Change:
-    """Return the change that moves vertices, or else things, m."""
     act = vertices.moved if selection.vertices else transform.moved
     return act(editor.sketch, selection, dx, dy)
 
 
 def cancel(editor: Editor) -> None:
-    """Give up what is half done, else put the tool away, else select nothing."""
     if editor.typed:
         editor.typed = ""
     elif not editor.tool.cancel(editor) and editor.tool is not editor.selector:
@@ -161,7 +133,6 @@ def cancel(editor: Editor) -> None:
 
 
 def select_next(editor: Editor, by: int) -> None:
-    """Select the next obstacle, start or boundary, in the order of the map."""
     order: list[Owner] = [item.key for item in editor.sketch.obstacles if not item.hidden]
     order += [*editor.start_names, *([BOUNDARY] if editor.sketch.boundary is not None else [])]
     if not order:
@@ -172,22 +143,24 @@ def select_next(editor: Editor, by: int) -> None:
 
 
 def one_vertex(editor: Editor) -> Vertex:
-    """Return the one vertex that is selected."""
-    if len(editor.selection.vertices) != 1:
-        raise MapError("select one vertex first: click an obstacle, then one of its corners")
+    require(
+        len(editor.selection.vertices) == 1,
+        "select one vertex first: click an obstacle, then one of its corners",
+    )
     (vertex,) = editor.selection.vertices
     return vertex
 
 
 def trim(editor: Editor, edit: Edit, length: float | None = None) -> None:
     """Cut the selected corners off, or round them, by twice the grid unless a length is given, m."""
-    if not editor.selection.vertices:
-        raise MapError("select corners first: click an obstacle, then its corners, or drag a box around them")
+    require(
+        editor.selection.vertices,
+        "select corners first: click an obstacle, then its corners, or drag a box around them",
+    )
     editor.change(edit(editor.sketch, vertices_or_things(editor.selection), length or 2 * editor.grid))
 
 
 def extend(editor: Editor) -> None:
-    """Go on with a wall from the vertex that is selected, to where the cursor is."""
     if editor.cursor is None:
         raise MapError("move the mouse to where the wall is to go on to")
     vertex = one_vertex(editor)
@@ -196,7 +169,6 @@ def extend(editor: Editor) -> None:
 
 
 def fill(editor: Editor) -> None:
-    """Fill the hole whose vertex is selected."""
     vertex = one_vertex(editor)
     if not isinstance(vertex.of, int) or vertex.ring == 0:
         raise MapError("select a vertex of the hole first")
@@ -210,17 +182,14 @@ def widen(editor: Editor, factor: float) -> None:
     widths = [shape.width for shape in shapes if isinstance(shape, WallObstacle)]
     width = round(max((widths[0] if widths else editor.wall_width) * factor, 0.01), 3)
     if widths and not editor.tool.busy:
-        change = properties.widened(editor.sketch, selection, width)
-        editor.change(change, drag=("width", editor.selection))
+        editor.change(properties.widened(editor.sketch, selection, width), drag=("width", editor.selection))
     editor.set_length("wall_width", width)
     editor.say(f"walls are {width:g} m wide")
 
 
 def next_start(editor: Editor) -> None:
-    """Show the team at the next start."""
     names = editor.start_names
-    if not names:
-        raise MapError("the map has no start yet: S draws one")
+    require(names, "the map has no start yet: S draws one")
     now = editor.start_name
     name = names[(names.index(now) + 1) % len(names)] if now in names else names[0]
     editor.start = name
@@ -229,32 +198,26 @@ def next_start(editor: Editor) -> None:
 
 
 def make_default(editor: Editor) -> None:
-    """Make the selected start the map's default."""
-    if len(editor.selection.starts) != 1:
-        raise MapError("select one start first")
+    require(len(editor.selection.starts) == 1, "select one start first")
     (name,) = editor.selection.starts
     editor.change(properties.start_first(editor.sketch, name))
 
 
 def make_areas(editor: Editor) -> None:
-    """Make what is selected areas that count more, as the tool Density is set."""
     tool = editor.tools["density"]
     assert isinstance(tool, DensityTool)
     editor.change(density.areas_made(editor.sketch, selected(editor), tool.weight))
 
 
 def fix_problem(editor: Editor) -> None:
-    """Mend the problem that is shown, or the first that can be."""
     for problem in [editor.problem] if editor.problem is not None else editor.problems:
-        change = fixed(editor.sketch, problem, editor.radius)
-        if change is not None:
+        if (change := fixed(editor.sketch, problem, editor.radius)) is not None:
             editor.change(change)
             return
     raise MapError("there is nothing that can be mended by itself")
 
 
 def next_problem(editor: Editor) -> None:
-    """Show the next problem with its words."""
     found = editor.problems
     if not found:
         editor.problem = None
@@ -263,9 +226,6 @@ def next_problem(editor: Editor) -> None:
     place = found.index(editor.problem) + 1 if editor.problem in found else 0
     editor.problem = found[place % len(found)]
     editor.say(editor.problem.words, trouble=editor.problem.grave)
-
-
-# values that are typed
 
 
 def _number(word: str, text: str, kind: type[_Number]) -> _Number:
@@ -278,23 +238,42 @@ def _number(word: str, text: str, kind: type[_Number]) -> _Number:
 
 def _set_angle(editor: Editor, text: str) -> None:
     angle = angle_of(text)
-    if not 0.1 <= angle <= 90.0:
-        raise MapError(f"angle: {angle:g}°, but 0.1° to 90° was wanted")
+    require(0.1 <= angle <= 90.0, f"angle: {angle:g}°, but 0.1° to 90° was wanted")
     editor.snap_angle = angle
     editor.say(f"angles snap to multiples of {angle:g}°")
 
 
 def _set_length(name: str) -> RunWith:
-    """Return what takes a length for the editor, which may be told by how it is now."""
     return lambda editor, text: editor.set_length(name, length_of(text, now=getattr(editor, name)))
 
 
 def _edit_to(edit: Edit, read: Callable[[str], object]) -> RunWith:
-    return lambda editor, text: editor.change(edit(editor.sketch, selected(editor), read(text)))
+    def run(editor: Editor, text: str) -> None:
+        value = read(text)
+        values = value if isinstance(value, tuple) else (value,)
+        editor.change(edit(editor.sketch, selected(editor), *values))
+
+    return run
+
+
+def common_measure(editor: Editor, name: str) -> float | None:
+    """Return the width or radius of all selected things that have one; None where they differ."""
+    sketch, selection = editor.preview
+    things: list[object] = [sketch.item(key).shape for key in selection.items if key in sketch.places]
+    things += [spec for start, spec in sketch.starts if start in selection.starts]
+    found = {getattr(thing, name) for thing in things if hasattr(thing, name)}
+    return found.pop() if len(found) == 1 else None
+
+
+def _set_measure(edit: Edit, name: str) -> RunWith:
+    def run(editor: Editor, text: str) -> None:
+        length = length_of(text, now=common_measure(editor, name))
+        editor.change(edit(editor.sketch, selected(editor), length))
+
+    return run
 
 
 def _move(editor: Editor, text: str) -> None:
-    text = text.strip()
     dx, dy = point_of(text if text[0] in "+@" else f"@{text}", last=(0.0, 0.0))
     editor.change(move(editor, dx, dy, editor.selection or selected(editor)))
 
@@ -308,54 +287,40 @@ def _place(editor: Editor, text: str) -> None:
 
 def _scale(editor: Editor, text: str) -> None:
     selection = selected(editor)
-    if bounds_of(editor.sketch, selection) is None:
-        raise MapError("there is nothing to scale")
+    require(bounds_of(editor.sketch, selection), "there is nothing to scale")
     factor = length_of(text if text.endswith("%") else f"*{text.lstrip('*x')}", now=1.0)
     editor.change(transform.scaled(editor.sketch, selection, factor))
 
 
-def _size(editor: Editor, text: str) -> None:
-    width, height = size_of(text)
-    editor.change(transform.resized(editor.sketch, selected(editor), width, height))
-
-
-def _name(editor: Editor, text: str) -> None:
+def rename(editor: Editor, text: str) -> None:
     owners = whole(editor.selection).owners
-    if len(owners) != 1:
-        raise MapError("select one obstacle or start first")
+    require(len(owners) == 1, "select one obstacle or start first")
     (owner,) = owners
     editor.change(properties.renamed(editor.sketch, owner, text))
 
 
 def _signed(text: str) -> float:
-    sign = -1.0 if text.strip().startswith("-") else 1.0
-    return sign * length_of(text.strip().lstrip("+-"))
+    return length_of(text.lstrip("+-")) * (-1.0 if text.startswith("-") else 1.0)
 
 
 def _set_density(editor: Editor, text: str) -> None:
-    if text.strip() != "none":
-        raise MapError(f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density")
+    require(
+        text == "none", f"density: {text!r}, but none was wanted; hot spots are drawn with the tool Density"
+    )
     editor.change(density.density_removed(editor.sketch))
 
 
-def _array(editor: Editor, text: str) -> None:
+def _array_of(text: str) -> tuple[int, int, float, float]:
     parts = text.replace("x", " ").split()
-    if len(parts) != 4:
-        raise MapError("array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
+    require(len(parts) == 4, "array: columns, rows and both distances were wanted, as in array 3 x 2 1.5 1.5")
     columns, rows = (_number("array", each, int) for each in parts[:2])
-    dx, dy = (length_of(each.lstrip("-")) * (-1.0 if each.startswith("-") else 1.0) for each in parts[2:])
-    editor.change(transform.arrayed(editor.sketch, selected(editor), columns, rows, dx, dy))
+    return columns, rows, _signed(parts[2]), _signed(parts[3])
 
 
-# the lists
-
+# headings of the help, and keys of the tools and of what is shown, in their order
 GROUPS = ("File", "Edit", "Arrange", "Combine", "Tools", "Vertices", "Snap", "View", "Robots", "Help")
-"""Headings of the help, in their order."""
-
-# of the tools and of what is shown, in their order
 _TOOL_KEYS = ("v", "g", "p", "r", "c", "w", "k", "b", "m", "s", "shift+s", "d", "o", "i")
 _SHOWN_KEYS = ("alt+3", "alt+2", "alt+1", "alt+5", "a", "alt+6", "alt+7", "alt+4")
-
 # commands that are done again and again while their key is held down
 _REPEATED = (
     *("undo", "redo", "paste", "duplicate", "select:next", "select:previous", "back", "more", "fewer"),
@@ -364,60 +329,83 @@ _REPEATED = (
     *("pan:left", "pan:right", "pan:up", "pan:down"),
 )
 
-# keys are separated by commas; what the window does has no function here
-_ROWS: dict[str, tuple[tuple[str, str, str, Run | None], ...]] = {
-    "File": (
-        ("new", "New map", "ctrl+n", None),
-        ("open", "Open a map", "ctrl+o", None),
-        ("recent", "Open a recent or bundled map", "ctrl+shift+o", None),
-        ("save", "Save", "ctrl+s", None),
-        ("save:as", "Save as", "ctrl+shift+s", None),
-        ("export", "Export to another format", "ctrl+e", None),
-        ("background", "Picture under the map", "ctrl+b", None),
+
+def editor_commands(
+    editor: Editor, canvas: EditorCanvas, documents: FileCommands, of_window: Mapping[str, Run]
+) -> list[Command]:
+
+    def does(act: Callable[..., object], *rest: object) -> Run:
+        return partial(act, editor, *rest)
+
+    def edited(edit: Edit, *rest: object) -> Run:
+        return lambda: editor.change(edit(editor.sketch, selected(editor), *rest))
+
+    def of_map(edit: Edit, *rest: object) -> Run:
+        return lambda: editor.change(edit(editor.sketch, *rest))
+
+    def arrows(name: str, title: str, keys: str, act: Callable[[int, int], object]) -> Iterator[Row]:
+        """Yield the commands of the four arrow keys; the first speaks for all of them."""
+        for way, x, y in (("left", -1, 0), ("right", 1, 0), ("up", 0, 1), ("down", 0, -1)):
+            yield name.format(way), title, keys.format(way), partial(act, x, y)
+            title = ""
+
+    def clip() -> None:
+        editor.change(boolean.clipped(editor.sketch, editor.selection.without_vertices()))
+
+    def fill_unreachable() -> None:
+        editor.change(unreachable_filled(editor.sketch, editor.radius))
+
+    def split() -> None:
+        editor.change(vertices.split(editor.sketch, one_vertex(editor)))
+
+    def switch_theme() -> None:
+        editor.theme = "dark" if editor.theme == "light" else "light"
+
+    table: tuple[str | Row, ...] = (  # the headings of groups, and below each its commands
+        "File",
+        ("new", "New map", "ctrl+n", documents.new),
+        ("open", "Open a map", "ctrl+o", documents.ask_open),
+        ("recent", "Open a recent or bundled map", "ctrl+shift+o", documents.ask_recent),
+        ("save", "Save", "ctrl+s", documents.save),
+        ("save:as", "Save as", "ctrl+shift+s", documents.ask_name),
+        ("export", "Export to another format", "ctrl+e", documents.ask_export),
+        ("background", "Picture under the map", "ctrl+b", documents.ask_picture),
         ("background:none", "Take the picture under the map away", "", of_map(properties.underlaid, None)),
-        ("reload", "Read the file again", "ctrl+r", None),
-        ("try", "Try it in the demo, and back", "f5", None),
-        ("screenshot", "Screenshot", "f12", None),
-        ("quit", "Quit", "ctrl+q", None),
-    ),
-    "Edit": (
-        ("undo", "Undo", "ctrl+z", Editor.undo),
-        ("redo", "Redo", "ctrl+y, ctrl+shift+z", Editor.redo),
-        ("cut", "Cut", "ctrl+x", cut),
-        ("copy", "Copy", "ctrl+c", copy),
-        ("paste", "Paste at the cursor", "ctrl+v", lambda editor: paste(editor, editor.cursor)),
-        ("paste:there", "Paste in the same place", "ctrl+shift+v", lambda editor: paste(editor, None)),
-        ("duplicate", "Duplicate", "ctrl+d", duplicate),
-        ("delete", "Delete", "delete, x", delete),
-        ("select:all", "Select all", "ctrl+a", lambda editor: editor.select(Selection.all(editor.sketch))),
-        ("select:next", "Select the next obstacle", "tab", partial(select_next, by=1)),
-        ("select:previous", "Select the previous obstacle", "shift+tab", partial(select_next, by=-1)),
-        ("name", "Name what is selected", "f2", None),
-        ("left", "Nudge by the grid (all arrows)", "left", nudge(-1, 0)),
-        ("right", "", "right", nudge(1, 0)),
-        ("up", "", "up", nudge(0, 1)),
-        ("down", "", "down", nudge(0, -1)),
-        ("left:far", "Nudge ten times as far (all arrows)", "shift+left", nudge(-FAR, 0)),
-        ("right:far", "", "shift+right", nudge(FAR, 0)),
-        ("up:far", "", "shift+up", nudge(0, FAR)),
-        ("down:far", "", "shift+down", nudge(0, -FAR)),
-        ("finish", "Finish what is being drawn", "return, enter", lambda editor: editor.tool.finish(editor)),
-        ("back", "Take the last point back, or delete", "backspace", back),
-        ("cancel", "Give up; select nothing; close", "escape", cancel),
-        ("menu", "What can be done here (right click)", "menu, shift+f10", None),
-    ),
-    "Arrange": (
+        ("reload", "Read the file again", "ctrl+r", documents.reload),
+        ("try", "Try it in the demo, and back", "f5", of_window["try"]),
+        ("screenshot", "Screenshot", "f12", of_window["screenshot"]),
+        ("quit", "Quit", "ctrl+q", documents.quit),
+        "Edit",
+        ("undo", "Undo", "ctrl+z", partial(editor.travel, 1)),
+        ("redo", "Redo", "ctrl+y, ctrl+shift+z", partial(editor.travel, -1)),
+        ("cut", "Cut", "ctrl+x", does(cut)),
+        ("copy", "Copy", "ctrl+c", does(copy)),
+        ("paste", "Paste at the cursor", "ctrl+v", lambda: paste(editor, editor.cursor)),
+        ("paste:there", "Paste in the same place", "ctrl+shift+v", does(paste, None)),
+        ("duplicate", "Duplicate", "ctrl+d", does(duplicate)),
+        ("delete", "Delete", "delete, x", does(delete)),
+        ("select:all", "Select all", "ctrl+a", lambda: editor.select(Selection.all(editor.sketch))),
+        ("select:next", "Select the next obstacle", "tab", does(select_next, 1)),
+        ("select:previous", "Select the previous obstacle", "shift+tab", does(select_next, -1)),
+        ("name", "Name what is selected", "f2", of_window["name"]),
+        *arrows("{}", "Nudge by the grid (all arrows)", "{}", partial(nudge, editor, 1)),
+        *arrows("{}:far", "Nudge ten times as far (all arrows)", "shift+{}", partial(nudge, editor, FAR)),
+        ("finish", "Finish what is being drawn", "return, enter", lambda: editor.tool.finish(editor)),
+        ("back", "Take the last point back, or delete", "backspace", does(back)),
+        ("cancel", "Give up; select nothing; close", "escape", does(cancel)),
+        ("menu", "What can be done here (right click)", "menu, shift+f10", of_window["menu"]),
+        "Arrange",
         ("rotate:left", "Turn by 90° to the left", "q", edited(transform.rotated, 90.0)),
         ("rotate:right", "Turn by 90° to the right", "e", edited(transform.rotated, -90.0)),
-        ("level", "Level: turn the map so that the measured line is level or upright", "", level),
+        ("level", "Level: turn the map so that the measured line is level or upright", "", does(level)),
         ("mirror:x", "Mirror left and right", "shift+h", edited(transform.mirrored, "x")),
         ("mirror:y", "Mirror up and down", "shift+v", edited(transform.mirrored, "y")),
-        ("align:left", "Align left sides", "alt+left", partial(align, side="left")),
-        ("align:right", "Align right sides", "alt+right", partial(align, side="right")),
-        ("align:top", "Align tops", "alt+up", partial(align, side="top")),
-        ("align:bottom", "Align bottoms", "alt+down", partial(align, side="bottom")),
-        ("align:centre", "Align middles across", "alt+c", partial(align, side="centre")),
-        ("align:middle", "Align middles in height", "alt+m", partial(align, side="middle")),
+        ("align:left", "Align left sides", "alt+left", does(align, "left")),
+        ("align:right", "Align right sides", "alt+right", does(align, "right")),
+        ("align:top", "Align tops", "alt+up", does(align, "top")),
+        ("align:bottom", "Align bottoms", "alt+down", does(align, "bottom")),
+        ("align:centre", "Align middles across", "alt+c", does(align, "centre")),
+        ("align:middle", "Align middles in height", "alt+m", does(align, "middle")),
         ("distribute:x", "Equal gaps across", "alt+x", edited(transform.distributed, "x")),
         ("distribute:y", "Equal gaps in height", "alt+y", edited(transform.distributed, "y")),
         ("raise", "To the top", "page up", edited(properties.raised, "top")),
@@ -427,101 +415,79 @@ _ROWS: dict[str, tuple[tuple[str, str, str, Run | None], ...]] = {
         ("lock", "Lock: the mouse takes it no more", "ctrl+l", edited(properties.locked)),
         ("hide", "Hide in the editor", "ctrl+h", edited(properties.hidden)),
         ("release", "Unlock and show all", "ctrl+shift+l", of_map(properties.released)),
-    ),
-    "Combine": (
+        "Combine",
         ("unite", "Unite", "alt+u", edited(boolean.united)),
         ("subtract", "Subtract the upper ones", "alt+s", edited(boolean.subtracted)),
         ("intersect", "Keep what they have in common", "alt+i", edited(boolean.intersected)),
         ("divide", "Cut along each other", "alt+d", edited(boolean.divided)),
-        (
-            "clip",
-            "Cut off outside the boundary",
-            "alt+b",
-            lambda editor: editor.change(boolean.clipped(editor.sketch, editor.selection.without_vertices())),
-        ),
+        ("clip", "Cut off outside the boundary", "alt+b", clip),
         ("join", "Join walls end to end", "alt+j", edited(vertices.joined)),
         ("polygons", "Turn into polygons", "alt+p", edited(properties.made_polygons)),
         ("boundary:of", "Make it the boundary", "", edited(properties.made_boundary)),
         ("repair", "Repair crossing outlines", "alt+r", edited(boolean.repaired)),
-        ("density:area", "Make it an area that counts more", "", make_areas),
-        (
-            "fill:unreachable",
-            "Fill all that robots cannot reach",
-            "",
-            lambda editor: editor.change(unreachable_filled(editor.sketch, editor.radius)),
-        ),
-    ),
-    "Vertices": (
-        ("bevel", "Cut corners off", "shift+b", lambda editor: trim(editor, vertices.bevelled)),
-        ("round", "Round corners", "shift+r", lambda editor: trim(editor, vertices.rounded_off)),
-        (
-            "split",
-            "Cut a wall in two here",
-            "shift+c",
-            lambda editor: editor.change(vertices.split(editor.sketch, one_vertex(editor))),
-        ),
-        ("extend", "Go on with the wall from here", "shift+w", extend),
-        ("fill", "Fill the hole", "shift+f", fill),
+        ("density:area", "Make it an area that counts more", "", does(make_areas)),
+        ("fill:unreachable", "Fill all that robots cannot reach", "", fill_unreachable),
+        "Vertices",
+        ("bevel", "Cut corners off", "shift+b", does(trim, vertices.bevelled)),
+        ("round", "Round corners", "shift+r", does(trim, vertices.rounded_off)),
+        ("split", "Cut a wall in two here", "shift+c", split),
+        ("extend", "Go on with the wall from here", "shift+w", does(extend)),
+        ("fill", "Fill the hole", "shift+f", does(fill)),
         ("simplify", "Leave needless vertices out", "shift+p", edited(vertices.simplified, TOLERANCE)),
         ("straighten", "Make edges straight that nearly are", "shift+l", edited(vertices.straightened)),
         ("path:repeat", "Obstacle goes in a loop, or back and forth", "shift+o", edited(paths.path_turned)),
         ("path:none", "Take an obstacle's path away", "alt+o", edited(paths.path_removed)),
-        ("wider", "Wider walls", "]", lambda editor: widen(editor, WIDER)),
-        ("narrower", "Narrower walls", "[", lambda editor: widen(editor, 1.0 / WIDER)),
-    ),
-    "Snap": (
-        ("grid:finer", "Finer grid", "-", lambda editor: editor.change_grid(-1)),
-        ("grid:coarser", "Coarser grid", "=, +", lambda editor: editor.change_grid(1)),
-        ("snap:all", "Snap to everything, or to nothing", "0", lambda editor: editor.switch("snap", "all")),
-    ),
-    "View": (
-        ("fit", "Show the whole map", "f", None),
-        ("fit:selection", "Show what is selected", "z", None),
-        ("zoom:in", "Zoom in", "ctrl+=, ctrl++", None),
-        ("zoom:out", "Zoom out", "ctrl+-", None),
-        ("pan:left", "Pan (all arrows)", "ctrl+left", None),
-        ("pan:right", "", "ctrl+right", None),
-        ("pan:up", "", "ctrl+up", None),
-        ("pan:down", "", "ctrl+down", None),
-        ("pan:hold", "Pan while it is held down", "space", None),
-        ("theme", "Light or dark", "t", None),
-        ("panel", "Hide or show the panel", "h", None),
-        ("tab", "Next page of the panel", "ctrl+tab", None),
-        ("fullscreen", "Full screen", "f11", None),
-        ("path:play", "Let obstacles move, or stand again", "l", play),
-        ("problem:next", "Go to the next problem", "f8, n", next_problem),
-        ("problem:fix", "Mend the problem that is shown", "shift+f8", fix_problem),
-    ),
-    "Robots": (
+        ("wider", "Wider walls", "]", does(widen, WIDER)),
+        ("narrower", "Narrower walls", "[", does(widen, 1.0 / WIDER)),
+        "Snap",
+        ("grid:finer", "Finer grid", "-", partial(editor.change_grid, -1)),
+        ("grid:coarser", "Coarser grid", "=, +", partial(editor.change_grid, 1)),
+        ("snap:all", "Snap to everything, or to nothing", "0", partial(editor.switch, "snap", "all")),
+        "View",
+        ("fit", "Show the whole map", "f", canvas.fit),
+        ("fit:selection", "Show what is selected", "z", lambda: canvas.fit(editor.selection)),
+        ("zoom:in", "Zoom in", "ctrl+=, ctrl++", partial(canvas.zoom, 1.25)),
+        ("zoom:out", "Zoom out", "ctrl+-", partial(canvas.zoom, 0.8)),
+        *arrows("pan:{}", "Pan (all arrows)", "ctrl+{}", lambda x, y: canvas.pan(-_PAN * x, _PAN * y)),
+        ("pan:hold", "Pan while it is held down", "space", of_window["pan:hold"]),
+        ("theme", "Light or dark", "t", switch_theme),
+        ("panel", "Hide or show the panel", "h", lambda: setattr(editor, "panel", not editor.panel)),
+        ("tab", "Next page of the panel", "ctrl+tab", of_window["tab"]),
+        ("fullscreen", "Full screen", "f11", of_window["fullscreen"]),
+        ("path:play", "Let obstacles move, or stand again", "l", does(play)),
+        ("problem:next", "Go to the next problem", "f8, n", does(next_problem)),
+        ("problem:fix", "Mend the problem that is shown", "shift+f8", does(fix_problem)),
+        "Robots",
         ("start:uniform", "A start anywhere in the free space", "shift+u", of_map(anywhere_added)),
-        ("start:next", "Next start of the map", "shift+n", next_start),
-        ("start:default", "Make it the default start", "shift+d", make_default),
-        ("more", "One robot more", "shift+=, shift++", lambda editor: editor.add_robots(1)),
-        ("fewer", "One robot fewer", "shift+-", lambda editor: editor.add_robots(-1)),
-    ),
-    "Help": (("help", "Keys", "f1, shift+/", None), ("palette", "Commands by name", "ctrl+k, /", None)),
-}
+        ("start:next", "Next start of the map", "shift+n", does(next_start)),
+        ("start:default", "Make it the default start", "shift+d", does(make_default)),
+        ("more", "One robot more", "shift+=, shift++", partial(editor.add_robots, 1)),
+        ("fewer", "One robot fewer", "shift+-", partial(editor.add_robots, -1)),
+        "Help",
+        ("help", "Keys", "f1, shift+/", of_window["help"]),
+        ("palette", "Commands by name", "ctrl+k, /", of_window["palette"]),
+    )
+    listed: list[Command] = []
 
+    def add(group: str, name: str, title: str, keys: str, run: Run) -> None:
+        pressed, repeats = tuple(filter(None, keys.split(", "))), name in _REPEATED
+        listed.append(Command(name, title, group, run, pressed, repeats=repeats, hidden=not title))
 
-def editor_commands(editor: Editor, of_window: Mapping[str, Callable[[], object]]) -> list[Command]:
-    """Return every command, those of the tools and of what is snapped to or shown among them."""
-    found = []
-    for group, rows in _ROWS.items():
-        for name, title, keys, run in rows:
-            does = of_window[name] if run is None else partial(run, editor)
-            pressed = tuple(keys.split(", ")) if keys else ()
-            repeats, hidden = name in _REPEATED, not title
-            found.append(Command(name, title, group, does, pressed, repeats=repeats, hidden=hidden))
+    group = ""
+    for row in table:
+        if isinstance(row, str):
+            group = row
+        else:
+            add(group, *row)
     for tool, key in zip(editor.tools.values(), _TOOL_KEYS, strict=True):
-        choose, title = partial(editor.choose, tool.name), f"{tool.title}: {tool.hint}"
-        found.append(Command(f"tool:{tool.name}", title, "Tools", choose, (key,)))
-    titles = [(name, f"Snap to {title.lower()}") for name, (title, _) in SNAPS.items()]
-    snaps = [(*titled, str(k)) for k, titled in enumerate(titles, 1)]
-    shows = [(name, title, key) for (name, title), key in zip(SHOWN.items(), _SHOWN_KEYS, strict=True)]
-    for kind, group, switches in (("snap", "Snap", snaps), ("show", "View", shows)):
-        for name, title, key in switches:
-            found.append(Command(f"{kind}:{name}", title, group, partial(editor.switch, kind, name), (key,)))
-    return found
+        choose = partial(editor.choose, tool.name)
+        add("Tools", f"tool:{tool.name}", f"{tool.title}: {tool.hint}", key, choose)
+    for k, (name, (title, _)) in enumerate(SNAPS.items(), 1):
+        switch = partial(editor.switch, "snap", name)
+        add("Snap", f"snap:{name}", f"Snap to {title.lower()}", str(k), switch)
+    for (name, title), key in zip(SHOWN.items(), _SHOWN_KEYS, strict=True):
+        add("View", f"show:{name}", title, key, partial(editor.switch, "show", name))
+    return listed
 
 
 TYPED: dict[str, tuple[str, RunWith]] = {
@@ -538,9 +504,9 @@ TYPED: dict[str, tuple[str, RunWith]] = {
     "place": ("2 3: lower left corner", _place),
     "rotate": ("30: by degrees", _edit_to(transform.rotated, angle_of)),
     "scale": ("150%: what is selected", _scale),
-    "size": ("3 x 2: width and height", _size),
-    "width": ("0.2: of walls", _edit_to(properties.widened, length_of)),
-    "circle": ("0.5: radius of circles", _edit_to(properties.sized, length_of)),
+    "size": ("3 x 2: width and height", _edit_to(transform.resized, size_of)),
+    "width": ("0.2: of walls", _set_measure(properties.widened, "width")),
+    "circle": ("0.5: radius of circles", _set_measure(properties.sized, "radius")),
     "bevel": ("0.3: cut corners off", lambda editor, text: trim(editor, vertices.bevelled, length_of(text))),
     "round": ("0.3: round corners", lambda editor, text: trim(editor, vertices.rounded_off, length_of(text))),
     "simplify": ("0.05: leave vertices out, to a tolerance", _edit_to(vertices.simplified, length_of)),
@@ -552,8 +518,8 @@ TYPED: dict[str, tuple[str, RunWith]] = {
     "density": ("none: takes it away", _set_density),
     "speed": ("0.5: along a path, m/s", _edit_to(paths.path_paced, paths.speed_of)),
     "offset": ("0.2: grow, or shrink with -", _edit_to(boolean.offset, _signed)),
-    "array": ("3 x 2 1.5 1.5: columns, rows, distances", _array),
-    "name": ("pillar: of what is selected", _name),
+    "array": ("3 x 2 1.5 1.5: columns, rows, distances", _edit_to(transform.arrayed, _array_of)),
+    "name": ("pillar: of what is selected", rename),
     "note": ("words: on what is selected", _edit_to(properties.noted, str)),
     "title": ("Hall: of the map", lambda editor, text: editor.change(properties.titled(editor.sketch, text))),
 }
@@ -561,8 +527,6 @@ TYPED: dict[str, tuple[str, RunWith]] = {
 
 
 def typed_commands(editor: Editor) -> list[Command]:
-    """Return the commands with a value after them."""
-
     def run(word: str, text: str) -> None:
         editor.carry_out(lambda: run_typed(editor, word, text))
 
@@ -574,65 +538,55 @@ def typed_commands(editor: Editor) -> list[Command]:
 
 def run_typed(editor: Editor, word: str, text: str) -> None:
     """Do what was typed, as ``rotate 30``; raises a MapError when that means nothing, or cannot be done."""
-    if not text.strip():
-        raise MapError(f"{word}: a value was wanted after it")
+    require(text.strip(), f"{word}: a value was wanted after it")
     TYPED[word][1](editor, text.strip())
 
 
-# the menu at the cursor
-
-
 def offered(editor: Editor) -> list[str]:
-    """Return the names of the actions that apply to what is selected, with an empty one between groups."""
-    names = [name for group in _offered_groups(editor) if group for name in ("", *group)]
-    return names[1:]
+    """Return the names of the commands that apply to what is selected, with an empty one between groups."""
+    groups = _of_vertices(editor) if editor.selection.vertices else _of_things(editor)
+    return [name for group in groups if group for name in ("", *group.split())][1:]
 
 
-def _offered_groups(editor: Editor) -> list[list[str]]:
+def _of_things(editor: Editor) -> list[str]:
     selection = editor.selection
-    if not selection:
-        drawn = ["polygon", "rectangle", "circle", "wall", "boundary", "disc"]
-        tools = [f"tool:{name}" for name in drawn]
-        return [["paste", "select:all"], tools, ["fit", "background", "try"]]
-    if selection.vertices:
-        return _of_vertices(editor)
     shapes = [editor.sketch.item(key).shape for key in selection.items if key in editor.sketch.places]
-    if selection.starts and not shapes:
-        return [["copy", "duplicate", "delete"], ["name", "show:robots", "fit:selection"]]
+    if not selection:
+        drawn = "tool:polygon tool:rectangle tool:circle tool:wall tool:boundary tool:disc"
+        return ["paste select:all", drawn, "fit background try"]
+    if not shapes and selection.starts:
+        return ["copy duplicate delete", "name show:robots fit:selection"]
     if not shapes:
-        return [["fit", "simplify", "straighten", "repair"], ["tool:boundary"]]
+        return ["fit simplify straighten repair", "tool:boundary"]
     one, several = len(selection.owners) == 1, len(shapes) > 1
     walls = sum(isinstance(shape, WallObstacle) for shape in shapes)
     polygons = sum(isinstance(shape, PolygonObstacle) for shape in shapes)
-    spread = ["distribute:x", "distribute:y"] if len(shapes) > 2 else []
     of_shapes = {
         "join": several and walls == len(shapes),
         "polygons": polygons < len(shapes),
-        "simplify": polygons or selection.boundary,
-        "straighten": polygons or selection.boundary,
+        "simplify straighten": polygons or selection.boundary,
         "boundary:of": one and len(shapes) == polygons == 1,
         "repair": any(problem.of in selection.owners and problem.grave for problem in editor.problems),
     }
+    spread = "distribute:x distribute:y" if len(shapes) > 2 else ""
     return [
-        ["cut", "copy", "duplicate", "delete"],
-        ["name", "fit:selection"] if one and not selection.boundary else [],
-        ["rotate:left", "rotate:right", "mirror:x", "mirror:y"],
-        ["unite", "subtract", "intersect", "divide"] if several else [],
-        ["align:left", "align:bottom", *spread] if several else [],
-        [*(["group"] if several else []), "lock", "hide"] if shapes else [],
-        [name for name, means_something in of_shapes.items() if means_something],
+        "cut copy duplicate delete",
+        "name fit:selection" if one and not selection.boundary else "",
+        "rotate:left rotate:right mirror:x mirror:y",
+        *(["unite subtract intersect divide", f"align:left align:bottom {spread}"] if several else []),
+        "group lock hide" if several else "lock hide",
+        " ".join(names for names, means_something in of_shapes.items() if means_something),
     ]
 
 
-def _of_vertices(editor: Editor) -> list[list[str]]:
+def _of_vertices(editor: Editor) -> list[str]:
     selection = editor.selection
-    names, aligning = ["delete", "bevel", "round"], ["align:left", "align:bottom"]
+    names, aligning = "delete bevel round", "align:left align:bottom"
     if len(selection.vertices) == 1:
-        (vertex,), aligning = selection.vertices, []
+        (vertex,), aligning = selection.vertices, ""
         shape = editor.sketch.item(vertex.of).shape if isinstance(vertex.of, int) and vertex.of >= 0 else None
         if isinstance(shape, WallObstacle):
-            names.append("extend" if vertex.index in (0, len(shape.points) - 1) else "split")
-        if vertex.ring:
-            names.append("fill")
-    copying = ["copy", "duplicate"] if BOUNDARY not in whole(selection).owners else []
-    return [names, aligning, ["straighten", "simplify"], copying]
+            names += " extend" if vertex.index in (0, len(shape.points) - 1) else " split"
+        names += " fill" if vertex.ring else ""
+    copying = "copy duplicate" if BOUNDARY not in whole(selection).owners else ""
+    return [names, aligning, "straighten simplify", copying]

@@ -1,6 +1,8 @@
 """The editor: what is open, selected, shown and remembered, and how every change is made. No pygame."""
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -13,7 +15,7 @@ from robocov.mapfile.models import SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.editor.model.document import Document
 from robocov_app.editor.model.measurement import Measurement
-from robocov_app.editor.model.selection import Change, Selection
+from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.model.sketch import Sketch
 from robocov_app.editor.model.validation import Problem, in_words
 from robocov_app.editor.tools import draw
@@ -27,14 +29,11 @@ from robocov_app.toolkit.dialogs import Answer, Dialog, Dialogs, Question
 from robocov_app.toolkit.worker import Worker
 
 FILE = "editor.json"
-
+# layers that can be shown or hidden, with their titles
 SHOWN = {"grid": "Grid", "names": "Names", "impassable": "Too narrow", "problems": "Problems"}
 SHOWN |= {"robots": "Robots at start", "picture": "Picture", "legend": "Legend", "handles": "Handles"}
-"""Layers that can be shown or hidden, with their titles."""
-
 # settings that are as an attribute of the editor, with its name
 KEPT = {"grid": "grid", "angle": "snap_angle", "radius": "radius", "robots": "robots", "wall": "wall_width"}
-
 MOST_RECENT = 10
 
 
@@ -58,32 +57,86 @@ class EditorSettings(BaseModel):
     recent: tuple[str, ...] = ()
 
 
-TOOLS: tuple[type[Tool], ...] = (
-    *(SelectTool, PanTool, draw.PolygonTool, draw.RectangleTool, draw.CircleTool, draw.WallTool),
-    *(draw.DoorTool, draw.BoundaryTool, draw.MeasureTool, draw.DiscTool, draw.PlacesTool),
-    *(DensityTool, MotionPathTool, ReferenceImageTool),
-)
-"""All tools, in the order in which they are shown."""
-
 SAID_FOR, TROUBLE_FOR = 5.0, 8.0  # seconds for which a message stays, or one of what went wrong
 FEW = 1500  # vertices up to which a map is measured while something is dragged
 GRIDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)  # m; spacings to choose from
 
 
+@dataclass(frozen=True)
+class Team:
+    """A team at a start, for its preview."""
+
+    start: str | None  # None for anywhere in the free space
+    robots: int
+    radius: float  # m
+    places: tuple[Point, ...] = ()  # m; empty where it cannot stand there
+    words: str = ""  # why not
+
+
+def placed(sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> Team:
+    try:
+        points = sketch.environment().start(start).sample(robots, seed=seed, radius=radius)
+    except Exception as error:  # what nobody has foreseen must not end the window either
+        return Team(start, robots, radius, words=str(error).removeprefix("map: "))
+    return Team(start, robots, radius, tuple((x, y) for x, y in points.tolist()))
+
+
+class TeamThread:
+    """Asks `placed` in a thread, so that the window does not wait; only the newest question counts."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "team")
+        self._asked: tuple[object, ...] = ()
+        self._answer: Future[Team] | None = None
+
+    def ask(self, sketch: Sketch, start: str | None, robots: int, seed: int, radius: float) -> None:
+        """Ask where a team would stand; asking the same again does nothing."""
+        team = start, robots, seed, radius
+        if self._asked == (sketch, *team):
+            return
+        self._asked = sketch, *team
+        if self._answer is not None:
+            self._answer.cancel()
+        self._answer = self._pool.submit(placed, sketch, *team)
+
+    def poll(self) -> Team | None:
+        """Return the answer to the newest question, once."""
+        if self._answer is None or not self._answer.done():
+            return None
+        answer, self._answer = self._answer.result(), None
+        return answer
+
+    def close(self) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+
 class Editor(Workspace):
     """Editor state and the user's actions on it."""
 
-    def __init__(self, document: Document, readings: Worker[Measurement], folder: Path) -> None:
+    def __init__(
+        self,
+        document: Document,
+        readings: Worker[Measurement],
+        folder: Path,
+        settings: EditorSettings | None = None,
+    ) -> None:
         super().__init__(document)
+        settings = settings or EditorSettings()
         self.readings, self.folder = readings, folder
-        self.tools: dict[str, Tool] = {kind.name: kind() for kind in TOOLS}
+        tools = (  # in the order in which they are shown
+            *(SelectTool(), PanTool(), draw.PolygonTool(), draw.RectangleTool(), draw.CircleTool()),
+            *(draw.WallTool(), draw.DoorTool(), draw.BoundaryTool(), draw.MeasureTool(), draw.DiscTool()),
+            *(draw.PlacesTool(), DensityTool(), MotionPathTool(), ReferenceImageTool()),
+        )
+        self.tools: dict[str, Tool] = {tool.name: tool for tool in tools}
         self.tool: Tool = self.tools["select"]
-        self.theme = "light"
+        self.theme: str = settings.theme
         self.panel = True
-        self.shown = {name for name in SHOWN if name != "robots"}
-        self.radius, self.robots, self.seed = DEFAULT_RADIUS, 6, 0
+        self.shown, self.snaps = set(settings.shown) & set(SHOWN), set(settings.snaps) & set(SNAPS)
+        self.grid, self.snap_angle, self.wall_width = settings.grid, settings.angle, settings.wall
+        self.radius, self.robots, self.seed = settings.radius, settings.robots, 0
         self.start: str | None = None
-        self.recent: list[str] = []
+        self.recent = list(settings.recent)
         self.measurement: Measurement | None = None
         self.problem: Problem | None = None  # the one that is shown with its words
         self.dialogs = Dialogs()  # with what waits for an answer
@@ -92,43 +145,29 @@ class Editor(Workspace):
         self.moves_since: float | None = None  # s; since when obstacles that move are shown moving
         self._about: tuple[object, float] | None = None
 
-    # what there is
-
     @property
     def selector(self) -> SelectTool:
-        """The tool that selects."""
         return self.tools["select"]  # type: ignore[return-value]
-
-    @property
-    def pending(self) -> Change | None:
-        """Change that letting go of the mouse would make."""
-        drag = self.selector.drag
-        return drag.change if drag is not None else None
 
     @property
     def preview(self) -> tuple[Sketch, Selection]:
         """The map and what is selected as they are shown: in a drag, what letting go would make."""
-        pending = self.pending
-        return (self.sketch, self.selection) if pending is None else (pending.sketch, pending.selection)
+        change = self.selector.drag.change if self.selector.drag is not None else None
+        return (self.sketch, self.selection) if change is None else (change.sketch, change.selection)
 
     @property
     def problems(self) -> tuple[Problem, ...]:
-        """Problems found so far."""
         return self.measurement.problems if self.measurement is not None else ()
 
     @property
     def start_names(self) -> list[str]:
-        """The starts that a team may be shown at."""
         return [name for name, _ in self.sketch.starts]
 
     @property
     def start_name(self) -> str | None:
         """The start at which the team is shown: the selected one, the chosen one, or the first."""
-        names = self.start_names
-        wanted = (*sorted(self.selection.starts), self.start, *names)
-        return next((name for name in wanted if name in names), None)
-
-    # changing
+        wanted = (*sorted(self.selection.starts), self.start, *self.start_names)
+        return next((name for name in wanted if name in self.start_names), None)
 
     def _changed(self) -> None:
         super()._changed()
@@ -138,54 +177,38 @@ class Editor(Workspace):
 
     def ask_readings(self) -> None:
         """Ask what the map is like, also one of few vertices that is being dragged; not the same again."""
-        sketch, pending = self.sketch, self.pending
-        if pending is not None and vertex_count(pending.sketch) < FEW:
-            sketch = pending.sketch
-        about = self._about
+        sketch, about = self.preview[0], self._about
+        if sketch is not self.sketch and vertex_count(sketch) >= FEW:
+            sketch = self.sketch
         if about is None or about[0] is not sketch or about[1] != self.radius:
             self._about = sketch, self.radius
             self.readings.put(self._about)
 
-    def undo(self) -> None:
-        """Take the newest change back."""
-        change = self.document.history.undo()
-        self.say(f"undone: {change.words}" if change else "nothing to undo")
-        self._changed()
-
-    def redo(self) -> None:
-        """Do again what was undone last."""
-        change = self.document.history.redo()
-        self.say(f"done again: {change.words}" if change else "nothing to do again")
-        self._changed()
-
     def travel(self, steps: int) -> None:
-        """Undo so many changes, or with a negative number do them again."""
-        history = self.document.history
+        """Undo so many changes, or with a negative number do them again; tell of a single one."""
+        history, change = self.document.history, None
         for _ in range(abs(steps)):
-            if (history.undo if steps > 0 else history.redo)() is None:
-                break
+            change = history.undo() if steps > 0 else history.redo()
+        if abs(steps) == 1:
+            done, none = ("undone", "undo") if steps > 0 else ("done again", "do again")
+            self.say(f"{done}: {change.words}" if change else f"nothing to {none}")
         self._changed()
 
     def put(self, document: Document) -> None:
-        """Put another document in the editor."""
         self.document = document
-        self.measurement, self._about = None, None
+        self.measurement = self._about = None
         self.selector.cancel(self)
         self.choose("select", tell=False)
         self._changed()
 
     def choose(self, name: str, *, tell: bool = True) -> None:
-        """Take a tool."""
         self.tool.cancel(self)
         self.tool, self.typed = self.tools[name], ""
         self.version += 1
         if tell:
             self.say(self.tool.hint)
 
-    # messages
-
     def attempt(self, action: Callable[[], object]) -> None:
-        """Do something; what cannot be done is told, in a sentence."""
         try:
             self.carry_out(action)
         except RobocovError as error:
@@ -203,7 +226,6 @@ class Editor(Workspace):
 
     @property
     def asked(self) -> Dialog | None:
-        """The dialog that is open."""
         return self.dialogs.asked
 
     def ask(self, title: str, words: str, *answers: tuple[str, str, Callable[[], object]]) -> None:
@@ -212,67 +234,40 @@ class Editor(Workspace):
         self.dialogs.ask(Question(title, words, given, on_cancel=given[-1].call))
 
     def pass_time(self, seconds: float) -> None:
-        """Let the clock go on: old messages go, answers come."""
         self.now += seconds
         if self.message and self.now - self.said > (TROUBLE_FOR if self.trouble else SAID_FOR):
             self.message = ""
-        answer = self.readings.poll()
-        if answer is not None:
+        if (answer := self.readings.poll()) is not None:
             self.measurement = answer
             self.version += 1
 
-    # typing while something is drawn
-
-    @property
-    def takes_numbers(self) -> bool:
-        """Whether digits are for the tool."""
-        tool = self.tool
-        return tool.takes_numbers and (tool.busy or tool.begins_typed or bool(self.typed))
-
-    def enter(self) -> None:
-        """Give the tool what was typed."""
-        text, self.typed = self.typed, ""
-        self.attempt(lambda: self.tool.enter(self, text))
-
-    # settings
-
     def switch(self, kind: str, name: str) -> None:
-        """Show something, or snap to it, or not."""
         chosen = self.shown if kind == "show" else self.snaps
         if kind == "snap" and name == "all":
             self.snaps = set() if self.snaps else set(SNAPS)
             self.say("snaps to everything" if self.snaps else "snaps to nothing")
-        else:
-            chosen ^= {name}
-            title = SHOWN[name] if kind == "show" else SNAPS[name][0]
-            self.say(f"{title}: {'on' if name in chosen else 'off'}")
-        self.version += 1
+            return
+        chosen ^= {name}
+        title = SHOWN[name] if kind == "show" else SNAPS[name][0]
+        self.say(f"{title}: {'on' if name in chosen else 'off'}")
 
     def set_length(self, name: str, length: float) -> None:
-        """Give grid, robots' radius or drawn walls another length, m."""
-        most = 10.0 if name == "radius" else 100.0
+        most, what = 10.0 if name == "radius" else 100.0, name.replace("_", " ")
         if not SMALLEST <= length <= most:
-            wanted = f"{SMALLEST:g} to {most:g} m was wanted"
-            raise MapError(f"{name.replace('_', ' ')}: {length:g} m, but {wanted}")
+            raise MapError(f"{what}: {length:g} m, but {SMALLEST:g} to {most:g} m was wanted")
         setattr(self, name, length)
-        self.version += 1
-        self.ask_readings()
         if name == "grid":
             self.say(f"the grid is {length:g} m")
 
     def change_grid(self, by: int) -> None:
-        """Take the next finer or coarser grid."""
         finer = [each for each in GRIDS if each < self.grid * 0.999] or GRIDS[:1]
         coarser = [each for each in GRIDS if each > self.grid * 1.001] or GRIDS[-1:]
         self.set_length("grid", coarser[0] if by > 0 else finer[-1])
 
     def set_robots(self, count: int) -> None:
-        """Show a team of another size."""
         if not 1 <= count <= 1000:
             raise MapError(f"robots: {count}, but 1 to 1000 were wanted")
         self.robots = count
-        self.version += 1
 
     def add_robots(self, by: int) -> None:
-        """Show a team of more or fewer robots."""
         self.set_robots(min(max(self.robots + by, 1), 1000))

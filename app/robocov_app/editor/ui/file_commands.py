@@ -2,9 +2,12 @@
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TypeAlias
+
+from PIL import Image, UnidentifiedImageError
 
 from robocov.errors import MapError
 from robocov.mapfile import bundled_maps, map_file
@@ -20,10 +23,8 @@ from robocov_app.toolkit.dialogs import Option, file_choice, list_choice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Worker
 
 Act: TypeAlias = Callable[[], object]
-
 _PATIENCE = 2.0  # seconds after which an import with settings that have changed since is given up
 _CANCEL = ("Cancel", "c", lambda: None)
-
 _OPENED = (SUFFIX, *(suffix for importer in IMPORTERS.values() for suffix in importer.suffixes))
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff")
 
@@ -35,29 +36,7 @@ class FileCommands:
         self.editor, self.drafts, self._fit, self._patient = editor, drafts, fit, patient
         self.leaving = False
 
-    def close(self) -> None:
-        """End what is going on beside the window."""
-        if isinstance(self.editor.asked, ImportDialog):
-            self.editor.dialogs.close()
-
-    def commands(self) -> dict[str, Act]:
-        """Return what the commands do, by their names."""
-        return {
-            "new": lambda: self.leave(self.new),
-            "open": lambda: self._ask_path("Open a map", self.open, _OPENED),
-            "recent": self.ask_recent,
-            "save": self.save,
-            "save:as": self.ask_name,
-            "export": self.ask_export,
-            "reload": self.reload,
-            "background": lambda: self._ask_path("Picture under the map", self.underlay, PICTURES),
-            "quit": lambda: self.leave(lambda: setattr(self, "leaving", True)),
-        }
-
-    # leaving what is open
-
     def leave(self, then: Act) -> None:
-        """Put another document in place of this one, after asking what is to become of it."""
         document = self.editor.document
 
         def discard() -> None:
@@ -72,32 +51,35 @@ class FileCommands:
         answers = (("Save", "s", save), ("Discard", "d", discard), _CANCEL)
         self.editor.ask("Save the changes?", words, *answers)
 
-    def _put(self, document: Document, words: str = "") -> None:
+    def _put(self, document: Document, words: str) -> None:
         self.editor.put(document)
         self._fit()
         if document.path is not None:
             self.remember(document.path)
         self.editor.say(words)
 
-    # opening
+    def quit(self) -> None:
+        self.leave(lambda: setattr(self, "leaving", True))
 
-    def new(self) -> str:
-        """Put an empty sheet in the editor."""
-        self._put(Document.new(self.drafts))
-        return "a new map: 10 x 10 m; B draws another boundary"
+    def new(self) -> None:
+        words = "a new map: 10 x 10 m; B draws another boundary"
+        self.leave(lambda: self._put(Document.new(self.drafts), words))
+
+    def ask_open(self) -> None:
+        self._ask_path("Open a map", self.open, _OPENED)
+
+    def ask_picture(self) -> None:
+        self._ask_path("Picture under the map", self.underlay, PICTURES)
 
     def _ask_path(
         self, title: str, call: Callable[[Path], object], endings: Sequence[str], text: str = ""
     ) -> None:
-        """Ask for a file; for one to save to where a name is suggested."""
-
         def chosen(path: Path) -> None:
             self.editor.carry_out(lambda: call(path))
 
         self.editor.dialogs.ask(file_choice(title, self.editor.folder, chosen, endings=endings, text=text))
 
     def ask_recent(self) -> None:
-        """Ask which of the maps to open that were open lately, or come with robocov."""
         names = [Option(path, "recent") for path in self.editor.recent if Path(path).exists()]
         names += [Option(name, "comes with robocov; opens as a copy") for name in bundled_maps()]
 
@@ -107,7 +89,6 @@ class FileCommands:
         self.editor.dialogs.ask(list_choice("Open a recent or bundled map", lambda: names, chosen))
 
     def open(self, path: Path) -> None:
-        """Open a file: a map, or one of a foreign format as a new map."""
         own = self.editor.document.path
         if own is not None and own.exists() and path.exists() and path.samefile(own):
             self.reload()
@@ -121,8 +102,6 @@ class FileCommands:
             self.ask_import(path, found)
 
     def ask_import(self, path: Path, importer: Importer) -> None:
-        """Ask how a foreign file is to be imported, and show what would come of it."""
-
         def put(imported: Imported) -> None:
             sketch = Sketch.from_environment(imported.environment)
             document = Document(sketch, self.drafts, saved=False, stem=path.stem)
@@ -130,31 +109,24 @@ class FileCommands:
 
         worker: Worker[Imported] = DirectWorker(Importing())
         if not self._patient:
-            service = "robocov_app.editor.ui.importing:Importing"
-            worker = LatestWorker(service, "imports", patience=_PATIENCE)
+            worker = LatestWorker(f"{Importing.__module__}:Importing", "imports", patience=_PATIENCE)
         self.editor.dialogs.ask(ImportDialog(path, importer, worker, put))
 
     def recover(self, draft: Autosave) -> None:
-        """Go on with work that was left behind."""
-        self._put(Document.recovered(draft, self.drafts))
-        self.editor.say(f"recovered: {draft.words()}")
+        words = f"recovered: {draft.words()}"
+        self.leave(lambda: self._put(Document.recovered(draft, self.drafts), words))
 
     def remember(self, path: Path) -> None:
-        """Note a file as one that was open lately."""
         name = os.path.abspath(path)  # noqa: PTH100 - resolves no links, as people know the path
         self.editor.recent = [name, *(each for each in self.editor.recent if each != name)][:MOST_RECENT]
 
-    # saving
-
     def save(self, then: Act | None = None) -> str | None:
-        """Save to the document's file; ask for one if it has none."""
         if self.editor.document.path is None:
             self.ask_name(then)
             return None
         return self._save(self.editor.document.path, then)
 
     def ask_name(self, then: Act | None = None) -> None:
-        """Ask where to save."""
         folder = self.editor.folder
         suggested = self.editor.document.suggested(folder)
         text = suggested.name if suggested.parent == folder else str(suggested)
@@ -169,13 +141,11 @@ class FileCommands:
         try:
             words = editor.document.save(path, over=over)
         except ChangedError as error:
-            replace = partial(self._save, path, then, over=True)
-            self._ask_over("Replace the file?", str(error), then, replace)
+            self._ask_over("Replace the file?", str(error), then, partial(self._save, path, then, over=True))
             return None
         assert editor.document.path is not None
         self.remember(editor.document.path)
-        grave = [problem for problem in editor.problems if problem.grave]
-        if grave:
+        if grave := [problem for problem in editor.problems if problem.grave]:
             words += f", as a draft: {grave[0].words}"
         if then is not None:
             then()
@@ -185,10 +155,7 @@ class FileCommands:
         answers = (("Save as…", "a", lambda: self.ask_name(then)), ("Replace it", "r", go_on), _CANCEL)
         self.editor.ask(title, words, *answers)
 
-    # exporting
-
     def ask_export(self) -> None:
-        """Ask where to write the map in a foreign format, which goes by the suffix."""
         self.editor.sketch.environment()
         suffixes = [suffix for exporter in EXPORTERS.values() for suffix in exporter.suffixes]
         title = f"Export to a file ending in {', '.join(suffixes)}"
@@ -205,10 +172,7 @@ class FileCommands:
         files = ", ".join(map(str, report.files))
         return "; ".join([f"exported: {files}", *report.warnings, *report.dropped])
 
-    # what happens on the disk
-
     def look(self) -> None:
-        """Look for what has come meanwhile: of an import, and whether something else has changed the file."""
         editor = self.editor
         if isinstance(asked := editor.asked, ImportDialog) and (imported := asked.poll()) is not None:
             editor.dialogs.close()
@@ -224,19 +188,13 @@ class FileCommands:
             editor.ask("The file has changed", words, *answers)
 
     def reload(self) -> str:
-        """Read the file again."""
         if self.editor.document.path is None:
             raise MapError("the map has no file yet")
         self.editor.document.reload()
         self.editor.measurement = None
-        self.editor.version += 1
-        self.editor.ask_readings()
         return f"read again: {self.editor.document.title}"
 
-    # the picture under the map
-
     def underlay(self, path: Path) -> None:
-        """Put a picture under the map."""
         lay_under(self.editor, path)
         self.editor.choose("picture")
         self._fit()
@@ -244,8 +202,6 @@ class FileCommands:
 
 def lay_under(editor: Editor, path: Path) -> None:
     """Put a picture under the map, as wide as the map is, or 20 m."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
         with Image.open(path) as picture:
             pixels = picture.size
@@ -262,12 +218,8 @@ def lay_under(editor: Editor, path: Path) -> None:
 def _from_map(path: Path, of: Path | None) -> str:
     """Return how a map names a picture: from its own folder where that is near, else from the root."""
     path = path.resolve()
-    if of is not None:
-        try:
-            near = os.path.relpath(path, of.resolve().parent)
-        except ValueError:  # on another drive
-            return path.as_posix()
-        if near.count("..") < 2:
+    with suppress(ValueError):  # on another drive
+        if of is not None and (near := os.path.relpath(path, of.resolve().parent)).count("..") < 2:
             return Path(near).as_posix()
     return path.as_posix()
 
@@ -289,7 +241,6 @@ def opened(path: Path, drafts: Path | None) -> Document | Importer:
 
 
 def heading(document: Document) -> str:
-    """Return what is said of a document that was opened."""
     if document.path is None:
         return f"{document.title}: opened as a copy"
     if not document.path.exists():

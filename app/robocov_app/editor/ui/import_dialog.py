@@ -1,7 +1,7 @@
 """The import dialog: options at the left, the map before and after at the right, the report below."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -12,14 +12,14 @@ from pygame import Rect, Surface
 from shapely.geometry.base import BaseGeometry
 
 from robocov.errors import RobocovError
-from robocov_app.editor.ui.importing import Continuation, Imported, options_of
+from robocov_app.editor.ui.importing import Imported, options_of
 from robocov_app.formats import Importer, ReadOptions, Shaping
 from robocov_app.formats.base import square_metres
 from robocov_app.render.camera import Camera
 from robocov_app.render.fonts import label, shortened, text_width
 from robocov_app.render.layout import columns_for
 from robocov_app.render.surface_cache import Latest
-from robocov_app.render.theme import Colour, Theme
+from robocov_app.render.theme import Theme
 from robocov_app.toolkit.dialogs import Dialog
 from robocov_app.toolkit.overlay import wrapped
 from robocov_app.toolkit.text_edit import TextEdit
@@ -28,10 +28,7 @@ from robocov_app.toolkit.worker import Worker
 
 # pixels at scale 1: of the options, of their names, beside them, of a line of the report, above each map
 _COLUMN, _NAME, _GAP, _LINE, _ABOVE = 300, 126, 32, 17, 40
-
 _FEWEST_LINES = 7  # of the report; more below maps that are wide
-_MARK = 150  # opacity of what is marked, of 255
-
 _HINT = "click into the map: keep that part · Tab option · Enter imports · Esc leaves"
 _DEFAULT = "default"
 
@@ -52,14 +49,10 @@ class ImportDialog(Dialog):
         self.cameras: list[Camera] = []
         self._seen: Ui | None = None
         self._worker = worker
-        self._mistake = ""
         self._picture: Latest[Surface] = Latest()
         self._ask()
 
-    # what is set
-
     def set(self, name: str, text: str) -> None:
-        """Give an option a text; the default's or none takes it back."""
         option = next(each for each in self.options if each.name == name)
         if not text or text in (option.default, _DEFAULT):
             self.given.pop(name, None)
@@ -68,34 +61,25 @@ class ImportDialog(Dialog):
         self._ask()
 
     def keep_inside(self, place: tuple[float, float]) -> None:
-        """Keep the part of the free space that holds a place, m."""
         self.given.pop("keep", None)
         self.set("inside", f"{place[0]:.10g} {place[1]:.10g}")
 
     def settings(self) -> tuple[ReadOptions, Shaping]:
-        """Return what is set."""
-        given = self.given
-        values = {each.name: each.value(given[each.name]) for each in self.options if each.name in given}
+        named = {each.name: each for each in self.options}
+        values = {name: named[name].value(text) for name, text in self.given.items()}
         of_reading = {field.name for field in fields(ReadOptions)}
-        read = {name: value for name, value in values.items() if name in of_reading}
-        return ReadOptions(**read), Shaping(**{name: values[name] for name in values.keys() - read.keys()})
-
-    # what comes of it
+        read = {name: values.pop(name) for name in values.keys() & of_reading}
+        return ReadOptions(**read), Shaping(**values)
 
     def _ask(self) -> None:
-        self.accepted = False
+        self.accepted, self._mistake = False, ""
         try:
-            options, shaping = self.settings()
+            self._worker.put((self.path, self.importer.name, *self.settings()))
         except RobocovError as error:
             self._mistake = str(error)
-        else:
-            self._mistake = ""
-            self._worker.put(Continuation(self.path, self.importer.name, options, shaping))
 
     def poll(self) -> Imported | None:
-        """Take what was imported, if it is there; return it if it is accepted."""
-        answer = self._worker.poll()
-        if answer is not None and not self._worker.busy:
+        if (answer := self._worker.poll()) is not None and not self._worker.busy:
             self.imported = answer
         if self.trouble:
             self.accepted = False
@@ -103,41 +87,31 @@ class ImportDialog(Dialog):
 
     @property
     def busy(self) -> bool:
-        """Whether it is being imported."""
         return not self._mistake and self._worker.busy
 
     @property
     def trouble(self) -> str:
-        """Why it cannot be imported as it is set."""
         return self._mistake or ("" if self._worker.busy else self._worker.trouble)
 
     @property
     def ready(self) -> bool:
-        """Whether what was imported is what is set."""
         return self.imported is not None and not self.busy and not self.trouble
 
-    # the dialog
-
     def key(self, name: str, ui: Ui) -> bool:
-        """Import by Enter; other keys are for the fields."""
-        if name in ("return", "enter") and ui.open_list is None:
-            self.accepted = True
-            return True
-        return False
+        accepts = name in ("return", "enter") and ui.open_list is None
+        self.accepted |= accepts
+        return accepts
 
     def cancelled(self) -> None:
-        """End what works on it."""
         self._worker.close()
 
     def page(self, ui: Ui) -> None:
-        """Show options, maps and report."""
         left, top, wide = ui.x, ui.y, ui.wide
         high = pygame.display.get_window_size()[1] / ui.scale - 2 * top - 8
         ui.wide = _COLUMN
         self._options(ui, top + high)
         ui.x, ui.y, ui.wide = left + _COLUMN + _GAP, top, wide - _COLUMN - _GAP
-        below = _LINE * (_FEWEST_LINES + 1) + 14
-        ui.row(height=high - below, below=0)
+        ui.row(height=high - (_LINE * (_FEWEST_LINES + 1) + 14), below=0)
         rect, clicked = ui.area("maps")
         if self.imported is not None:
             maps = self._place(rect, self.imported, ui.scale)
@@ -150,8 +124,7 @@ class ImportDialog(Dialog):
                     self.keep_inside((round(x, digits), round(y, digits)))
             ui.y = top + maps / ui.scale + 14
         else:
-            ui.end_row()
-            ui.y += 14
+            ui.space(14)
             if ui.surface is not None:
                 words = label("nothing to show" if self.trouble else "reading…", ui.px(13), ui.theme.faint)
                 ui.surface.blit(words, words.get_rect(center=rect.center))
@@ -166,8 +139,7 @@ class ImportDialog(Dialog):
             self._seen = ui
             first = next(option.name for option in self.options if not option.choices)
             ui.focus, ui.edit = first, TextEdit.of(self.given.get(first, ""))
-        room = min((foot - 44 - ui.y) / len(self.options), 28.0)
-        ui.row(_NAME, 0, height=room - 4, below=4)
+        ui.row(_NAME, 0, height=min((foot - 44 - ui.y) / len(self.options), 28.0) - 4, below=4)
         for option in self.options:
             name, tip = option.name, option.help
             now = self.given.get(name, option.default)
@@ -185,8 +157,7 @@ class ImportDialog(Dialog):
         ui.words(" ".join(lines), size=SMALL, colour=ui.theme.faint)
         ui.y = foot - 30
         ui.row(92, 92, height=30, below=0)
-        if ui.button("Import", chosen=self.ready, key="import", tip=self.trouble):
-            self.accepted = True
+        self.accepted |= ui.button("Import", chosen=self.ready, key="import", tip=self.trouble)
         if ui.button("Cancel", key="cancel"):
             self.done = True
             self.cancelled()
@@ -209,8 +180,6 @@ class ImportDialog(Dialog):
         ui.label("importing…" if self.busy and self.imported is not None else _HINT, style="unit")
         ui.end_row()
 
-    # the maps
-
     def _place(self, box: Rect, imported: Imported, scale: float) -> float:
         """Place the two maps at the top of a box; return the height that they take, px."""
         low_x, low_y, high_x, high_y = bounds = imported.comparison.bounds
@@ -231,7 +200,7 @@ class ImportDialog(Dialog):
         screen.blit(maps, (0, 0))
         self._draw_captions(screen, imported, scale, theme)
         inside = next(option for option in self.options if option.name == "inside")
-        if inside.name in self.given and not self.trouble:
+        if "inside" in self.given and not self.trouble:
             for camera in self.cameras:
                 x, y = camera.to_pixels(np.array(inside.value(self.given["inside"]))).tolist()
                 for width, ink in ((5, theme.background), (2, theme.final)):
@@ -268,35 +237,28 @@ class ImportDialog(Dialog):
 def _maps(
     size: tuple[int, int], imported: Imported, cameras: list[Camera], scale: float, theme: Theme
 ) -> Surface:
-    """Return a picture, else transparent, of the map as it was read and as it became."""
-    compared = imported.comparison
-    picture = Surface(size, pygame.SRCALPHA)
-    before = (compared.before, compared.lost, theme.trajectory)
-    after = (compared.after, compared.opened, theme.start)
-    for camera, (free, marked, colour) in zip(cameras, (before, after), strict=True):
+    compared, picture = imported.comparison, Surface(size, pygame.SRCALPHA)
+    before, after = (compared.before, compared.lost), (compared.after, compared.opened)
+    colours = theme.trajectory, theme.start
+    for camera, (free, marked), colour in zip(cameras, (before, after), colours, strict=True):
         _fill(picture, camera, compared.region, theme.obstacle, theme.obstacle)
         _fill(picture, camera, free, theme.background, theme.obstacle)
         for ring in shapely.get_rings(shapely.get_parts(free)):
             points = camera.to_pixels(shapely.get_coordinates(ring)).tolist()
             pygame.draw.aalines(picture, theme.obstacle_edge, True, points)
         marks = Surface(size, pygame.SRCALPHA)
-        _fill(marks, camera, marked, (*colour, _MARK), (0, 0, 0, 0))
+        _fill(marks, camera, marked, (*colour, 150), (0, 0, 0, 0))
         picture.blit(marks, (0, 0))
     if compared.gap is not None:
         ends = cameras[1].to_pixels(np.array(compared.gap.between))
         pygame.draw.line(picture, theme.final, ends[0].tolist(), ends[1].tolist(), round(2 * scale))
-        reach = float(np.hypot(*(ends[1] - ends[0]))) / 2
-        if reach < 10 * scale:
+        if math.dist(*ends) < 20 * scale:
             pygame.draw.circle(picture, theme.final, ends.mean(axis=0).tolist(), 10 * scale, round(2 * scale))
     return picture
 
 
 def _fill(
-    surface: Surface,
-    camera: Camera,
-    area: BaseGeometry,
-    inside: Colour | tuple[int, int, int, int],
-    holes: Colour | tuple[int, int, int, int],
+    surface: Surface, camera: Camera, area: BaseGeometry, inside: Sequence[int], holes: Sequence[int]
 ) -> None:
     """Fill polygons; what lies in the hole of another is smaller, and drawn after it."""
     parts = [part for part in shapely.get_parts(area).tolist() if part.geom_type == "Polygon"]

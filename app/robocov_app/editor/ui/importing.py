@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
 from robocov.environment import Environment
 from robocov.errors import ParameterError, one_line, shown
@@ -14,8 +14,8 @@ from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.toolkit.worker import Line
 
 Kind = Literal["number", "place", "words", "text", "choice"]
-
 ON = "yes"  # a switch that is on
+Wanted: TypeAlias = tuple[Path, str, ReadOptions, Shaping]  # a file, its format, and how to import it
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,6 @@ class Option:
     help: str
 
     def value(self, text: str) -> Any:
-        """Return what a text means."""
         if self.kind == "choice":
             return True if text == ON else text
         if self.kind == "words":
@@ -47,7 +46,6 @@ class Option:
 
 
 def options_of(importer: Importer) -> tuple[Option, ...]:
-    """Return the options that mean something for a format, those of reading first."""
     reading = [option for option in _options(ReadOptions) if option.name in importer.options]
     return (*reading, *_options(Shaping))
 
@@ -60,28 +58,17 @@ def _options(settings: type[ReadOptions] | type[Shaping]) -> Iterator[Option]:
         hint = hints[field.name]
         plain = next((each for each in get_args(hint) if each is not type(None)), hint)
         hint = hint if get_origin(hint) in (Literal, tuple) else plain
+        name, words = field.name, helps.get(field.name, "")
         default = "" if field.default is None else str(field.default)
-        kind: Kind = "number" if hint is float else "text"
-        choices: tuple[str, ...] = ()
         if hint is bool:
-            kind, choices, default = "choice", ("no", ON), "no"
+            yield Option(name, "choice", ("no", ON), "no", words)
         elif get_origin(hint) is Literal:
-            kind, choices = "choice", get_args(hint)
-            if default:
-                choices = tuple(sorted(choices, key=lambda each: each != default))
+            choices = sorted(get_args(hint), key=lambda each: bool(default) and each != default)
+            yield Option(name, "choice", tuple(choices), default, words)
         elif get_origin(hint) is tuple:
-            kind = "words" if ... in get_args(hint) else "place"
-        yield Option(field.name, kind, choices, default, helps.get(field.name, ""))
-
-
-@dataclass(frozen=True, eq=False)
-class Continuation:
-    """Request: a file and the options to import it with."""
-
-    path: Path
-    format: str
-    options: ReadOptions
-    shaping: Shaping
+            yield Option(name, "words" if ... in get_args(hint) else "place", (), default, words)
+        else:
+            yield Option(name, "number" if hint is float else "text", (), default, words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +88,12 @@ class Importing:
     def __init__(self) -> None:
         self._read: tuple[tuple[Path, str, ReadOptions], ForeignMap] | None = None
 
-    def __call__(self, questions: list[Continuation], line: Line) -> Imported:
-        """Import what was wanted last."""
-        last = questions[-1]
-        key = last.path, last.format, last.options
+    def __call__(self, questions: list[Wanted], line: Line) -> Imported:
+        path, name, options, shaping = questions[-1]
+        key = path, name, options
         if self._read is None or self._read[0] != key:
             self._read = None
-            self._read = key, read_map(last.path, format=last.format, options=last.options)
+            self._read = key, read_map(path, format=name, options=options)
         foreign = self._read[1]
-        environment, report = shaped(foreign, last.shaping, one_line(last.path.name))
+        environment, report = shaped(foreign, shaping, one_line(path.name))
         return Imported(environment, report, compare(foreign, environment, report))

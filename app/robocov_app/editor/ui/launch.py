@@ -1,7 +1,8 @@
 """Opening the editor: with a display or without, from the command line's options."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
 
 from robocov.errors import InputError
@@ -44,73 +45,58 @@ def editor_window(
     # what is wrong with the file is told before a window flashes up
     found = Document.new(drafts) if path is None else opened(path, drafts)
     document = found if isinstance(found, Document) else Document.new(drafts)
-    ended = False
-    readings = measurement_worker(direct=headless)
-    try:
-        with display(headless=alone, otherwise=NO_DISPLAY):
-            file = None if alone else settings_file(FILE)
-            settings, trouble = loaded(EditorSettings, file)
-            editor = Editor(document, readings, folder)
-            for name, attribute in KEPT.items():
-                setattr(editor, attribute, getattr(settings, name))
-            editor.theme, editor.recent = theme or settings.theme, list(settings.recent)
-            editor.shown = set(settings.shown) & set(SHOWN)
-            editor.snaps = set(settings.snaps) & set(SNAPS)
-            if background is not None:
-                lay_under(editor, background)
-                editor.choose("picture", tell=False)
-            wanted = size or (settings.width, settings.height)
-            wanted = wanted if size or alone else fitting(wanted)
-            scale = scale or settings.scale or (1.0 if alone else screen_scale())
-            window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
-            window.panel.show_tab(settings.tab)
-            editor.say(trouble or (heading(document) if path is not None and document is found else ""))
-            if document.path is not None:
-                window.documents.remember(document.path)
-            if not alone:
-                offer(window, recoverable(drafts))
-            if path is not None and not isinstance(found, Document):
-                window.documents.ask_import(path, found)
-            begun = settings_of(window, settings)
-            try:
-                yield window
-                save_settings(changed_settings(settings, begun, settings_of(window, settings)), file)
-                ended = True
-            finally:
-                window.close()
-                # what was not saved stays to be offered, unless it was decided about
-                editor.document.close(discard=ended and window.documents.leaving)
-    except BaseException:
-        if not ended:
-            document.close(discard=False)
-        raise
-    finally:
-        readings.close()
+    with ExitStack() as stack:
+        stack.callback(document.close, discard=False)  # unless it was closed by then
+        readings = stack.enter_context(closing(measurement_worker(direct=headless)))
+        stack.enter_context(display(headless=alone, otherwise=NO_DISPLAY))
+        file = None if alone else settings_file(FILE)
+        settings, trouble = loaded(EditorSettings, file)
+        editor = Editor(document, readings, folder, settings)
+        editor.theme = theme or settings.theme
+        if background is not None:
+            lay_under(editor, background)
+            editor.choose("picture", tell=False)
+        wanted = size or (settings.width, settings.height)
+        wanted = wanted if size or alone else fitting(wanted)
+        scale = scale or settings.scale or (1.0 if alone else screen_scale())
+        window = EditorWindow(editor, wanted, scale, drafts, patient=headless)
+        window.panel.show_tab(settings.tab)
+        editor.say(trouble or (heading(document) if path is not None and document is found else ""))
+        if document.path is not None:
+            window.documents.remember(document.path)
+        if not alone:
+            offer(window, recoverable(drafts))
+        if path is not None and not isinstance(found, Document):
+            window.documents.ask_import(path, found)
+        begun, discarding = settings_of(window, settings), False
+        try:
+            yield window
+            save_settings(changed_settings(settings, begun, settings_of(window, settings)), file)
+            discarding = window.documents.leaving
+        finally:
+            window.close()
+            # what was not saved stays to be offered, unless it was decided about
+            editor.document.close(discard=discarding)
 
 
 def offer(window: EditorWindow, found: Sequence[Autosave]) -> None:
-    """Offer work that was left behind, the newest first."""
     if not found:
         return
     draft, rest = found[0], found[1:]
-    editor = window.editor
-
-    def recover() -> None:
-        window.documents.leave(lambda: window.documents.recover(draft))
 
     def throw_away() -> None:
         discard(draft.folder)
         offer(window, rest)
 
+    recover = partial(window.documents.recover, draft)
     answers = (("Recover", "r", recover), ("Discard", "d", throw_away), ("Later", "l", lambda: None))
     words = f"An editor ended without saving: {draft.words()}."
     if rest:
         words += f"\n{len(rest)} more {'are' if len(rest) > 1 else 'is'} kept besides."
-    editor.ask("Recover unsaved work?", words, *answers)
+    window.editor.ask("Recover unsaved work?", words, *answers)
 
 
 def settings_of(window: EditorWindow, before: EditorSettings) -> EditorSettings:
-    """Return what is worth remembering of a window."""
     editor = window.editor
     width, height = window.windowed or window.screen.get_size()
     changes = {

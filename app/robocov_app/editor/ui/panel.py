@@ -1,14 +1,14 @@
 """The editor's panel: its pages follow the selection, and their fields show and take values."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from types import UnionType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pygame
 
-from robocov.environment import CircleObstacle, DiscStart, Point, WallObstacle
+from robocov.environment import CircleObstacle, DiscStart
 from robocov.errors import MapError, counted
 from robocov_app.editor.canvas.overlay import draw_badge
 from robocov_app.editor.edits import properties, transform
@@ -20,7 +20,7 @@ from robocov_app.editor.model.coordinates import angle_of, length_of, point_of
 from robocov_app.editor.model.selection import Selection, numbered_name, place_of, points_of
 from robocov_app.editor.model.sketch import BOUNDARY, KINDS, Owner
 from robocov_app.editor.tools.snapping import SNAPS
-from robocov_app.editor.ui.commands import Edit, fix_problem, move, run_typed, whole
+from robocov_app.editor.ui.commands import TYPED, common_measure, fix_problem, move, rename, run_typed, whole
 from robocov_app.editor.ui.editor import KEPT, SHOWN, Editor
 from robocov_app.toolkit.command import Commands
 from robocov_app.toolkit.overlay import flat_canvas, wrapped
@@ -30,97 +30,55 @@ from robocov_app.toolkit.ui import SMALL, TEXT, SidePanel, Ui
 class Field(NamedTuple):
     """A field of the panel."""
 
-    text: Callable[[Editor], str]  # what it shows
+    text: Callable[[Editor], str]  # what it shows; MapError or LookupError where there is no such value
     take: Callable[[Editor, str], object]  # takes what was typed; MapError where that means nothing
-    tip: str = ""
-
-    def shown(self, editor: Editor) -> str:
-        """Return what the field shows; nothing where there is no such value."""
-        try:
-            return self.text(editor)
-        except (MapError, LookupError):
-            return ""
+    tip: str
 
 
-def number(value: float) -> str:
-    """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros.
-
-    >>> number(2.0), number(0.30004), number(-0.00001)
-    ('2', '0.3', '0')
-    """
-    text = f"{round(value, 4) + 0.0:.4f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
+def number(value: float | None) -> str:
+    """Return a number as it stands in a field: to the tenth of a millimetre, without needless zeros."""
+    return "" if value is None else f"{round(value, 4) + 0.0:.12g}"
 
 
-def coordinate(text: str, now: float) -> float:
-    """Return a typed coordinate, m: a number with a unit or without, or a step as ``+0.5``."""
-    text = text.strip()
-    if text.startswith(("+", "@")):
-        return now + length_of(text.lstrip("+@"))
-    # two coordinates are read where only one is typed, so that signs and units mean the same
-    return point_of(f"{text} 0", last=(now, 0.0))[0]
-
-
-def _selected_things(editor: Editor) -> list[Any]:
+def _box(editor: Editor) -> tuple[float, float, float, float]:
+    """Return the place of a vertex, a centre, or a box's lower left corner, and the box's sides, m."""
     sketch, selection = editor.preview
-    shapes = [sketch.item(key).shape for key in selection.items if key in sketch.places]
-    return [*shapes, *(spec for name, spec in sketch.starts if name in selection.starts)]
-
-
-def _corner(editor: Editor) -> Point:
-    """Return the place that the page shows: of a vertex, a centre, or a box's lower left corner."""
-    sketch, selection = editor.preview
-    if len(selection.vertices) == 1:
-        return place_of(sketch, *selection.vertices)
-    if not selection.vertices and len(selection.owners) == 1:
-        for thing in _selected_things(editor):
-            if isinstance(thing, CircleObstacle | DiscStart):
-                return thing.center
-    x, y, _, _ = _bounds(editor)
-    return x, y
-
-
-def _bounds(editor: Editor) -> tuple[float, float, float, float]:
-    sketch, selection = editor.preview
-    bounds = bounds_of(sketch, whole(selection))
-    if bounds is None:
+    if (bounds := bounds_of(sketch, whole(selection))) is None:
         raise MapError("nothing is selected")
-    return bounds
+    x, y, high_x, high_y = bounds
+    sides = high_x - x, high_y - y
+    if len(selection.vertices) == 1:
+        x, y = place_of(sketch, *selection.vertices)
+    elif not selection.vertices and len(selection.owners) == 1:
+        shapes = [sketch.item(key).shape for key in selection.items]
+        for thing in (*shapes, *(dict(sketch.starts)[name] for name in selection.starts)):
+            if isinstance(thing, CircleObstacle | DiscStart):
+                x, y = thing.center
+    return x, y, *sides
 
 
 def _put(editor: Editor, text: str, axis: int) -> None:
-    now = _corner(editor)[axis]
-    by = coordinate(text, now) - now
+    """Move what is selected to a coordinate: a number with a unit or without, or a step as ``+0.5``."""
+    now, text = _box(editor)[axis], text.strip()
+    if text.startswith(("+", "@")):
+        by = length_of(text.lstrip("+@"))
+    else:  # two coordinates are read where only one is typed, so that signs and units mean the same
+        by = point_of(f"{text} 0", last=(now, 0.0))[0] - now
     dx, dy = (by, 0.0) if axis == 0 else (0.0, by)
     editor.change(move(editor, dx, dy, editor.selection))
 
 
-def _size(editor: Editor, axis: int) -> str:
-    bounds = _bounds(editor)
-    return number(bounds[axis + 2] - bounds[axis])
-
-
 def _resize(editor: Editor, text: str, axis: int) -> None:
     """Give what is selected a typed width or height; the other stays, but of circles."""
-    low_x, low_y, high_x, high_y = _bounds(editor)
-    sides = [high_x - low_x, high_y - low_y]
+    sides = list(_box(editor)[2:])
     sides[axis] = length_of(text, now=sides[axis])
     wide, high = (side or None for side in sides)
     editor.change(transform.resized(editor.sketch, whole(editor.selection), wide, high))
 
 
 def _shown_name(editor: Editor) -> str:
-    owners = whole(editor.selection).owners
-    if len(owners) != 1:
-        return ""
-    (owner,) = owners
-    return owner if isinstance(owner, str) else editor.sketch.item(owner).shape.name or ""
-
-
-def _rename(editor: Editor, text: str) -> None:
     (owner,) = whole(editor.selection).owners
-    if text.strip() != _shown_name(editor):
-        editor.change(properties.renamed(editor.sketch, owner, text.strip()))
+    return owner if isinstance(owner, str) else editor.sketch.item(owner).shape.name or ""
 
 
 def _shown_note(editor: Editor) -> str:
@@ -128,25 +86,15 @@ def _shown_note(editor: Editor) -> str:
     return notes.pop() if len(notes) == 1 else ""
 
 
-def _note(editor: Editor, text: str) -> None:
-    editor.change(properties.noted(editor.sketch, whole(editor.selection), text.strip()))
-
-
-def _measure(editor: Editor, name: str, kinds: UnionType | type) -> str:
-    """Return the width or radius that all selected things of these kinds have."""
-    found = {getattr(thing, name) for thing in _selected_things(editor) if isinstance(thing, kinds)}
-    return number(found.pop()) if len(found) == 1 else ""
-
-
-def _set_measure(editor: Editor, text: str, edit: Edit, now: Callable[[Editor], str]) -> None:
-    length = length_of(text, now=float(now(editor)) if now(editor) else None)
-    editor.change(edit(editor.sketch, whole(editor.selection), length))
-
-
 def _picture(editor: Editor) -> Background:
     if editor.sketch.background is None:
         raise MapError("there is no picture under the map: Ctrl B takes one")
     return editor.sketch.background
+
+
+def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
+    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
+    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
 
 
 def _set_scale(editor: Editor, text: str) -> None:
@@ -156,18 +104,15 @@ def _set_scale(editor: Editor, text: str) -> None:
     _lay(editor, scale=scale)
 
 
-def _lay(editor: Editor, drag: str | None = None, **changes: float) -> None:
-    laid = replace(_picture(editor), **changes)  # type: ignore[arg-type]
-    editor.change(properties.underlaid(editor.sketch, laid), drag=drag)
+def _turn(editor: Editor, text: str) -> None:
+    _lay(editor, turn=angle_of(text))
 
 
 def _typed(word: str, tip: str) -> Field:
-    """Return a field of the editor's own values, which can also be typed after a command."""
-    return Field(
-        lambda editor: number(getattr(editor, KEPT[word])),
-        lambda editor, text: run_typed(editor, word, text),
-        tip,
-    )
+    def take(editor: Editor, text: str) -> None:
+        run_typed(editor, word, text)
+
+    return Field(lambda editor: number(getattr(editor, KEPT[word])), take, tip)
 
 
 def _titled(name: str, tip: str) -> Field:
@@ -177,11 +122,13 @@ def _titled(name: str, tip: str) -> Field:
     return Field(lambda editor: str(getattr(editor.sketch, name)), take, tip)
 
 
-_wall_width = partial(_measure, name="width", kinds=WallObstacle)
-_radius = partial(_measure, name="radius", kinds=CircleObstacle | DiscStart)
-_set_width = partial(_set_measure, edit=properties.widened, now=_wall_width)
-_set_radius = partial(_set_measure, edit=properties.sized, now=_radius)
-_STEP = "; +0.5 moves by half a metre"
+def _measure(name: str, word: str, tip: str) -> Field:
+    return Field(lambda editor: number(common_measure(editor, name)), TYPED[word][1], tip)
+
+
+def _of_box(part: int, take: Callable[..., None], tip: str) -> Field:
+    return Field(lambda editor: number(_box(editor)[part]), partial(take, axis=part % 2), tip)
+
 
 FIELDS: dict[str, Field] = {
     "title": _titled("name", "The map's name, for people"),
@@ -190,43 +137,23 @@ FIELDS: dict[str, Field] = {
     "robots": _typed("robots", "Robots of the team that is shown at a start, and tried with F5"),
     "grid": _typed("grid", "Distance of the grid's lines; arrows move by it"),
     "angle": _typed("angle", "Lines snap to multiples of this"),
-    "name": Field(_shown_name, _rename, "What people call it"),
-    "note": Field(_shown_note, _note, "Whatever is worth remembering of it"),
-    "x": Field(lambda editor: number(_corner(editor)[0]), partial(_put, axis=0), "From the left" + _STEP),
-    "y": Field(lambda editor: number(_corner(editor)[1]), partial(_put, axis=1), "From below" + _STEP),
-    "wide": Field(partial(_size, axis=0), partial(_resize, axis=0), "Also *2, 50% or +0.3"),
-    "high": Field(partial(_size, axis=1), partial(_resize, axis=1), "Also *2, 50% or +0.3"),
-    "width": Field(_wall_width, _set_width, "How thick the wall is"),
-    "size:radius": Field(_radius, _set_radius, "Its radius"),
+    "name": Field(_shown_name, rename, "What people call it"),
+    "note": Field(_shown_note, TYPED["note"][1], "Whatever is worth remembering of it"),
+    "x": _of_box(0, _put, "From the left; +0.5 moves by half a metre"),
+    "y": _of_box(1, _put, "From below; +0.5 moves by half a metre"),
+    "wide": _of_box(2, _resize, "Also *2, 50% or +0.3"),
+    "high": _of_box(3, _resize, "Also *2, 50% or +0.3"),
+    "width": _measure("width", "width", "How thick the wall is"),
+    "size:radius": _measure("radius", "circle", "Its radius"),
     "picture:scale": Field(lambda editor: f"{_picture(editor).scale:.6g}", _set_scale, "Side of a pixel"),
-    "picture:turn": Field(
-        lambda editor: number(_picture(editor).turn),
-        lambda editor, text: _lay(editor, turn=angle_of(text)),
-        "Counter-clockwise",
-    ),
-    "picture:opacity": Field(
-        lambda editor: number(_picture(editor).opacity),
-        lambda editor, text: _lay(editor, drag="opacity", opacity=round(min(max(float(text), 0.0), 1.0), 2)),
-    ),
+    "picture:turn": Field(lambda editor: number(_picture(editor).turn), _turn, "Counter-clockwise"),
 }
-"""All fields by name."""
 
 
 TABS = ("map", "object", "snap", "problems", "history")
-
 ROW = 20.0  # height of a line of a list, px at scale 1
 MOST_PROBLEMS = 200  # that are listed
 _NAME = 62.0
-
-_FACTS = {
-    "Size": "Width and height of the boundary",
-    "Free": "Area where robots can be, of that inside the boundary",
-    "Parts": "Connected parts of the free space, and those that a robot can sweep",
-    "Gap": "The narrowest passage, against a robot's diameter",
-    "Holds": "Obstacles and their vertices",
-    "Density": "How much each place counts: the tool Density; floor 0.5 and density none are commands",
-}
-
 _NOTHING = (
     "Nothing is selected. Click an obstacle, a start or the boundary; drag a box around several; "
     "Tab goes on to the next; Ctrl A takes all."
@@ -238,14 +165,15 @@ _STARTS = "Disc tool:disc|Points tool:places|Anywhere start:uniform|Next start:n
 _PICTURE = "Choose… background|Scale, move tool:picture|Remove background:none"
 _PROBLEMS = "Next problem:next|Repair repair|Clip clip|Mend problem:fix"
 _TURNS = "Turn ↺ rotate:left|Turn ↻ rotate:right|Flip ↔ mirror:x|Flip ↕ mirror:y"
-_ONE = (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none")
-_START = ("Delete delete|Copy duplicate|Default start:default",)
-_BUTTONS = {
+_BUTTONS = {  # of the page Object, by what is selected
     "vertex": ("Delete delete|Cut off bevel|Round round|Split split",),
     "vertices": ("Delete delete|Cut off bevel|Round round|Align align:left",),
     "boundary": ("Simplify simplify|Straighten straighten|Repair repair",),
-    **dict.fromkeys(("disc", "start"), _START),
-    **dict.fromkeys(("polygon", "circle", "wall"), _ONE),
+    **dict.fromkeys(("disc", "start"), ("Delete delete|Copy duplicate|Default start:default",)),
+    **dict.fromkeys(
+        ("polygon", "circle", "wall"),
+        (_TURNS, "Path tool:path|Loop ↺ path:repeat|Play path:play|No path path:none"),
+    ),
     "several": (
         _TURNS,
         "Unite unite|Subtract subtract|Intersect intersect|Divide divide",
@@ -254,7 +182,6 @@ _BUTTONS = {
         "Join join|Polygons polygons|Simplify simplify|Delete delete",
     ),
 }
-"""Buttons of the page Object, by what is selected."""
 
 
 class Panel(SidePanel):
@@ -267,12 +194,10 @@ class Panel(SidePanel):
         super().__init__(TABS[0])
 
     def show_tab(self, name: str) -> None:
-        """Turn to a page."""
         if name in TABS:
             self.tab, self.ui.stale = name, True
 
     def update(self) -> None:
-        """Let the page be drawn anew when something that it shows is different."""
         editor = self.editor
         (sketch, selection), unsaved = editor.preview, editor.document.unsaved
         shows = (editor.version, self.tab, id(sketch), selection, id(editor.measurement), unsaved)
@@ -280,11 +205,8 @@ class Panel(SidePanel):
             self._drawn, self.ui.stale = shows, True
 
     def focus(self, name: str) -> None:
-        """Let keys go into a field of the open page."""
         self.ui.run(None, None)
         self.ui.set_focus(name)
-
-    # the page
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
@@ -297,14 +219,10 @@ class Panel(SidePanel):
         for tool in self.editor.tools.values():
             self._does(ui, tool.title, f"tool:{tool.name}", chosen=tool is self.editor.tool)
         count = len(self.editor.problems)
-        titles = {name: name.capitalize() for name in TABS}
-        titles["problems"] += f" {min(count, 99)}" if count else ""
         ui.space(6)
-        ui.row(44, 56, 46, 72, 0, below=8)
-        for name, title in titles.items():
-            if ui.button(title, key=f"tab:{name}", chosen=name == self.tab, small=True):
-                self.show_tab(name)
-        ui.row()
+        titles = {"problems": f"Problems {min(count, 99)}"} if count else {}
+        if (tab := ui.tabs("tab", TABS, self.tab, 44, 56, 46, 72, 0, titles=titles)) is not None:
+            self.show_tab(tab)
         pages = (self._map, self._object, self._snap, self._problems, self._history)
         pages[TABS.index(self.tab)](ui)
 
@@ -318,7 +236,6 @@ class Panel(SidePanel):
         ui.row(*[0.0] * len(buttons), below=4)
         for text, action in buttons:
             self._does(ui, text, action)
-        ui.row()
 
     def _check(self, ui: Ui, kind: str, name: str, title: str) -> None:
         editor = self.editor
@@ -328,36 +245,33 @@ class Panel(SidePanel):
             self._do(f"{kind}:{name}")
 
     def _field(self, ui: Ui, name: str, word: str, unit: str = "") -> None:
-        """Show a field between its word and its unit, each in a cell of its own."""
         editor, field = self.editor, FIELDS[name]
         ui.label(word, key=f"word:{name}", tip=field.tip)
-        given = ui.text_entry(name, field.shown(editor), tip=field.tip)
+        text = ""
+        with suppress(MapError, LookupError):
+            text = field.text(editor)
+        given = ui.text_entry(name, text, tip=field.tip)
         if unit:
             ui.label(unit, key=f"unit:{name}", style="unit")
         if given is not None:
             editor.attempt(lambda: field.take(editor, given))
 
     def _pair(self, ui: Ui, *fields: tuple[str, str, str]) -> None:
-        names = max(len(word) for _, word, _ in fields)
-        word = 14.0 if names < 3 else 48.0
+        word = 14.0 if max(len(word) for _, word, _ in fields) < 3 else 48.0
         ui.row(*(width for _ in range(2) for width in (word, 0.0, 16.0)))
         for name, words, unit in fields:
             self._field(ui, name, words, unit or " ")
-        ui.row()
 
     def _whole_row(self, ui: Ui, name: str, word: str) -> None:
         ui.row(_NAME, 0)
         self._field(ui, name, word)
-        ui.row()
-
-    # pages
 
     def _map(self, ui: Ui) -> None:
         with ui.scroll("map"):
             self._whole_row(ui, "title", "Name")
             self._whole_row(ui, "description", "About")
             ui.row(_NAME, 0, height=18, below=2)
-            for (word, tip), said in zip(_FACTS.items(), facts(self.editor), strict=True):
+            for word, said, tip in facts(self.editor):
                 ui.label(word, style="unit", tip=tip)
                 ui.label(said, key=f"fact:{word}")
             ui.space(4)
@@ -379,7 +293,10 @@ class Panel(SidePanel):
             ui.space(6)
             self._things(ui)
             return
-        ui.header(object_words(editor))
+        words = editor.selection.words(editor.sketch)
+        if editor.selection.vertices:
+            words += f" of {whole(editor.selection).words(editor.sketch)}"
+        ui.header(words.upper())
         if kind in ("polygon", "circle", "wall", "disc", "start"):
             self._whole_row(ui, "name", "Name")
         if kind in ("polygon", "circle", "wall", "several"):
@@ -422,8 +339,7 @@ class Panel(SidePanel):
             why = "" if picture is not None else "there is no picture under the map"
             part = ui.slider("opacity", picture.opacity if picture is not None else 0.5, 0.0, 1.0, why=why)
             if part is not None:
-                text = f"{part:.2f}"
-                self.editor.attempt(lambda: FIELDS["picture:opacity"].take(self.editor, text))
+                self.editor.attempt(lambda: _lay(self.editor, "opacity", opacity=round(part, 2)))
 
     def _problems(self, ui: Ui) -> None:
         editor, problems = self.editor, self.editor.problems
@@ -431,14 +347,13 @@ class Panel(SidePanel):
         with ui.scroll("problems"):
             if not problems:
                 seen = editor.measurement is not None
-                said = "Nothing is wrong with the map." if seen else "Being looked at …"
-                ui.words(said, colour=ui.theme.faint)
+                ui.words(
+                    "Nothing is wrong with the map." if seen else "Being looked at …", colour=ui.theme.faint
+                )
             for k, problem in enumerate(problems[:MOST_PROBLEMS]):
                 mends = problem.kind in TITLES
-                room = ui.wide - 26 - (66 if mends else 0)
-                lines = wrapped(problem.words, ui.px(TEXT), ui.px(room - 18))
-                high = (TEXT + 5) * len(lines) + 8
-                ui.row(20, 0, *([54] if mends else []), height=high, below=2)
+                lines = wrapped(problem.words, ui.px(TEXT), ui.px(ui.wide - 44 - (66 if mends else 0)))
+                ui.row(20, 0, *([54] if mends else []), height=(TEXT + 5) * len(lines) + 8, below=2)
                 badge = ui.cell()
                 if ui.surface is not None:
                     canvas = flat_canvas(ui.surface, ui.theme, ui.scale)
@@ -465,14 +380,10 @@ class Panel(SidePanel):
         with ui.scroll("history"):
             for k in ui.visible_rows(len(steps), ROW + 2):
                 done, count = steps[k]
-                aside = "undone" if count < 0 else ""
-                if ui.option(done, aside, key=f"step:{k}", chosen=count == 0):
+                if ui.option(done, "undone" if count < 0 else "", key=f"step:{k}", chosen=count == 0):
                     self.editor.travel(count)
 
-    # lists
-
     def _things(self, ui: Ui) -> None:
-        """Show all things of the map, the topmost first, also those that are locked or hidden."""
         editor, sketch = self.editor, self.editor.sketch
         things: list[tuple[Owner, str]] = []
         for item in reversed(sketch.obstacles):
@@ -488,7 +399,6 @@ class Panel(SidePanel):
                     self._pick(Selection.of(owner), editor.selection.without_vertices())
 
     def _vertices(self, ui: Ui) -> None:
-        """Show the vertices of what is selected, with their coordinates; in a drag, where they are by now."""
         editor = self.editor
         found = [vertex for owner in editor.handled for vertex, _ in points_of(editor.sketch, owner)]
         with ui.scroll("vertices"):
@@ -501,60 +411,45 @@ class Panel(SidePanel):
                     self._pick(Selection(vertices=frozenset({vertex})), before)
 
     def _pick(self, own: Selection, before: Selection) -> None:
-        shift = pygame.key.get_mods() & pygame.KMOD_SHIFT
-        self.editor.select(before.toggled(own) if shift else own)
+        self.editor.select(before.toggled(own) if pygame.key.get_mods() & pygame.KMOD_SHIFT else own)
 
 
 def object_kind(editor: Editor) -> str:
-    """Return what kind of thing is selected, on which it depends what the page offers."""
-    selection = editor.selection
-    if not selection:
-        return "nothing"
+    sketch, selection = editor.sketch, editor.selection
     if selection.vertices:
         return "vertex" if len(selection.vertices) == 1 else "vertices"
     if len(selection.owners) > 1:
         return "several"
     if selection.boundary:
         return "boundary"
-    if selection.starts:
-        (name,) = selection.starts
-        spec = dict(editor.sketch.starts).get(name)
-        return "disc" if isinstance(spec, DiscStart) else "start"
-    (key,) = selection.items
-    if key not in editor.sketch.places:
-        return "nothing"
-    shape = editor.sketch.item(key).shape
-    return KINDS[type(shape)]
+    for name in selection.starts:
+        return "disc" if isinstance(dict(sketch.starts).get(name), DiscStart) else "start"
+    for key in selection.items & sketch.places.keys():
+        return KINDS[type(sketch.item(key).shape)]
+    return "nothing"
 
 
-def object_words(editor: Editor) -> str:
-    """Return what the object page is about."""
-    selection = editor.selection
-    if selection.vertices:
-        return f"{selection.words(editor.sketch)} of {whole(selection).words(editor.sketch)}".upper()
-    if selection.owners == {BOUNDARY}:
-        return "BOUNDARY"
-    return selection.words(editor.sketch).upper()
-
-
-def facts(editor: Editor) -> tuple[str, ...]:
-    """Return what the map page says of the map, in the order of its words."""
+def facts(editor: Editor) -> tuple[tuple[str, str, str], ...]:
+    """Return what the map page says of the map: a word, what is said, and a tip."""
     sketch, measurement = editor.sketch, editor.measurement
-    size, ring = "no boundary yet: B draws one", sketch.boundary
-    if ring:
-        xs, ys = zip(*ring, strict=True)
+    size, free, parts, narrowest, holds = "no boundary yet: B draws one", "…", "…", "…", "…"
+    if sketch.boundary:
+        xs, ys = zip(*sketch.boundary, strict=True)
         size = f"{max(xs) - min(xs):.2f} x {max(ys) - min(ys):.2f} m"
-    if measurement is None:
-        return (size, "…", "…", "…", "…", density_label(sketch.density))
-    parts, reached = len(measurement.components), len(measurement.reached)
-    narrowest, gap, diameter = "none", measurement.gap, 2 * measurement.radius
-    if gap is not None:
-        narrowest = f"{gap.width:.3f} m {'≥' if gap.width >= diameter else '<'} {diameter:.2f} m"
+    if measurement is not None:
+        count, reached = len(measurement.components), len(measurement.reached)
+        gap, diameter = measurement.gap, 2 * measurement.radius
+        free = f"{measurement.free_area:.2f} m²"
+        parts = f"{count}" if count == reached else f"{count}; {reached} for a robot"
+        holds = f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices"
+        sign = "≥" if gap is not None and gap.width >= diameter else "<"
+        narrowest = "none" if gap is None else f"{gap.width:.3f} m {sign} {diameter:.2f} m"
+    counts = "How much each place counts: the tool Density; floor 0.5 and density none are commands"
     return (
-        size,
-        f"{measurement.free_area:.2f} m²",
-        f"{parts}" if parts == reached else f"{parts}; {reached} for a robot",
-        narrowest,
-        f"{counted(len(sketch.obstacles), 'obstacle')}, {measurement.vertices} vertices",
-        density_label(sketch.density),
+        ("Size", size, "Width and height of the boundary"),
+        ("Free", free, "Area where robots can be, of that inside the boundary"),
+        ("Parts", parts, "Connected parts of the free space, and those that a robot can sweep"),
+        ("Gap", narrowest, "The narrowest passage, against a robot's diameter"),
+        ("Holds", holds, "Obstacles and their vertices"),
+        ("Density", density_label(sketch.density), counts),
     )

@@ -19,8 +19,6 @@ from robocov_app.viewer.session.scenario import Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-BACK = ("f5",)
-
 
 class PlayPresenter(Presenter):
     """The viewer's presenter, which knows whether the map is still the one that is tried."""
@@ -32,7 +30,6 @@ class PlayPresenter(Presenter):
         super().__init__(session, costs, shown, folder, title, controller_kinds())
 
     def open_map(self, name: str) -> None:
-        """Begin anew on another map, or on the one that is tried."""
         if name == self._title:
             self.session.restart(environment=self.tried)
             self.map_name = name
@@ -41,7 +38,6 @@ class PlayPresenter(Presenter):
         self.elsewhere = name != self._title
 
     def maps(self) -> list[str]:
-        """Return the maps to choose from, the one that is tried among them."""
         return list(dict.fromkeys([self._title, *super().maps()]))
 
 
@@ -57,15 +53,14 @@ class PlayWindow(Window):
         super().__init__(viewer, screen.get_size(), scale, patient=patient, screen=screen)
 
     def take(self, event: pygame.event.Event) -> None:
-        """Take one event."""
         if event.type == pygame.WINDOWFOCUSLOST or (event.type == pygame.KEYUP and event.key == self.held):
             self.held = None
-        if event.type == pygame.KEYDOWN and self.held is not None and event.key == self.held:
+        if event.type == pygame.KEYDOWN and event.key == self.held:
             return
-        if event.type == pygame.KEYDOWN and key_of(event) in BACK:
+        if event.type == pygame.KEYDOWN and key_of(event) == "f5":
             self.ended = True
-            return
-        super().take(event)
+        else:
+            super().take(event)
 
     def do(self, name: str) -> None:
         """Do the action of this name; Escape leads back where it would do nothing."""
@@ -78,7 +73,6 @@ class PlayWindow(Window):
 
 
 def begun(editor: Editor, screen: pygame.Surface, scale: float, *, patient: bool) -> PlayWindow:
-    """Return the demo on the map of the editor, with its team at its start."""
     environment = editor.sketch.environment()
     name = editor.start_name if editor.start_name in environment.starts else None
     limits = TeamSpec(radius=editor.radius)

@@ -13,12 +13,11 @@ from robocov_app.editor.model.selection import Selection
 from robocov_app.editor.tools.snapping import Snap
 from robocov_app.editor.tools.tool import PointerEvent
 from robocov_app.editor.ui.commands import GHOST, GROUPS, editor_commands, offered, typed_commands
-from robocov_app.editor.ui.editor import Editor
+from robocov_app.editor.ui.editor import Editor, Team, TeamThread
 from robocov_app.editor.ui.file_commands import FileCommands
 from robocov_app.editor.ui.import_dialog import ImportDialog
 from robocov_app.editor.ui.panel import TABS, Panel
 from robocov_app.editor.ui.play_mode import PlayWindow, begun, brought_back
-from robocov_app.editor.ui.team import Team, TeamThread
 from robocov_app.render.theme import theme_named
 from robocov_app.toolkit.command import Commands, Menu, draw_keys, palette
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, WHEEL, key_of, show_cursor, wheel_notches
@@ -27,170 +26,33 @@ from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import BaseWindow
 
 SLIP = 4.0  # pixels at scale 1 that a click may move
-
 _SHAPES = {"arrow": pygame.SYSTEM_CURSOR_ARROW, "cross": pygame.SYSTEM_CURSOR_CROSSHAIR}
 _SHAPES |= {"hand": pygame.SYSTEM_CURSOR_HAND, "move": pygame.SYSTEM_CURSOR_SIZEALL}
 _SHAPES |= {"sideways": pygame.SYSTEM_CURSOR_SIZEWE, "updown": pygame.SYSTEM_CURSOR_SIZENS}
 _SHAPES |= {"rising": pygame.SYSTEM_CURSOR_SIZENESW, "falling": pygame.SYSTEM_CURSOR_SIZENWSE}
 
 
-class Pointer:
-    """Turns events of the mouse into what panel, sheet and tools do: the panel comes first."""
-
-    def __init__(
-        self, editor: Editor, canvas: EditorCanvas, panel: Panel, menu: Callable[[tuple[int, int]], object]
-    ) -> None:
-        self._editor, self._canvas, self._panel, self._menu = editor, canvas, panel, menu
-        self.at = (0, 0)
-        self.held = False  # whether the left button pans, for as long as a key is held
-        self._drag = ""
-        self._button = 0
-        self._pressed_at = (0, 0)
-        self._last_click = -1.0, (0, 0)
-        self._moved_off = False
-        self._shape = -1
-
-    @property
-    def dragging(self) -> bool:
-        """Whether a button is held down on something."""
-        return bool(self._drag)
-
-    def take(self, event: pygame.event.Event, now: float) -> None:
-        """Take an event of the mouse at a time in seconds."""
-        if event.type != pygame.MOUSEWHEEL:
-            self.at = event.pos
-        taken = not self._drag and self._panel.take(event)
-        if event.type == pygame.MOUSEMOTION:
-            self._moved(event)
-        elif event.type == pygame.MOUSEBUTTONUP:
-            self._released(event)
-        elif taken:
-            self._editor.cursor = None
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            self._panel.ui.stop_typing()
-            self._pressed(event, now)
-        elif self._canvas.over(self.at):
-            self._canvas.zoom(WHEEL ** wheel_notches(event), self.at)
-
-    def aim(self, pixel: tuple[int, int]) -> PointerEvent:
-        """Return where a pixel means, with what is held down on the keyboard."""
-        raw, reach = self._canvas.to_world(pixel), self._canvas.reach
-        editor, tool, held, point = self._editor, self._editor.tool, pygame.key.get_mods(), raw
-        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
-        if tool.snaps:
-            free = ctrl or not editor.snaps
-            snap = Snap(raw) if free else editor.snapped(raw, reach, tool.origin, tool.drawn)
-            point, tool.guides = snap.point, snap.guides
-        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
-        return PointerEvent(point, raw, reach, shift, alt, ctrl)
-
-    def leave(self) -> None:
-        """The mouse is not in the window any more."""
-        self._editor.cursor = self._canvas.at = self._canvas.hovered = None
-
-    def _pressed(self, event: pygame.event.Event, now: float) -> None:
-        editor = self._editor
-        if self._drag or not self._canvas.over(event.pos) or event.button not in (1, 2, 3):
-            return
-        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
-        if event.button != 1 or editor.tool.name == "pan" or self.held:
-            self._drag = "pan"
-            return
-        problem = self._canvas.problem_at(event.pos)
-        if problem is not None and not editor.tool.busy:
-            editor.problem = None if editor.problem is problem else problem
-            editor.say(problem.words, trouble=problem.grave)
-            editor.version += 1
-            return
-        then, where = self._last_click
-        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self._canvas.layout.scale
-        self._last_click = (-1.0 if double else now), event.pos
-        self._drag = "tool"
-        aim = self.aim(event.pos)
-        act = editor.tool.twice if double else editor.tool.press
-        editor.attempt(lambda: act(editor, aim))
-
-    def _moved(self, event: pygame.event.Event) -> None:
-        editor, canvas = self._editor, self._canvas
-        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
-        aimed = over or self._drag == "tool"
-        editor.cursor = canvas.to_world(event.pos) if aimed else None
-        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
-        canvas.hovered = canvas.problem_at(event.pos) if over and not self._drag else None
-        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
-        self._moved_off = self._moved_off or (bool(self._drag) and far)
-        if self._drag == "pan":
-            if self._moved_off:
-                canvas.pan(*event.rel)
-        elif aimed:
-            aim, version = self.aim(event.pos), editor.version
-            editor.attempt(lambda: editor.tool.move(editor, aim))
-            editor.version = version  # the panel need not look again at every move of the mouse
-        else:
-            editor.tool.guides = ()
-
-    def _released(self, event: pygame.event.Event) -> None:
-        editor, drag = self._editor, self._drag
-        if event.button != self._button or not drag:
-            return
-        self._drag, self._button = "", 0
-        if drag == "tool":
-            aim = self.aim(event.pos)
-            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
-            editor.document.history.break_drag()
-        elif event.button == 3 and not self._moved_off:
-            if editor.tool.busy:
-                editor.attempt(lambda: editor.tool.finish(editor))
-            else:
-                self._menu(event.pos)
-
-    def show(self) -> None:
-        """Let the cursor tell what a press would do."""
-        canvas, editor = self._canvas, self._editor
-        if inside(canvas.layout.panel, self.at):
-            self._shape = -1  # the panel has set its own
-            return
-        shape = "arrow"
-        if canvas.over(self.at):
-            panned = self._drag == "pan" or self.held
-            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
-        if _SHAPES[shape] != self._shape:
-            self._shape = _SHAPES[shape]
-            show_cursor(self._shape)
-
-
-_STATUS_HINT = "F5 try it · F1 keys"
-
-
 def facts(editor: Editor, frames: float, team: Team | None) -> list[str]:
-    """Return what the line says, the most important first."""
-    said = [f"{editor.tool.title}: {editor.tool.hint}" if editor.tool is not editor.selector else ""]
-    if editor.cursor is not None:
-        said.insert(0, point_words(editor.cursor))
-    owner = editor.selector.hovered
-    if editor.tool is editor.selector and isinstance(owner, int) and owner in editor.sketch.places:
-        item = editor.sketch.item(owner)
-        said.append(f"{item.shape.name or 'note'}: {item.note}" if item.note else "")
-    if editor.selection and editor.tool is editor.selector:
-        said.append(editor.selection.words(editor.sketch))
-    if "robots" in editor.shown and team is not None:
-        said.append(team.words or f"{len(team.places)} robots at {team.start or 'anywhere'}")
-    if editor.tool is editor.selector and not editor.selection:
-        said.append(editor.tool.hint)
+    sketch, idle, owner = editor.sketch, editor.tool is editor.selector, editor.selector.hovered
+    item = sketch.item(owner) if idle and isinstance(owner, int) and owner in sketch.places else None
+    standing = team if "robots" in editor.shown else None
     grid = f"grid {editor.grid:g} m" if "grid" in editor.snaps else "grid off"
-    said.append(grid if editor.snaps else "no snapping")
-    if editor.readings.busy:
-        said.append("measuring …")
-    said.append(f"{frames:.0f} fps")
+    said = (
+        point_words(editor.cursor) if editor.cursor is not None else "",
+        "" if idle else f"{editor.tool.title}: {editor.tool.hint}",
+        f"{item.shape.name or 'note'}: {item.note}" if item is not None and item.note else "",
+        editor.selection.words(sketch) if idle and editor.selection else "",
+        standing and (standing.words or f"{len(standing.places)} robots at {standing.start or 'anywhere'}"),
+        editor.tool.hint if idle and not editor.selection else "",
+        grid if editor.snaps else "no snapping",
+        "measuring …" if editor.readings.busy else "",
+        f"{frames:.0f} fps",
+    )
     return [each for each in said if each]
 
 
-_PAN = 60  # pixels that a key pans
-_CAPTION = "robocov edit"
-
 # what numbers are typed with, and what may follow in one
 _OF_NUMBERS, _UNITS = frozenset("0123456789.,-+@<*/%°×x; "), frozenset("mcm'\"rad")
-
 _HINT = "Wheel: zoom · right button: pan, or menu · Alt-drag: copy · Ctrl: no snapping · F1 or Esc closes"
 
 
@@ -198,13 +60,7 @@ class EditorWindow(BaseWindow):
     """Shows the editor and lets it be touched."""
 
     def __init__(
-        self,
-        editor: Editor,
-        size: tuple[int, int],
-        scale: float,
-        drafts: Path | None,
-        *,
-        patient: bool = False,
+        self, editor: Editor, size: tuple[int, int], scale: float, drafts: Path | None, patient: bool = False
     ) -> None:
         super().__init__(size)
         self.editor, self.scale = editor, scale
@@ -213,34 +69,42 @@ class EditorWindow(BaseWindow):
         self.canvas = EditorCanvas(editor)
         self.documents = FileCommands(editor, drafts, self.canvas.fit, patient=patient)
         self.dialogs = editor.dialogs
-        listed = editor_commands(editor, {**self.documents.commands(), **self._what_to_do()})
+        of_window: dict[str, Callable[[], object]] = {
+            "try": self.try_it,
+            "screenshot": lambda: self.save_screenshot(editor.folder),
+            "name": self._name,
+            "menu": lambda: self.open_menu(self.at),
+            "pan:hold": lambda: setattr(self, "held", True),
+            "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
+            "fullscreen": self.toggle_fullscreen,
+            "help": lambda: setattr(self, "help", not self.help),
+            "palette": lambda: self.dialogs.ask(palette(self.commands, GHOST, editor.say)),
+        }
+        listed = editor_commands(editor, self.canvas, self.documents, of_window)
         self.commands = Commands(listed, self._attempt, lambda: typed_commands(editor))
-        self.panel = Panel(editor, self.commands, self.do, self._show_problem)
-        self.menu: Menu | None = None
-        self.pointer = Pointer(editor, self.canvas, self.panel, self.open_menu)
+        self.panel = Panel(editor, self.commands, self.do, lambda: self.canvas.go_to(editor.problem))
+        self.at = (0, 0)  # where the mouse is, px
+        self.held = False  # whether the left button pans, for as long as a key is held
+        self.drag = ""  # what a button that is held down drags: "tool", "pan"
+        self._button, self._shape, self._moved_off = 0, -1, False
+        self._pressed_at, self._last_click = (0, 0), (-1.0, (0, 0))
         self.team = TeamThread()
         self._patient = editor.snapper.patient = patient
         self._arranged: tuple[object, ...] | None = None
-        self._caption = ""
         self._arrange()
         self.canvas.fit()
         editor.ask_readings()
         self.draw()
 
-    # frames
-
     def close(self) -> None:
-        """End what is going on beside the window."""
-        if self.trial is not None:
-            self.trial.close()
+        if self.inner is not None:
+            self.inner.close()
         self.team.close()
-        self.documents.close()
+        self.dialogs.close()
         self.editor.snapper.close()
 
     def look(self) -> object:
         """Return all that changes the picture without an event; None while something moves."""
-        if self.trial is not None:
-            return self.trial.look()
         editor, canvas, ui = self.editor, self.canvas, self.panel.ui
         importing = isinstance(editor.asked, ImportDialog) and editor.asked.busy
         if ui.stale or editor.moves_since is not None or importing:
@@ -250,11 +114,10 @@ class EditorWindow(BaseWindow):
             *(editor.problem, editor.sketch, editor.selection, editor.measurement, editor.tool),
             *(editor.cursor, frozenset(editor.shown), editor.grid, frozenset(editor.snaps)),
             *(canvas.team, canvas.camera, canvas.hovered, self.help, id(editor.asked)),
-            *(self._arranged, self._caption),
+            *(self._arranged, pygame.display.get_caption()),
         )
 
     def suit(self, scale: float, theme: str, *, panel: bool | None) -> None:
-        """Take the look of where the window is shown; `panel`: to show or hide it, None to leave it."""
         editor, self.scale = self.editor, scale
         editor.theme, editor.panel = theme, editor.panel if panel is None else panel
         editor.version += 1
@@ -262,20 +125,19 @@ class EditorWindow(BaseWindow):
             self.trial.suit(scale, theme, panel=panel)
 
     def update(self, seconds: float) -> None:
-        """Let so many seconds pass."""
         if self.trial is not None:
             self._play(self.trial, seconds)
             return
         editor = self.editor
         editor.pass_time(seconds)
-        if not self.pointer.dragging:
+        if not self.drag:
             self.documents.look()
             if "robots" in editor.shown:
                 self.team.ask(editor.sketch, editor.start_name, editor.robots, editor.seed, editor.radius)
                 if (team := self.team.poll()) is not None:
                     self.canvas.team = team
                     editor.say(team.words, trouble=True)
-        if not (self.pointer.dragging and editor.readings.busy):
+        if not (self.drag and editor.readings.busy):
             editor.ask_readings()
         if editor.document.trouble:
             editor.say(editor.document.trouble, trouble=True)
@@ -283,12 +145,11 @@ class EditorWindow(BaseWindow):
             self.closed = True
             return
         self._arrange()
-        self.panel.covered = self.dialogs.open or self.menu is not None
+        self.panel.covered = self.dialogs.open
         self.panel.update()
-        self.pointer.show()
-        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · {_CAPTION}"
-        if caption != self._caption:
-            self._caption = caption
+        self._show_cursor()
+        caption = f"{'● ' if editor.document.unsaved else ''}{editor.document.title} · robocov edit"
+        if caption != pygame.display.get_caption()[0]:
             pygame.display.set_caption(caption)
 
     def _arrange(self) -> None:
@@ -296,36 +157,25 @@ class EditorWindow(BaseWindow):
         key = (self.screen.get_size(), self.scale, editor.panel, editor.theme)
         if key == self._arranged:
             return
-        self._arranged = key
-        self.theme = theme_named(editor.theme)
+        self._arranged, self.theme = key, theme_named(editor.theme)
         self.layout = laid_out(key[0], self.scale, 1, 1.0, panel=editor.panel, plot=False)
         self.canvas.arrange(self.layout, self.theme)
         self.panel.arrange(self.layout, self.theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
-        if self.trial is not None:
-            self.trial.draw()
-            return
         layout, theme, editor = self.layout, self.theme, self.editor
         self.canvas.draw(self.screen)
         told = facts(editor, self.rate, self.canvas.team)
-        draw_status(self.screen, layout.status, theme, layout.scale, told, _STATUS_HINT)
+        draw_status(self.screen, layout.status, theme, layout.scale, told, "F5 try it · F1 keys")
         if layout.panel[2]:
             self.panel.draw(self.screen)
         draw_message(self.screen, editor.message, layout.arena, theme, layout.scale, editor.trouble)
-        if self.menu is not None:
-            self.menu.draw(self.screen, theme, layout.scale)
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
         pygame.display.flip()
 
-    # doing
-
     def do(self, name: str) -> None:
-        """Do the command of this name."""
-        self.menu = None
         if name == "cancel" and self.help:
             self.help = False
         else:
@@ -335,55 +185,9 @@ class EditorWindow(BaseWindow):
         editor, problem = self.editor, self.editor.problem
         editor.attempt(action)
         if editor.problem is not problem:
-            self._show_problem()
-
-    def _show_problem(self) -> None:
-        if self.editor.problem is not None:
-            self.canvas.go_to(self.editor.problem)
-
-    def open_palette(self, text: str = "") -> None:
-        """Open the palette, with the beginning of a command."""
-
-        def told(words: str) -> None:
-            self.editor.version += 1
-            self.editor.say(words)
-
-        asked = palette(self.commands, GHOST, told)
-        asked.text = text
-        self.dialogs.ask(asked)
-
-    def _what_to_do(self) -> dict[str, Callable[[], object]]:
-        editor, canvas = self.editor, self.canvas
-        return {
-            "fit": canvas.fit,
-            "fit:selection": canvas.fit_selection,
-            "zoom:in": lambda: canvas.zoom(1.25, self._middle()),
-            "zoom:out": lambda: canvas.zoom(0.8, self._middle()),
-            "pan:left": lambda: canvas.pan(_PAN, 0),
-            "pan:right": lambda: canvas.pan(-_PAN, 0),
-            "pan:up": lambda: canvas.pan(0, _PAN),
-            "pan:down": lambda: canvas.pan(0, -_PAN),
-            "pan:hold": lambda: setattr(self.pointer, "held", True),
-            "theme": lambda: setattr(editor, "theme", "dark" if editor.theme == "light" else "light"),
-            "panel": lambda: setattr(editor, "panel", not editor.panel),
-            "tab": lambda: self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)]),
-            "name": self._name,
-            "menu": lambda: self.open_menu(self.pointer.at),
-            "fullscreen": self.toggle_fullscreen,
-            "screenshot": lambda: self.save_screenshot(editor.folder),
-            "help": lambda: setattr(self, "help", not self.help),
-            "palette": self.open_palette,
-            "try": self.try_it,
-        }
-
-    def _middle(self) -> tuple[float, float]:
-        if self.canvas.over(self.pointer.at):
-            return self.pointer.at
-        left, top, width, height = self.canvas.camera.view
-        return left + width / 2, top + height / 2
+            self.canvas.go_to(editor.problem)
 
     def _name(self) -> None:
-        """Go to the field with the name of what is selected, or of the map."""
         field, tab = ("name", "object") if len(self.editor.selection.owners) == 1 else ("title", "map")
         self.editor.panel = True
         self._arrange()
@@ -391,74 +195,60 @@ class EditorWindow(BaseWindow):
         self.panel.focus(field)
 
     def open_menu(self, pixel: tuple[int, int]) -> None:
-        """Open the menu for what is at a pixel; what is not selected yet is selected then."""
         editor = self.editor
         if self.canvas.over(pixel):
             there = owners_at(editor.sketch, self.canvas.to_world(pixel), 0.5 * self.canvas.reach)
-            near = editor.selection.vertices or any(each in editor.selection.owners for each in there)
-            if not near:
+            if not (editor.selection.vertices or any(each in editor.selection.owners for each in there)):
                 editor.select(Selection.of(*there[:1]))
         found = [self.commands[name] if name else None for name in offered(editor)]
-        self.menu = Menu(found, pixel, self.do)
-
-    # trying
+        self.dialogs.ask(Menu(found, pixel, self.do))
 
     def try_it(self) -> None:
-        """Begin the demo on the map."""
         if self.editor.selector.busy:  # the mouse lets go of what it drags; what is half drawn stays
             self.editor.selector.cancel(self.editor)
         trial = begun(self.editor, self.screen, self.scale, patient=self._patient)
         trial.windowed = self.windowed
-        self.trial = trial
+        self.trial = self.inner = trial
 
     def _play(self, trial: PlayWindow, seconds: float) -> None:
         trial.screen, trial.rate = self.screen, self.rate
         trial.update(seconds)
         if not (trial.ended or trial.closed):
             return
-        leaving = trial.closed and not trial.ended
         trial.close()
         trial.keeper.finish()
-        self.trial = None
+        self.trial = self.inner = None
         self.screen = pygame.display.get_surface() or self.screen
         self.windowed = trial.windowed
-        editor = self.editor
-        editor.theme = trial.viewer.theme
-        viewer = trial.viewer
+        editor, viewer = self.editor, trial.viewer
+        editor.theme = viewer.theme
         change = brought_back(editor.sketch, viewer.tried, viewer.session.environment)
         if change is not None and not viewer.elsewhere:
             editor.change(change)
-        self.commands.forget_keys()
-        if pygame.key.get_pressed()[pygame.K_F5]:  # its repeated presses would begin anew
-            self.commands.hold(pygame.K_F5)
+        held = pygame.key.get_pressed()[pygame.K_F5]  # its repeated presses would begin anew
+        self.commands.forget_keys(*([pygame.K_F5] if held else ()))
         self._arrange()
         editor.version += 1
-        if leaving:
-            self.do("quit")
-        else:
+        if trial.ended:
             self.draw()
-
-    # events
+        else:
+            self.do("quit")
 
     def take(self, event: pygame.event.Event) -> None:
-        """Take one event."""
-        if self.trial is not None:
-            self.trial.take(event)
-            return
         kind = event.type
         if kind == pygame.KEYUP:
             self.commands.release(event)
-            self.pointer.held = self.pointer.held and event.key != pygame.K_SPACE
+            self.held = self.held and event.key != pygame.K_SPACE
         elif kind == pygame.WINDOWFOCUSLOST:
             self.commands.forget_keys()
-            self.pointer.held = False
+            self.held = False
         elif kind == pygame.KEYDOWN and event.key == pygame.K_F12:
             self.do("screenshot")
             return
         if kind in OF_THE_MOUSE and kind != pygame.MOUSEWHEEL:
-            self.pointer.at = event.pos
+            self.at = event.pos
         if kind == pygame.QUIT:
-            if isinstance(self.editor.asked, ImportDialog):
+            if isinstance(self.editor.asked, ImportDialog | Menu):
                 self.dialogs.close()
             if not self.dialogs.open:
                 self.do("quit")
@@ -466,50 +256,133 @@ class EditorWindow(BaseWindow):
             return
         elif kind == pygame.DROPFILE:
             self.editor.attempt(lambda: self.documents.open(Path(event.file)))
-        elif self.menu is not None and self._menu_takes(self.menu, event):
-            return
         elif kind == pygame.KEYDOWN:
-            self._press(event)
+            self._key_down(event)
             if self.trial is not None:
                 self.trial.held = event.key
             self.dialogs.swallow(event.unicode)
         elif kind == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif kind in OF_THE_MOUSE:
-            self.pointer.take(event, self.editor.now)
+            self._mouse(event)
         elif kind == pygame.WINDOWLEAVE:
-            self.pointer.leave()
+            self.editor.cursor = self.canvas.at = self.canvas.hovered = None
         else:
             self.panel.take(event)
 
-    def _menu_takes(self, menu: Menu, event: pygame.event.Event) -> bool:
-        taken = menu.take(event)
-        if not menu.open and self.menu is menu:
-            self.menu = None
-        return taken
+    def _mouse(self, event: pygame.event.Event) -> None:
+        taken = not self.drag and self.panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self.editor.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self.panel.ui.stop_typing()
+            self._pressed(event)
+        elif self.canvas.over(self.at):
+            self.canvas.zoom(WHEEL ** wheel_notches(event), self.at)
 
-    def _press(self, event: pygame.event.Event) -> None:
+    def _aim(self, pixel: tuple[int, int]) -> PointerEvent:
+        raw, reach = self.canvas.to_world(pixel), self.canvas.reach
+        editor, tool, held, point = self.editor, self.editor.tool, pygame.key.get_mods(), raw
+        ctrl = bool(held & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        if tool.snaps:
+            free = ctrl or not editor.snaps
+            snap = Snap(raw) if free else editor.snapped(raw, reach, tool.origin, tool.drawn)
+            point, tool.guides = snap.point, snap.guides
+        shift, alt = bool(held & pygame.KMOD_SHIFT), bool(held & pygame.KMOD_ALT)
+        return PointerEvent(point, raw, reach, shift, alt, ctrl)
+
+    def _pressed(self, event: pygame.event.Event) -> None:
+        editor = self.editor
+        if self.drag or not self.canvas.over(event.pos) or event.button not in (1, 2, 3):
+            return
+        self._pressed_at, self._button, self._moved_off = event.pos, event.button, False
+        if event.button != 1 or editor.tool.name == "pan" or self.held:
+            self.drag = "pan"
+            return
+        if (problem := self.canvas.problem_at(event.pos)) is not None and not editor.tool.busy:
+            editor.problem = None if editor.problem is problem else problem
+            editor.say(problem.words, trouble=problem.grave)
+            editor.version += 1
+            return
+        (then, where), now = self._last_click, editor.now
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP * self.canvas.layout.scale
+        self._last_click = (-1.0 if double else now), event.pos
+        self.drag = "tool"
+        aim = self._aim(event.pos)
+        act = editor.tool.twice if double else editor.tool.press
+        editor.attempt(lambda: act(editor, aim))
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        editor, canvas = self.editor, self.canvas
+        over = canvas.over(event.pos) and not inside(canvas.layout.panel, event.pos)
+        aimed = over or self.drag == "tool"
+        editor.cursor = canvas.to_world(event.pos) if aimed else None
+        canvas.at = (float(event.pos[0]), float(event.pos[1])) if aimed else None
+        canvas.hovered = canvas.problem_at(event.pos) if over and not self.drag else None
+        far = dist(event.pos, self._pressed_at) >= SLIP * canvas.layout.scale
+        self._moved_off = self._moved_off or (bool(self.drag) and far)
+        if self.drag == "pan":
+            if self._moved_off:
+                canvas.pan(*event.rel)
+        elif aimed:
+            aim, version = self._aim(event.pos), editor.version
+            editor.attempt(lambda: editor.tool.move(editor, aim))
+            editor.version = version  # the panel need not look again at every move of the mouse
+        else:
+            editor.tool.guides = ()
+
+    def _released(self, event: pygame.event.Event) -> None:
+        editor, drag = self.editor, self.drag
+        if event.button != self._button or not drag:
+            return
+        self.drag, self._button = "", 0
+        if drag == "tool":
+            aim = self._aim(event.pos)
+            editor.attempt(lambda: editor.tool.release(editor, aim, clicked=not self._moved_off))
+            editor.document.history.break_drag()
+        elif event.button == 3 and not self._moved_off:
+            if editor.tool.busy:
+                editor.attempt(lambda: editor.tool.finish(editor))
+            else:
+                self.open_menu(event.pos)
+
+    def _show_cursor(self) -> None:
+        canvas, editor = self.canvas, self.editor
+        if inside(canvas.layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = "arrow"
+        if canvas.over(self.at):
+            panned = self.drag == "pan" or self.held
+            shape = "move" if panned else "hand" if canvas.hovered else editor.tool.shape_of_cursor(editor)
+        if _SHAPES[shape] != self._shape:
+            self._shape = _SHAPES[shape]
+            show_cursor(self._shape)
+
+    def _key_down(self, event: pygame.event.Event) -> None:
         """Take a key: for a field, for a number while something is drawn, else for a command."""
         if self.panel.take(event) or (not self.panel.ui.busy and self._number(event)):
             return
-        command = self.commands.of_key(event)
-        if command is not None:
+        if (command := self.commands.of_key(event)) is not None:
             self.do(command.name)
 
     def _number(self, event: pygame.event.Event) -> bool:
-        """Take a key for the number that is typed while something is drawn; say whether it was one."""
-        editor, name, sign = self.editor, key_of(event), event.unicode
-        if not editor.takes_numbers or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT):
+        editor, tool, name, sign = self.editor, self.editor.tool, key_of(event), event.unicode
+        text, modifiers = editor.typed, pygame.KMOD_CTRL | pygame.KMOD_META | pygame.KMOD_ALT
+        if not (tool.takes_numbers and (tool.busy or tool.begins_typed or text)) or event.mod & modifiers:
             return False
-        if editor.typed and name in ("return", "enter", "backspace", "tab"):
-            if name in ("return", "enter"):
-                editor.enter()
-            else:
-                editor.typed = editor.typed[:-1] if name == "backspace" else f"{editor.typed} "
-            return True
-        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if editor.tool.busy else "x×*/ ;%,-+@<°")
-        follows = bool(editor.typed) and (sign in _OF_NUMBERS or sign in _UNITS)
-        if len(sign) == 1 and (begins or follows):
-            editor.typed = (editor.typed + sign)[:40]
-            return True
-        return False
+        begins = sign in _OF_NUMBERS and sign not in ("x×*/ ;%" if tool.busy else "x×*/ ;%,-+@<°")
+        if text and name in ("return", "enter"):
+            editor.typed = ""
+            editor.attempt(lambda: tool.enter(editor, text))
+        elif text and name in ("backspace", "tab"):
+            editor.typed = text[:-1] if name == "backspace" else f"{text} "
+        elif len(sign) == 1 and (begins or (text and (sign in _OF_NUMBERS or sign in _UNITS))):
+            editor.typed = (text + sign)[:40]
+        else:
+            return False
+        return True
