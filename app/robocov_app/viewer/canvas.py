@@ -51,7 +51,6 @@ class ViewerCanvas:
         """Pane and number of the robot under the cursor."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Make the painters fit the layout and the theme."""
         self.layout, self.theme = layout, theme
         self._environment = self.viewer.session.environment
         several = len(layout.panes) > 1
@@ -69,13 +68,11 @@ class ViewerCanvas:
     # cameras
 
     def fit(self) -> None:
-        """Show the whole map."""
         self._camera = None
         for painter in self._painters:
             painter.fit()
 
     def zoom(self, factor: float, at: tuple[float, float]) -> None:
-        """Magnify what is under a pixel of the window, in all panes."""
         pane = self.pane_at(at) or 0
         left, top, _, _ = self.layout.panes[pane]
         camera = self._painters[pane].camera
@@ -86,7 +83,6 @@ class ViewerCanvas:
         self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move all cameras by so many pixels."""
         camera = self._painters[0].camera.panned(dx, dy)
         low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
         x = float(np.clip(camera.center[0], low_x, high_x))
@@ -101,7 +97,6 @@ class ViewerCanvas:
     # what is where
 
     def pane_at(self, pixel: tuple[float, float]) -> int | None:
-        """Return the pane under a pixel of the window."""
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
@@ -112,17 +107,14 @@ class ViewerCanvas:
         return x, y
 
     def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
-        """Return the pixel of the window where a place is."""
         left, top, _, _ = self.layout.panes[pane]
         x, y = self._painters[pane].camera.to_pixels(np.array(point)).tolist()
         return x + left, y + top
 
     def reach(self, pane: int) -> float:
-        """Return how many metres a finger is wide."""
         return _REACH * self.layout.scale / self._painters[pane].camera.zoom
 
     def robot_at(self, pixel: tuple[float, float], pane: int) -> int | None:
-        """Return the number of the robot that is drawn under a pixel, also of one that failed."""
         if pane >= len(self._scenes):
             return None
         scene = self._scenes[pane]
@@ -142,7 +134,6 @@ class ViewerCanvas:
     # drawing
 
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw all panes."""
         session = self.viewer.session
         if session.environment is not self._environment:
             before, self._environment = self._environment, session.environment
@@ -195,7 +186,6 @@ class ViewerCanvas:
         )
 
     def _caption_cost(self, pane: Pane) -> str:
-        """Return the numbers that the chart shows, with their time where that is not the present's."""
         session = self.viewer.session
         time, distances = compared(session)
         _, times = compared(session, TIME)
@@ -206,14 +196,12 @@ class ViewerCanvas:
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
     def _scale_colours(self, largest: float) -> None:
-        """Let the scale of colours follow what is shown, without trembling."""
         if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
             self._limit = round_limit(1.1 * largest)
 
     def _scans(
         self, pane: Pane, snapshot: Snapshot, ranges: Array, selected: int | None
     ) -> list[tuple[Array, Array]]:
-        """Return ray scans: of the robot that is asked about, else of all unless they are many."""
         rows = [selected] if selected is not None else list(range(len(snapshot.positions)))
         rays = min(RAYS, MOST_RAYS // len(rows))
         if rays < 24:
@@ -230,7 +218,6 @@ class ViewerCanvas:
         return Canvas(surface, camera, self.theme, self.layout.scale, hues)
 
     def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
-        """Draw what the tool is about to do, the hand's spring, and rings around robots."""
         canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
         numbers = list(scene.numbers or ()) if scene.snapshot is not None else []
@@ -287,7 +274,6 @@ class ViewerCanvas:
             tag(surface, preview.words, at, self.theme, canvas.scale)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
-        """Draw what parts the panes, which of them is chosen, and the legend that they share."""
         if len(self._scenes) < 2:
             return
         scale, theme = self.layout.scale, self.theme
@@ -310,7 +296,6 @@ class ViewerCanvas:
         screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))
 
     def shared_rows(self) -> int:
-        """Return how many rows the shared legend has needed as long as the same is shown."""
         if len(self._scenes) < 2:
             return 0
         kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
@@ -322,6 +307,5 @@ class ViewerCanvas:
         return rows
 
     def _legend_entries(self) -> list[LegendEntry]:
-        """Return the shared legend: what any of the panes shows."""
         each = zip(self._painters, self._scenes, strict=False)  # a pane that was just added has no scene yet
         return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

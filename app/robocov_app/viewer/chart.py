@@ -19,9 +19,7 @@ from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared
 from robocov_app.viewer.session.pane import Pane
 
-LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20
-"""Pixels at scale 1 round the plot."""
-
+LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
 SHORTEST = 10.0  # seconds that the axis shows at least
 REFRESHED = 0.1  # seconds after which growing curves are drawn anew
 
@@ -78,7 +76,6 @@ class Chart:
         """Cursor position in the window."""
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Take another layout and theme."""
         self.layout, self.theme = layout, theme
         self._page = None
 
@@ -86,11 +83,9 @@ class Chart:
 
     @property
     def plotted(self) -> Plotted:
-        """The quantity that is plotted now."""
         return chosen(self.viewer.session, self._wanted)
 
     def switch(self) -> str:
-        """Plot the other quantity, if there are two."""
         wanted = TIME if self.plotted is DISTANCE else DISTANCE
         if wanted is TIME and chosen(self.viewer.session, TIME) is not TIME:
             return "all robots are equally fast: the mean time goes as the mean distance"
@@ -98,11 +93,9 @@ class Chart:
         return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
 
     def offers(self, at: tuple[int, int]) -> bool:
-        """Return whether the name of the other quantity is at a pixel of the window."""
         return self._other is not None and inside(self._other, at)
 
     def ghost_at(self, at: tuple[int, int]) -> int | None:
-        """Return the node of the document whose branch has a ghost curve at a pixel of the window."""
         at = at[0], at[1] - self.layout.chart[1]
         near = [(float(np.hypot(*(points - at).T).min()), node) for node, points in self._ghosts]
         best = min(near, default=(np.inf, 0))
@@ -130,14 +123,12 @@ class Chart:
         return float(np.clip(time, 0.0, self.viewer.session.end))
 
     def column(self, time: float) -> float:
-        """Return the pixel's column of a time."""
         left, right, end = self._span
         return left + (right - left) * time / end
 
     # drawing
 
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw both."""
         session, layout = self.viewer.session, self.layout
         curves = [pane.curves[self.plotted.name] for pane in session.panes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
@@ -227,7 +218,6 @@ class Chart:
                 canvas.segments(ends, curve_colour(self.viewer, theme, pane), canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
-        """Name the other quantity beside the title, where there are two: a click plots it."""
         self._other = None
         if chosen(self.viewer.session, TIME) is DISTANCE:
             return
@@ -241,7 +231,6 @@ class Chart:
     def _event_words(
         self, canvas: Canvas, events: list[Event], left: float, right: float, end: float, top: float
     ) -> None:
-        """Write what happened beside its line, where there is room."""
         scale, free = self.layout.scale, left
         for event in events:
             x = left + (right - left) * event.time / end
@@ -284,7 +273,6 @@ class Chart:
             self._note(canvas, words, (right + 9 * scale, y), colour=colour, bold=True)
 
     def _track(self, canvas: Canvas) -> None:
-        """Draw the time line."""
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         top = self.layout.chart[3]
@@ -304,14 +292,12 @@ class Chart:
         self._note(canvas, words, (right + 9 * scale, middle), colour=colour, bold=not thinned)
 
     def _rule(self, screen: pygame.Surface, x: float, colour: Colour) -> None:
-        """Draw an upright line through the plot."""
         _, top, _, height = self.layout.chart
         scale = self.layout.scale
         line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
         screen.fill(colour, line)
 
     def _cursor(self, screen: pygame.Surface) -> None:
-        """Draw how far the run has come, the handle on the time line, and the line through the plot."""
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         canvas = flat_canvas(screen, theme, scale)
         middle = self.layout.track[1] + 0.5 * self.layout.track[3]
@@ -332,7 +318,6 @@ class Chart:
         canvas.stamp(handle, (x, middle))
 
     def _hovered(self, screen: pygame.Surface) -> None:
-        """Tell what was at the time under the cursor: an event near it, or the values."""
         over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         if over is None or not left <= over[0] <= right:

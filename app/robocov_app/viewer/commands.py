@@ -49,7 +49,6 @@ class Row(NamedTuple):
 
 
 def grouped(group: str, *rows: Row) -> list[Command]:
-    """Return the commands of a group."""
     return [
         Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
         for name, title, run, keys, repeats, takes in rows
@@ -57,8 +56,6 @@ def grouped(group: str, *rows: Row) -> list[Command]:
 
 
 def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
-    """Return the commands that need no window; `titles` are the layers', by their names."""
-
     def robot_numbers() -> list[str]:
         return [str(number) for number in viewer.numbers]
 
@@ -69,7 +66,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
 
     def branches() -> list[str]:
-        return [str(k + 1) for k in range(len(viewer.session.branches))]
+        return [str(k + 1) for k in range(len(viewer.session.document.branches()))]
 
     def save(name: object) -> None:
         viewer.save_session(Path(str(name)) if name else None)
@@ -188,7 +185,6 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
 
 
 def parameter_commands(viewer: Presenter) -> Iterator[Command]:
-    """Return a command for each gain of the chosen controller and each limit of the team: ``k_rep 0.5``."""
     for each in viewer.parameters():
         run = partial(viewer.set_parameter, each.name)
         words = tuple(getattr(each, "offered", ()))

@@ -37,7 +37,6 @@ class Known:
 
     @cached_property
     def field(self) -> Field:
-        """The distances as layers want them; made only where one is shown."""
         return Field(self.lattice(), self.result)
 
 
@@ -65,7 +64,6 @@ class Costs:
         self._pane: int | None = None
 
     def environment(self, environment: Environment) -> None:
-        """Take another map from now on."""
         self._number += 1
         self._map = CostQuestion(self._number, environment, self.lattice)
         self.known, self._waiting = {}, {}
@@ -89,7 +87,6 @@ class Costs:
             self._waiting[pane] = asked
 
     def poll(self) -> list[tuple[int, Known]]:
-        """Return what has been answered since the last call, by pane."""
         answers, worker = [], self._worker
         while self._asked is not None or self._ask_next():
             answer = worker.poll()
@@ -112,7 +109,6 @@ class Costs:
         return answers
 
     def close(self) -> None:
-        """End what works for it."""
         self.forget()
         self._worker.close()
 
@@ -201,7 +197,6 @@ class CostService:
         self._told: CoverageCost | None = None
 
     def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
-        """Answer the last question."""
         maps = [question for question in questions if question.environment is not None]
         if maps:
             self._prepare(maps[-1], line)

@@ -21,9 +21,7 @@ from robocov_app.viewer.presenter import Presenter
 SLOW = 0.05  # m/s; who is slower seems to be at rest
 FAR = 0.3  # m; who rests farther from its goal has not arrived
 NOTHING = 5e-4  # N; what is less is written as 0 N, and has no arrow
-REST = "law"
-"""Kind of the line for what the terms of a controller leave of its force."""
-
+REST = "law"  # kind of the line for what the terms of a controller leave of its force
 _SWAY = 0.02  # m; who goes to and fro by less seems to stand
 _HUGE = 1e100  # what is not below is no number to reckon with
 _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
@@ -54,7 +52,6 @@ class Report:
 
 
 def report_on(viewer: Presenter, number: int) -> Report:
-    """Return what the inspector says of a robot of the chosen pane."""
     session, pane = viewer.session, viewer.pane
     setup = session.setup(pane)
     if number in setup.failed:
@@ -172,7 +169,6 @@ def _terms(decision: Decision, robot: int) -> tuple[dict[str, complex], bool]:
 
 
 def _aim(decision: Decision, environment: Environment, here: complex, robot: int) -> _Thing | None:
-    """Return where the robot is drawn to, and what of the map is in between."""
     goal = _row(decision.goals, robot)
     if goal is None:
         return None
@@ -191,7 +187,6 @@ def _aim(decision: Decision, environment: Environment, here: complex, robot: int
 
 
 def _solid(environment: Environment, here: complex, point: complex | None, radius: float) -> _Thing | None:
-    """Return what an obstacle point belongs to; without a point, what the robot touches."""
     if point is None:
         line = shapely.shortest_line(shapely.Point(here.real, here.imag), environment.free.boundary)
         if line is None or line.length > radius + TOUCHING:
@@ -216,7 +211,6 @@ def _row(values: object, row: int) -> complex | None:
 
 
 def _along(vector: complex, way: complex) -> float:
-    """Return the cosine of the angle between two vectors; 0 where one has no direction."""
     size = abs(vector) * abs(way)
     return (vector * way.conjugate()).real / size if size > 0.0 else 0.0
 
@@ -246,7 +240,6 @@ def _motion(case: _Case, recent: Array | None) -> str:
 
 
 def _compass(vector: complex) -> str:
-    """Return the nearest of eight directions, x to the east and y to the north; empty for no direction."""
     return _WAYS[round(math.atan2(vector.imag, vector.real) / (math.pi / 4)) % 8] if vector else ""
 
 
@@ -305,7 +298,6 @@ def _verdict(case: _Case, motion: str) -> str:
 
 
 def _forces(case: _Case) -> list[Line]:
-    """Return each force with what causes it, and their sum."""
     parts = [(_cause(case, kind, vector), vector, kind) for kind, vector in case.forces.items()]
     if case.viscosity > 0.0:
         slowed = f"held back {_force(abs(case.drag))}" if abs(case.drag) >= NOTHING else "not held back"
@@ -316,7 +308,6 @@ def _forces(case: _Case) -> list[Line]:
 
 
 def _cause(case: _Case, kind: str, vector: complex) -> str:
-    """Return a force with its size and what causes it."""
     aim, none, away = case.aim, abs(vector) < NOTHING, False
     size, way = _force(abs(vector)), _compass(vector)
     if kind == "attraction" and aim:
@@ -338,7 +329,6 @@ def _cause(case: _Case, kind: str, vector: complex) -> str:
 
 
 def _called(case: _Case, kind: str) -> str:
-    """Return what a force is called where its cause was told before, with its size."""
     name = _plain(kind)
     if kind == "attraction" and case.aim:
         name = f"the pull to {case.aim.name}"
@@ -358,7 +348,6 @@ def _robots(count: int) -> str:
 
 
 def _reasons(case: _Case, motion: str) -> list[str]:
-    """Return which limits act and, for a robot that gets nowhere, which forces hold each other."""
     texts = ["its law gives no force that is a number"] if case.broken else []
     wanted, speed, top = abs(case.resultant) / case.mass, abs(case.velocity), case.max_speed
     if wanted > 1.001 * case.strength:
@@ -381,7 +370,6 @@ def _reasons(case: _Case, motion: str) -> list[str]:
 
 
 def _surroundings(case: _Case) -> list[str]:
-    """Return what the robot hears, senses and touches."""
     solid, others = case.solid, case.others
     texts = [f"touches {thing.beside}" for thing in case.touched]
     if case.aim and "attraction" not in case.forces:

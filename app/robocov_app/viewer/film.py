@@ -17,11 +17,8 @@ from robocov_app.runs.recording import film_command
 if TYPE_CHECKING:
     from robocov_app.runs.recording import Frame
 
-FPS = 30
-"""Frames of a film per second."""
-
-_WAITING = 45
-"""Frames that may wait to be written; what comes when there are more is left out."""
+FPS = 30  # frames of a film per second
+_WAITING = 45  # frames that may wait to be written; what comes when there are more is left out
 
 
 class Film:
@@ -58,7 +55,6 @@ class Film:
         self._thread.start()
 
     def add(self, screen: pygame.Surface, seconds: float) -> None:
-        """Take what is on the screen for as many frames as are due after so many seconds."""
         self._due += seconds * FPS
         count = int(self._due + 1e-6)
         self._due -= count
@@ -110,6 +106,5 @@ class Film:
 
 
 def pixels(screen: pygame.Surface) -> Frame:
-    """Return what is on the screen, (height, width, 3) RGB."""
     width, height = screen.get_size()
     return np.frombuffer(pygame.image.tobytes(screen, "RGB"), dtype=np.uint8).reshape(height, width, 3)

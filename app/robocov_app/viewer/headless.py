@@ -49,8 +49,7 @@ if TYPE_CHECKING:
 
 STORY = "story.json"
 
-STRIP = 30
-"""Height of a film's strip with what was done, px at scale 1."""
+STRIP = 30  # height of a film's strip with what was done, px at scale 1
 
 
 @dataclass(eq=False)
@@ -71,12 +70,10 @@ class Part:
 
     @property
     def words(self) -> str:
-        """First words of the caption."""
         return self.node.words
 
 
 def parts_of(document: Document, node: Node, end: int) -> list[Part]:
-    """Return the parts of a branch, with records of all their steps."""
     parts: list[Part] = []
     dt = 0.0
     for run, here in replayed(document, node, end):
@@ -158,7 +155,6 @@ def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict
 
 
 def story_folders(folder: Path) -> list[tuple[Path, str]]:
-    """Return the folders of a story's parts with words on each, in their order; else the folder itself."""
     try:
         content = json.loads((folder / STORY).read_bytes())
         if content["format"] != "robocov-story":
@@ -179,7 +175,6 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 def save_story(
     document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
 ) -> dict[str, Any]:
-    """Write a branch into a folder: numbers and pictures of its parts, all costs, a film."""
     root = document.path(node)[0]
     assert root.scenario is not None
     parts, dt = parts_of(document, node, end), root.scenario.dt
@@ -284,7 +279,6 @@ def story_frames(
 
 
 def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
-    """Return the strip below a film: what was done last, and when."""
     strip = pygame.Surface(size, 0, 32)
     strip.fill(theme.panel)
     text = round(0.5 * size[1])
@@ -294,7 +288,6 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
 
 
 def _scene(pane: Pane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
-    """Return what a frame shows of a pane."""
     setup, snapshot = pane.setup, pane.simulation.snapshot
     known = [
         (begin + time, value)

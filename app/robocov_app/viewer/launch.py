@@ -30,8 +30,7 @@ NO_DISPLAY = (
     "(of a saved run, with --video) renders without, and robocov run needs none"
 )
 
-HEADLESS_FPS = 30
-"""Frames per second of what is rendered without a display."""
+HEADLESS_FPS = 30  # frames per second of what is rendered without a display
 
 
 @dataclass

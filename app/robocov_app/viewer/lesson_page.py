@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 def draw_caption(
     screen: pygame.Surface, layout: Layout, theme: Theme, title: str, text: str, progress: float
 ) -> None:
-    """Show a chapter of the tour: its title and its two sentences, over the lower arena."""
     scale = layout.scale
     left, top, width, height = layout.arena
     size, bold = round(14 * scale), round(15.5 * scale)
@@ -48,7 +47,6 @@ def draw_caption(
 
 
 def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
-    """Show a lesson in place of the panel: what its chapter says and asks, and which chapters there are."""
     scale = layout.scale
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))

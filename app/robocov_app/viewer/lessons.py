@@ -29,14 +29,11 @@ if TYPE_CHECKING:
 
     from robocov_app.viewer.presenter import Presenter
 
-FIRST = "lesson-1.robocov"
-"""The lesson that comes with robocov."""
-
+FIRST = "lesson-1.robocov"  # the lesson that comes with robocov
 READING = 4.0
 """Seconds on the wall after a chapter's end until the next, and for an answer where nobody answers."""
 
-LONGEST_TASK = 600.0
-"""Seconds of simulation after which `check` gives a task up."""
+LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
 
 PLAIN = frozenset(
     {
@@ -48,7 +45,6 @@ PLAIN = frozenset(
 
 
 def first_lesson() -> SavedSession:
-    """Return the lesson that comes with robocov."""
     text = files("robocov_app.viewer").joinpath("assets", FIRST).read_text(encoding="utf-8")
     return session_of(json.loads(text), FIRST)
 
@@ -62,7 +58,6 @@ def load_lesson(path: Path) -> SavedSession:
 
 
 def holds(condition: ConditionModel, session: Session) -> bool:
-    """Return whether what is waited for is so."""
     pane = session.panes[0]
     if condition.step is not None and session.step_now >= condition.step:
         return True
@@ -113,22 +108,18 @@ class LessonPlayer:
 
     @property
     def chapter(self) -> ChapterModel:
-        """The chapter that is played."""
         return self.lesson.chapters[self.number]
 
     @property
     def title(self) -> str:
-        """Its title with its number."""
         return f"{self.number + 1}  {self.chapter.title}"
 
     @property
     def text(self) -> str:
-        """Text of the chapter."""
         return self.chapter.text
 
     @property
     def asks(self) -> list[str]:
-        """Question or task of now, line by line."""
         chapter = self.chapter
         if self.state == "left":
             return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
@@ -144,7 +135,6 @@ class LessonPlayer:
 
     @property
     def chapters(self) -> tuple[str, ...]:
-        """The titles of all chapters."""
         return tuple(chapter.title for chapter in self.lesson.chapters)
 
     @property
@@ -157,13 +147,11 @@ class LessonPlayer:
 
     @property
     def progress(self) -> float:
-        """Part of the lesson that is over, 0 to 1, by chapters."""
         end = self.chapter.until.step
         part = min(self.session.step_now / end, 1.0) if end else 0.5
         return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
-        """Take note that so many seconds have passed on the wall."""
         if self.done or self.state == "left":
             return
         session, chapter = self.session, self.chapter
@@ -183,7 +171,6 @@ class LessonPlayer:
             self.skip(1)
 
     def reply(self, answer: int) -> None:
-        """Answer the question; the chapter goes on."""
         question = self.chapter.question
         if self.state == "asks" and question is not None and 1 <= answer <= len(question.answers):
             self.answer = answer
@@ -191,23 +178,19 @@ class LessonPlayer:
             self.session.playing = True
 
     def skip(self, by: int) -> None:
-        """Go to the next chapter, or back to one before; after the last the lesson ends."""
         if self.number + by >= len(self.lesson.chapters):
             self.end()
         else:
             self._begin(max(self.number + by, 0))
 
     def leave(self) -> None:
-        """Let whoever watches play with what is there."""
         if self.state != "task":
             self._turn("left")
 
     def come_back(self) -> None:
-        """Begin the chapter that was left again."""
         self._begin(self.number)
 
     def end(self) -> None:
-        """End; the session from before is there again."""
         viewer = self._viewer
         self._workspace.close()
         viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before

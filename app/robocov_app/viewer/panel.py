@@ -50,13 +50,11 @@ class Panel(SidePanel):
         self._age = 0.0
 
     def show_tab(self, name: str) -> None:
-        """Turn to a page."""
         if name in TABS:
             self.tab = name
             self.viewer.version += 1
 
     def update(self, seconds: float) -> None:
-        """Let time pass: the page is drawn anew when something that it shows is different."""
         self._age += seconds
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
@@ -157,7 +155,6 @@ class Panel(SidePanel):
     # pages
 
     def _parameters(self, ui: Ui) -> None:
-        """Show sliders, fields and resets of the chosen controller's gains and of the team's limits."""
         found = self.viewer.parameters()
         law = self.viewer.session.setup(self.viewer.pane).law
         groups = {
@@ -192,7 +189,6 @@ class Panel(SidePanel):
         self._reset(ui, each, usual)
 
     def _words(self, ui: Ui, each: Pick) -> None:
-        """Show buttons side by side, one for each word; where they do not fit, a list."""
         count = len(each.offered)
         width = (ui.wide - 103 - 25 - 3 * (count - 1)) / count
         fits = all(shortened(word, round(SMALL), width - 6) == word for word in each.offered)
@@ -211,7 +207,6 @@ class Panel(SidePanel):
             self._set(each.name, each.default)
 
     def _show(self, ui: Ui) -> None:
-        """Show check boxes of the layers."""
         viewer = self.viewer
         names = [name for name in self.titles if name not in NOT_OFFERED]
         rows = -(-len(names) // 2)
@@ -232,7 +227,6 @@ class Panel(SidePanel):
             self._does(ui, "Whole map", "fit")
 
     def _robot(self, ui: Ui) -> None:
-        """Show what the inspector says, and what can be done to its robot."""
         why = "" if self.viewer.selected is not None else "no robot is chosen: click one first, or press Tab"
         ui.row(0, 0, 0, 0, below=8)
         self._does(ui, "◀", "robot:previous")
@@ -249,7 +243,6 @@ class Panel(SidePanel):
             show_report(ui, report)
 
     def _keep(self, ui: Ui) -> None:
-        """Show buttons for what is saved, and for help."""
         ui.row(0, 0, height=28, below=5)
         for text, action in (each for row in _KEPT for each in row):
             filming = action == "film" and self.viewer.filming
@@ -257,7 +250,6 @@ class Panel(SidePanel):
 
 
 def show_report(ui: Ui, report: Report) -> None:
-    """Show what the inspector says of a robot, forces with their arrows."""
     ui.words(report.title, size=14, bold=True)
     ui.space(3)
     ui.words(report.verdict, size=12.5, bold=True, colour=ui.theme.final)
@@ -271,7 +263,6 @@ def show_report(ui: Ui, report: Report) -> None:
 
 
 def _arrow(ui: Ui, line: Line, largest: float) -> None:
-    """Draw the arrow of a force at the left of the line to come."""
     assert line.vector is not None
     size = float(np.hypot(*line.vector))
     if ui.surface is None or size < NOTHING:

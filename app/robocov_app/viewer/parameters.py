@@ -8,9 +8,7 @@ from robocov.errors import ParameterError, shown
 from robocov.robots import KINEMATICS, TRACK_PER_RADIUS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
-SPAN = 30.0
-"""A slider reaches from so many times less than the default to so many times more."""
-
+SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
 _END = 0.985  # from here on a slider says "no limit" where there may be none
 
 _KINEMATIC = "kinematic limit, the same for every controller"
@@ -58,7 +56,6 @@ class Parameter:
         return min(max(part, 0.0), _END if self.optional else 1.0)
 
     def at(self, place: float) -> float | None:
-        """Return the value of a place of the slider, to three digits, never beyond its ends."""
         if self.optional and place > _END:
             return None
         linear, low = self.low <= 0.0, self.low
@@ -66,7 +63,6 @@ class Parameter:
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def words(self) -> str:
-        """Return the value as people type it."""
         return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
 
     def read(self, text: str) -> float | None:
@@ -93,7 +89,6 @@ class Pick:
     offered: tuple[str, ...]
 
     def words(self) -> str:
-        """Return the value as people type it."""
         return self.value
 
     def read(self, text: str) -> str:
@@ -130,7 +125,6 @@ def gain_parameters(law: ControllerChoice) -> list[Parameter | Pick]:
 
 
 def limit_parameters(limits: TeamSpec) -> list[Parameter | Pick]:
-    """Return a slider for each limit of the team, and its kinematics; what is set, is set for all robots."""
     found: list[Parameter | Pick] = []
     usual, kind = TeamSpec(), KINEMATICS[limits.track_width > 0.0]
     for name, (label, meaning, (low, high)) in _LIMITS.items():
@@ -145,7 +139,6 @@ def limit_parameters(limits: TeamSpec) -> list[Parameter | Pick]:
 
 
 def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSpec:
-    """Return the limits with another value of one; `name` may begin with ``team.``."""
     name = name.removeprefix("team.")
     if name == "kinematics":
         name, value = "track_width", TRACK_PER_RADIUS * limits.radius if value == KINEMATICS[1] else 0.0

@@ -13,8 +13,7 @@ from robocov_app.viewer.panel import Panel
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.tools import Brush
 
-_TAKES_ROBOTS = ("hand", "eraser", "failure")
-"""Tools that take hold of a robot."""
+_TAKES_ROBOTS = ("hand", "eraser", "failure")  # tools that take hold of a robot
 
 
 class Pointer:
@@ -42,11 +41,9 @@ class Pointer:
 
     @property
     def dragging(self) -> bool:
-        """Whether a button is held down on something."""
         return bool(self._drag)
 
     def take(self, event: pygame.event.Event, now: float) -> None:
-        """Take an event of the mouse at a time in seconds."""
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos
         taken = not self._drag and self._panel.take(event)
@@ -71,7 +68,6 @@ class Pointer:
             self._canvas.zoom(factor, self.at)
 
     def show(self) -> None:
-        """Let the cursor, and a ring around the robot under it, tell what a press would do."""
         viewer, canvas, layout = self._viewer, self._canvas, self._canvas.layout
         pane = canvas.pane_at(self.at) if viewer.cursor is not None else None
         if pane is not None:  # the cameras may have moved below it
@@ -96,7 +92,6 @@ class Pointer:
             show_cursor(shape)
 
     def leave(self) -> None:
-        """The cursor is not in the window any more."""
         self._viewer.cursor = None
         self._chart.hover = None
 
@@ -138,7 +133,6 @@ class Pointer:
         self._held = pane
 
     def _press_chart(self, at: tuple[int, int]) -> None:
-        """Plot the other quantity, enter a branch by its ghost, or look at the time there."""
         viewer, chart = self._viewer, self._chart
         if chart.offers(at):
             viewer.attempt(chart.switch)

@@ -64,14 +64,12 @@ class RunSaver:
         return f"saving the run: {target}/"
 
     def poll(self) -> list[Said]:
-        """Return what is to be told since the last call."""
         for job in [job for job in self._jobs if job.process.poll() is not None]:
             self._end(job)
         said, self._said = self._said, []
         return said
 
     def finish(self) -> None:
-        """Wait until all is saved; after Ctrl-C what is being saved stays as it is."""
         try:
             for k, job in enumerate(self._jobs):
                 try:
@@ -90,7 +88,6 @@ class RunSaver:
                 self._end(job)
 
     def _end(self, job: _Job) -> None:
-        """Note how a job went, and clear up after it."""
         self._jobs.remove(job)
         with job.errors as errors, job.temporary:
             errors.seek(0)
@@ -105,7 +102,6 @@ class RunSaver:
 
 
 def own_controllers(document: Document) -> list[str]:
-    """Return the names of the controllers of a session that are the user's own."""
     names: dict[str, None] = {}
     for node in document.nodes:
         for change in node.changes:
@@ -117,7 +113,6 @@ def own_controllers(document: Document) -> list[str]:
 
 
 def _stem(session: Session, map_name: str) -> str:
-    """Return what the folder is called, but for its number."""
     name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
     laws = [pane.law.name for pane in session.panes]
     what = folder_names(laws)[0] if len(laws) == 1 else "comparison"

@@ -41,7 +41,6 @@ def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) 
 
 
 def cursor_words(viewer: Presenter) -> str:
-    """Return where the cursor is, and what the place adds to the cost."""
     if viewer.cursor is None:
         return ""
     x, y = viewer.cursor
@@ -65,7 +64,6 @@ def cursor_words(viewer: Presenter) -> str:
 
 
 def suggestion(viewer: Presenter) -> str:
-    """Return what this session has not tried yet, if the present is shown and has settled; else nothing."""
     session = viewer.session
     if not (viewer.suggests and session.settled and session.live) or session.hand is not None:
         return ""

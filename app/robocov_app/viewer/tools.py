@@ -106,7 +106,6 @@ class Hand(Tool):
 
     @property
     def holds(self) -> bool:
-        """Whether it holds something; if not, dragging pans."""
         return self.robot is not None or self.obstacle is not None
 
     def move(self, session: Session, point: Point) -> None:
@@ -217,7 +216,6 @@ class Wall(Polygon):
     _same = 0.3
 
     def widen(self, factor: float) -> None:
-        """Draw wider walls, or narrower ones."""
         self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
 
     def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
@@ -318,7 +316,6 @@ class Brush(Tool):
         return self.radius
 
     def widen(self, session: Session, factor: float) -> str:
-        """Take a larger brush, or a smaller one; return what to tell."""
         whole = session.environment.region.diameter
         self.radius = float(f"{np.clip(self.size(session) * factor, whole / 200, whole / 2):.3g}")
         return f"the brush has a radius of {self.radius:g} m"
@@ -375,7 +372,6 @@ class Brush(Tool):
         return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
 
     def _show(self, session: Session) -> None:
-        """Let the robots know of it."""
         dabs, self._dabs = tuple(self._dabs), []
         session.paint(dabs, self.size(session), lowers=self.lowers, stroke=self._stroke)
         self._shown = self.clock()
@@ -420,7 +416,6 @@ def _fail(session: Session, point: Point, reach: float, number: int | None) -> s
 
 
 def toolbox() -> dict[str, Tool]:
-    """Return one of each tool by name, in the order in which they are shown."""
     fails = "click a robot to let it fail; click it again to revive it"
     tools: list[Tool] = [
         *(Hand(), Polygon(), Wall(), Circle(), Brush()),

@@ -88,7 +88,6 @@ class Window(BaseWindow):
     # frames
 
     def close(self) -> None:
-        """End what is going on beside the window."""
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
         self.viewer.costs.close()
@@ -100,7 +99,6 @@ class Window(BaseWindow):
         viewer.version += 1
 
     def update(self, seconds: float) -> None:
-        """Let so many seconds pass, for the simulation, its cost and the panel."""
         self._now += seconds
         self._unfilmed += seconds
         self._pass_time(seconds)
@@ -153,7 +151,6 @@ class Window(BaseWindow):
         viewer.look_at_map()
 
     def _ask_costs(self) -> None:
-        """Ask for the cost of what is shown, and note the answers that tell of the present."""
         viewer, session = self.viewer, self.viewer.session
         if session.serial != self._serial:
             self._serial = session.serial
@@ -173,7 +170,6 @@ class Window(BaseWindow):
                         pane.curves["time"].add(known.time, known.travel_time)
 
     def _arrange(self) -> None:
-        """Lay the window out anew when its size, look or number of panes is another."""
         viewer, session = self.viewer, self.viewer.session
         size = self.screen.get_size()
         panes = len(session.panes)
@@ -194,7 +190,6 @@ class Window(BaseWindow):
             self.panel.arrange(layout, theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
         layout, theme, viewer = self.layout, self.theme, self.viewer
         if len(layout.panes) > 1:
             self.screen.fill(theme.background, pygame.Rect(layout.arena))
@@ -225,7 +220,6 @@ class Window(BaseWindow):
         self._unfilmed = 0.0
 
     def _inspect(self) -> None:
-        """Let the inspector explain the robot that is asked, a few times a second while that is in sight."""
         number, panel, session = self.viewer.selected, self.panel, self.viewer.session
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
@@ -238,7 +232,6 @@ class Window(BaseWindow):
     # doing
 
     def do(self, name: str) -> None:
-        """Do the action of this name."""
         if self.tour is not None and self.tour.state != "left" and name in ("back", "forward"):
             self.tour.skip(1 if name == "forward" else -1)
             return
@@ -331,7 +324,7 @@ class Window(BaseWindow):
 
         def lines() -> list[Option]:
             found = []
-            for k, each in enumerate(session.branches, 1):
+            for k, each in enumerate(session.document.branches(), 1):
                 text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
                 found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
             return found
@@ -339,7 +332,6 @@ class Window(BaseWindow):
         self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
-        """Ask who is here for the first time whether to begin with the lesson; until then the team waits."""
         session = self.viewer.session
         playing, session.playing = session.playing, False
 
@@ -377,14 +369,12 @@ class Window(BaseWindow):
 
     @property
     def _lesson_shown(self) -> bool:
-        """Whether a lesson has the place of the panel."""
         return self.tour is not None and self.tour.state != "left"
 
     def _asked(self) -> bool:
         return self.tour is not None and self.tour.state == "asks"
 
     def _leave_lesson(self) -> None:
-        """Let whoever touches something play; the lesson waits."""
         if self.tour is not None:
             self.tour.leave()
 
@@ -392,7 +382,6 @@ class Window(BaseWindow):
         return self.keeper.save(self.viewer.session, self.viewer.folder, self.viewer.map_name)
 
     def toggle_film(self) -> str:
-        """Begin to record what is in the window, or end it."""
         if self.film is None:
             target = free_name(self.viewer.folder, "robocov", ".mp4")
             self.film = Film(target, self.screen.get_size(), patient=self._patient)
@@ -407,7 +396,6 @@ class Window(BaseWindow):
     # events
 
     def take(self, event: pygame.event.Event) -> None:
-        """Take one event."""
         if event.type == pygame.KEYUP:
             self.commands.release(event)
         elif event.type == pygame.WINDOWFOCUSLOST:
@@ -434,7 +422,6 @@ class Window(BaseWindow):
             self.panel.take(event)
 
     def _press(self, event: pygame.event.Event) -> None:
-        """Take a key: for a field first, else for a command."""
         if self.panel.take(event):
             return
         command = self.commands.of_key(event)

@@ -79,7 +79,7 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
         assert driver.session.numbers == (2, 3)
         driver.window.commands.typed(f"open {path}")
         driver.frames(2)
-        assert driver.viewer.session.numbers == (2, 3) and len(driver.viewer.session.branches) == 2
+        assert driver.viewer.session.numbers == (2, 3) and len(driver.viewer.session.document.branches()) == 2
         driver.window.commands.typed("branch 1")
         assert driver.viewer.session.numbers == (1, 3)
 

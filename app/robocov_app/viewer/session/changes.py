@@ -44,7 +44,6 @@ def _density_of(model: Any, context: Any) -> Density | None:
 
 
 def _density_json(density: Density | None, context: object = None) -> object:
-    """Return a density as maps have it."""
     square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
     return to_json(square.with_density(density)).get("density")
 
@@ -53,7 +52,6 @@ _DENSITY = read_as(DensityModel | None, _density_of, _density_json)
 
 
 def _begun(value: object, read: Any) -> Scenario:
-    """Return a scenario of a file; what cannot be begun is told with its place."""
     try:
         scenario: Scenario = read(value)
     except MapError:
@@ -258,11 +256,11 @@ class Restart(_Change):
 
 MapChange: TypeAlias = EditObstacles | Paint | SetDensity
 PaneChange: TypeAlias = Place | Join | Leave | Fail | Revive | SetController | SetLimits
-Change: TypeAlias = PaneChange | MapChange | Drag | Release | RemovePane | Restart
+Touch: TypeAlias = PaneChange | MapChange | Drag | Release | RemovePane
+Change: TypeAlias = Touch | Restart
 
 
 def map_change(before: Environment, after: Environment) -> EditObstacles:
-    """Return the change from one map to another of the same place that differs in some obstacles."""
     old, new = before.obstacles, after.obstacles
     first = _alike(old, new)
     last = _alike(old[first:][::-1], new[first:][::-1])
@@ -270,7 +268,6 @@ def map_change(before: Environment, after: Environment) -> EditObstacles:
 
 
 def _alike(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
-    """Return how many obstacles are the same at the beginning."""
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False)))
 
 
@@ -291,7 +288,6 @@ def _need_another(pane: Pane, number: int) -> None:
 
 
 def _fitting(setup: PaneSetup, number: int, others: np.ndarray, radii: np.ndarray, point: Point) -> Point:
-    """Return the place nearest to a point where a robot fits beside the others and those that failed."""
     return nearest_free(setup.solid, setup.limits.radius_of(number), others, point, radii)
 
 
@@ -311,7 +307,6 @@ def _without_robot(pane: Pane, number: int) -> Continuation:
 
 
 def _with_robot(pane: Pane, setup: PaneSetup, number: int, point: Point) -> Continuation:
-    """Return a pane's robots and one more, at rest at a point or as near as it fits."""
     positions, row = pane.simulation.positions, bisect(setup.numbers, number)
     place = _fitting(setup, number, positions, pane.simulation.team.radius, point)
     return Continuation(

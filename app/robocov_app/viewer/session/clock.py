@@ -8,23 +8,18 @@ from time import perf_counter
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
 """Simulated seconds per second; infinite for as fast as it goes."""
 
-LONGEST_FRAME = 0.1
-"""Longest frame, s: what it took beyond is not made up for."""
-
+LONGEST_FRAME = 0.1  # longest frame, s: what it took beyond is not made up for
 FRAME_BUDGET = 0.008
 """So many seconds of a frame a window that people look at gives to the steps of the simulation."""
 
-_PATIENT = 16.0
-"""Speed of "as fast as it goes" where no time runs out."""
+_PATIENT = 16.0  # speed of "as fast as it goes" where no time runs out
 
 
 def speed_words(speed: float) -> str:
-    """Return a speed as people write it: ``0.5×``, ``max``."""
     return "max" if math.isinf(speed) else f"{speed:g}×"
 
 
 def speed_index(speed: float) -> int:
-    """Return the number of the nearest of `SPEEDS`, by their ratios."""
     logs = [math.log(min(each, 1e4)) for each in (*SPEEDS, speed)]
     return min(range(len(SPEEDS)), key=lambda k: abs(logs[k] - logs[-1]))
 

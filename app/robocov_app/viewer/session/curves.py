@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from robocov_app.viewer.session.pane import Pane
     from robocov_app.viewer.session.session import Session
 
-MOST_SAMPLES = 3000
-"""When a curve has so many, every second one of its older half goes."""
+MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,6 @@ class Curve:
         return self._time[-1] if self._time else -np.inf
 
     def add(self, time: float, value: float) -> None:
-        """Take a sample at any time; one of the same time is replaced."""
         if not np.isfinite([time, value]).all():
             return
         k = bisect_left(self._time, time - 1e-9)
@@ -68,7 +66,6 @@ class Curve:
         self._value.insert(k, value)
 
     def outline(self, most: int) -> list[list[float]]:
-        """Return times and values of some samples, the last among them, with few digits."""
         stride = -(-len(self._time) // most)
         return [
             [round(time, 3) for time in self._time[::-stride][::-1]],
@@ -90,7 +87,6 @@ class Curve:
                 self.add(time, value)
 
     def at(self, time: float) -> float:
-        """Return the value at a time, between samples on the straight line; nan before the first."""
         if not self._time or time < self._time[0] - 1e-6:
             return float("nan")
         return float(np.interp(time, self._time, self._value))
@@ -131,12 +127,10 @@ def speeds_of(session: Session, pane: Pane) -> Array | None:
 
 
 def chosen(session: Session, wanted: Plotted) -> Plotted:
-    """Return what is plotted: what is wanted, if there is a choice."""
     return wanted if any(len(pane.curves["time"]) for pane in session.panes) else DISTANCE
 
 
 def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
-    """Return the newest time not after now at which the costs of all panes with any are known, and these."""
     curves = {pane.number: curve for pane in session.panes if len(curve := pane.curves[what.name])}
     time = min([session.time, *(curve.last_time for curve in curves.values())])
     values = {number: curve.at(time) for number, curve in curves.items()}

@@ -18,8 +18,7 @@ from robocov_app.viewer.session.history import Moment
 from robocov_app.viewer.session.lockstep import Happening, Lockstep
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
-MOST_KEPT = 160
-"""Moments of a node that are kept while another branch is shown."""
+MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
 
 
 @dataclass(eq=False)
@@ -54,17 +53,14 @@ class Node:
 
     @property
     def begun(self) -> Scenario:
-        """The scenario that begins here, where one does."""
         assert self.scenario is not None
         return self.scenario
 
     @property
     def begin(self) -> int:
-        """The step at which it begins, in its own time."""
         return self.at if self.scenario is None else 0
 
     def carry_out(self, run: Lockstep) -> None:
-        """Change a run that goes on from one step to the next as was done at this step."""
         for change in self.changes:
             if change.step == run.step and not isinstance(change, Restart):
                 run.apply(change)
@@ -83,14 +79,13 @@ class Branch(NamedTuple):
     words: str
 
     def told(self, dt: float) -> str:
-        """Return when it ends and, where that is known, each pane's mean distance then."""
         words = [f"{self.end * dt:.1f} s"]
         for pane, what in sorted(self.node.curves):
             if what == "distance":
                 value = self.node.curves[pane, what].at(self.end * dt)
                 # of a file that was opened the controllers are known once it has been run
                 law = self.node.controllers.get(pane)
-                words.append(f"{law.label} {value:.3f} m" if law else f"{value:.3f} m")
+                words.append(f"{law.label if law else ''} {value:.3f} m".lstrip())
         return " · ".join(words)
 
 
@@ -103,7 +98,6 @@ class Document:
             self.add(None, 0, "begin", "begun", Restart(scenario))
 
     def add(self, parent: Node | None, at: int, kind: str, words: str, change: Change) -> Node:
-        """Add a touch in a node's time."""
         begin = 0 if isinstance(change, Restart) else at
         node = Node(len(self.nodes), parent, at, kind, words, [replace(change, step=begin)], begin)
         self.nodes.append(node)
@@ -121,16 +115,12 @@ class Document:
         path = self.path(node)
         return {each.number: after.at for each, after in pairwise(path)} | {node.number: step}
 
-    def children(self, node: Node) -> Iterator[Node]:
-        """Yield what was done next in a node's time, whether or not time began anew with it."""
-        return (each for each in self.nodes if each.parent is node)
-
     def branches(self) -> list[Branch]:
         """Return all stories, the newest last."""
         return [
             Branch(node, node.end, node.name or node.words)
             for node in self.nodes
-            if node.end > max((child.at for child in self.children(node)), default=-1)
+            if all(child.at < node.end for child in self.nodes if child.parent is node)
         ]
 
     def branch(self, name: str) -> Branch:
@@ -151,13 +141,12 @@ def replayed(
     It goes on from time 0, or from a step of the node `since`. Controllers and touches may raise anything.
     """
     path, limits = document.path(node), document.limits(node, step)
-    run, at = run or Lockstep(path[0].begun), 0 if since is None else path.index(since)
-    while True:
-        while path[at] is not node and run.step >= limits[path[at].number]:
-            at += 1
-            path[at].carry_out(run)
-        yield run, path[at]
-        if path[at] is node and run.step >= step:
-            return
-        path[at].happenings.update(run.advance())
-        path[at].carry_out(run)
+    run, rest = run or Lockstep(path[0].begun), path[0 if since is None else path.index(since) :]
+    for here in rest:
+        if here is not rest[0]:
+            here.carry_out(run)
+        while run.step < limits[here.number]:
+            yield run, here
+            here.happenings.update(run.advance())
+            here.carry_out(run)
+    yield run, node

@@ -30,8 +30,7 @@ from robocov_app.viewer.session.scenario import Coordinate, Text
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
 
-MOST_SAMPLES = 30
-"""Samples of a curve that stand in the file, for each touch."""
+MOST_SAMPLES = 30  # samples of a curve that stand in the file, for each touch
 
 
 @dataclass(frozen=True)
@@ -156,7 +155,6 @@ class SavedSession:
 
 
 def session_schema() -> dict[str, Any]:
-    """Return the JSON schema of session files."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **SessionModel.model_json_schema()}
 
 
@@ -168,7 +166,6 @@ def save_session(path: Path, document: Document, head: Node, step: int, view: Ma
 
 
 def dumped(content: Mapping[str, Any]) -> str:
-    """Return a session as text: a line for each touch."""
     touches = ",\n  ".join(
         json.dumps(each, ensure_ascii=False, allow_nan=False) for each in content["touches"]
     )
@@ -178,7 +175,6 @@ def dumped(content: Mapping[str, Any]) -> str:
 
 
 def session_json(document: Document, head: Node, step: int, view: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a session as JSON."""
     from robocov import __version__
 
     maps = _Maps()
@@ -255,7 +251,6 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
 
 
 def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> Node:
-    """Return the next node of a document."""
     first, parent = not nodes, None
     if (touch.parent is None) != first or (touch.parent is not None and touch.parent >= len(nodes)):
         refuse("parent", value=touch.parent, wanted="null for the first, else an earlier number,")
@@ -298,7 +293,6 @@ class _Maps:
         self.environment = cache(self._environment)
 
     def number(self, environment: Environment) -> int:
-        """Return the number of a map that is written."""
         document = _map_json(environment)
         if document not in self.maps:
             self.maps.append(document)

@@ -3,43 +3,29 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import compress
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from robocov.environment import CircleObstacle
+from robocov.arrays import Array, IntArray
+from robocov.conditions import Conditions
+from robocov.conditions.perception import Inbox
+from robocov.environment import CircleObstacle, Environment
+from robocov.observation import Decision
+from robocov.robots import Team
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from robocov.arrays import Array, IntArray
-    from robocov.conditions import Conditions
-    from robocov.conditions.perception import Inbox
-    from robocov.environment import Environment
-    from robocov.observation import Decision
-    from robocov.robots import Team
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
-
-MOST_BYTES = 24_000_000
-"""Memory that the moments of a window may take."""
-
-_OVERHEAD = 700
-"""Bytes that a moment of one pane takes beside its arrays."""
-
-_FEWEST = 300
-"""Moments that are kept however large they are."""
-
-_KEPT = 0.75
-"""Of the moments, so many stay at most when they are thinned."""
-
-RATE = 30.0
-"""Most rows for each simulated second."""
-
-MOST_ROWS = 4096
-"""When there are so many, every second of the older half goes."""
+MOST_BYTES = 24_000_000  # memory that the moments of a window may take
+_OVERHEAD = 700  # bytes that a moment of one pane takes beside its arrays
+_FEWEST = 300  # moments that are kept however large they are
+_KEPT = 0.75  # of the moments, so many stay at most when they are thinned
+RATE = 30.0  # most rows for each simulated second
+MOST_ROWS = 4096  # when there are so many, every second of the older half goes
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +55,6 @@ class PaneSetup:
 
     @property
     def team(self) -> Team:
-        """The robots that work."""
         return self.limits.team(self.numbers)
 
 
@@ -103,14 +88,14 @@ class State(NamedTuple):
 class Moment(NamedTuple):
     """All panes at one moment: enough to go on from there, bit for bit.
 
-    `step`: steps since the start. `scenario`: controllers, limits and map as they were last chosen; None in
-    the past of a record. `hand`, (number, (x, y) m) or None: the robot that is dragged, and where to. `node`:
-    node of the document in whose time it is.
+    `step`: steps since the start. `scenario`: controllers, limits and map as they were last chosen. `hand`,
+    (number, (x, y) m) or None: the robot that is dragged, and where to. `node`: node of the document in whose
+    time it is.
     """
 
     step: int
     states: Mapping[int, State]
-    scenario: Scenario | None = None
+    scenario: Scenario
     hand: tuple[int, tuple[float, float]] | None = None
     node: int = 0
 
@@ -120,83 +105,68 @@ class History:
 
     When they would take more than `most_bytes`, the older ones are thinned: of those that have grown old only
     every second step stays, of still older ones every fourth, and so on. The newest all stay, and so do,
-    unless they are too many themselves, those since which something was touched. `dt` in s.
+    unless they are too many themselves, those since which something was touched. `dt` in s; `thinned`: number
+    of moments that are gone.
     """
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
-        self.dt = dt
-        self.most_bytes = most_bytes
-        self._moments: list[Moment] = []
-        self._steps: list[int] = []
+        self.dt, self.most_bytes = dt, most_bytes
+        self.moments: list[Moment] = []
         self._sizes: list[int] = []
-        self._bytes = 0
-        self.thinned = 0
-        """Number of moments that are gone."""
+        self._bytes = self.thinned = 0
 
     def __len__(self) -> int:
-        return len(self._moments)
+        return len(self.moments)
 
     def __getitem__(self, k: int) -> Moment:
-        return self._moments[k]
+        return self.moments[k]
 
     @property
     def last(self) -> Moment:
-        """The newest moment."""
-        return self._moments[-1]
+        return self.moments[-1]
 
     @property
     def steps(self) -> list[int]:
-        """The steps of the moments, ascending; not to be changed."""
-        return self._steps
-
-    def since(self, k: int) -> list[Moment]:
-        """Return the moments from number `k` on."""
-        return self._moments[k:]
+        return [moment.step for moment in self.moments]
 
     def time(self, k: int) -> float:
         """Return the time of moment `k`, s."""
-        return self._steps[k] * self.dt
+        return self.moments[k].step * self.dt
 
     def add(self, moment: Moment) -> None:
         """Append a moment that is later than all."""
-        self._moments.append(moment)
-        self._steps.append(moment.step)
+        self.moments.append(moment)
         self._sizes.append(_size(moment))
         self._bytes += self._sizes[-1]
-        count = len(self._moments) + 1
-        while self._bytes > self.most_bytes and _FEWEST < len(self._moments) < count:
-            count = len(self._moments)
+        count = len(self) + 1
+        while self._bytes > self.most_bytes and _FEWEST < len(self) < count:
+            count = len(self)
             self._thin()
 
     def amend(self, moment: Moment) -> None:
         """Replace the newest moment, if it is of the same step; else append."""
-        if self._moments and self._moments[-1].step == moment.step:
-            self.cut(len(self._moments) - 2)
+        if self.moments and self.last.step == moment.step:
+            self.moments.pop()
+            self._bytes -= self._sizes.pop()
         self.add(moment)
 
     def at(self, time: float) -> int:
         """Return the number of the last moment not after `time`, the first if there is none."""
-        return max(bisect_right(self._steps, time / self.dt + 1e-6) - 1, 0)
-
-    def cut(self, k: int) -> None:
-        """Forget what came after moment `k`."""
-        self._bytes -= sum(self._sizes[k + 1 :])
-        del self._moments[k + 1 :], self._steps[k + 1 :], self._sizes[k + 1 :]
+        step = time / self.dt + 1e-6
+        return max(bisect_right(self.moments, step, key=lambda moment: moment.step) - 1, 0)
 
     def until(self, k: int) -> History:
         """Return a history of its own that ends with moment `k`."""
-        twin = History(self.dt, self.most_bytes)
-        twin._moments, twin._steps = self._moments[: k + 1], self._steps[: k + 1]
-        twin._sizes = self._sizes[: k + 1]
-        twin._bytes, twin.thinned = sum(twin._sizes), self.thinned
+        twin = copy(self)
+        twin.moments, twin._sizes = self.moments[: k + 1], self._sizes[: k + 1]
+        twin._bytes = sum(twin._sizes)
         return twin
 
     def _thin(self) -> None:
         """Leave at most `_KEPT`: all of the newest, ever fewer of what is older."""
-        count = len(self._moments)
-        steps = np.array(self._steps)
+        count, steps = len(self), np.array(self.steps)
         age = steps[-1] - steps
-        touched = np.array([True, *map(_changes, self._moments, self._moments[1:])])
+        touched = np.array([True, *map(_changes, self.moments, self.moments[1:])])
         for always in (touched, np.arange(count) == 0):
             whole, keep = count // 2, np.ones(count, dtype=bool)
             while whole > 1 and keep.sum() > _KEPT * count:
@@ -204,11 +174,8 @@ class History:
                 keep = always | (steps % _strides(age, int(age[-1 - whole])) == 0)
             if keep.sum() <= _KEPT * count:
                 break
-        kept = np.flatnonzero(keep).tolist()
-        self.thinned += count - len(kept)
-        self._moments = [self._moments[k] for k in kept]
-        self._steps = [self._steps[k] for k in kept]
-        self._sizes = [self._sizes[k] for k in kept]
+        self.moments, self._sizes = list(compress(self.moments, keep)), list(compress(self._sizes, keep))
+        self.thinned += count - len(self)
         self._bytes = sum(self._sizes)
 
 
@@ -232,14 +199,10 @@ def _changes(before: Moment, after: Moment) -> bool:
 def _size(moment: Moment) -> int:
     """Return about how many bytes a moment takes."""
     return sum(
-        _OVERHEAD
-        + state.positions.nbytes
-        + state.velocities.nbytes
-        + _bytes_of(state.memory)
-        + _bytes_of(state.inbox)
-        + _bytes_of(state.steering)
-        for state in moment.states.values()
-    )
+        _OVERHEAD + sum(_bytes_of(part) for part in (each.memory, each.inbox, each.steering))
+        + each.positions.nbytes + each.velocities.nbytes
+        for each in moment.states.values()
+    )  # fmt: skip
 
 
 def _bytes_of(memory: Any, depth: int = 4) -> int:
@@ -266,9 +229,8 @@ class Trail:
     """Positions at ascending times, for the robots that work now; bounded."""
 
     def __init__(self, n: int) -> None:
-        self._rows = np.empty((64, n, 2))
-        self._times = np.empty(64)
-        self._count = 0
+        # the system gives memory only as it is written to
+        self._rows, self._times, self._count = np.empty((MOST_ROWS, n, 2)), np.empty(MOST_ROWS), 0
 
     def __len__(self) -> int:
         return self._count
@@ -293,38 +255,39 @@ class Trail:
             self._count -= 1
         elif since < 1.0 / RATE - 1e-6 and not always:
             return
-        if self._count == MOST_ROWS:
-            self._thin()
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-            self._times = np.concatenate([self._times, np.empty_like(self._times)])
+        if self._count == len(self._times):
+            kept = np.r_[0 : self._count // 2 : 2, self._count // 2 : self._count]
+            self._count = len(kept)
+            self._rows[: self._count], self._times[: self._count] = self._rows[kept], self._times[kept]
         self._rows[self._count], self._times[self._count] = positions, time
         self._count += 1
-
-    def cut(self, time: float) -> None:
-        """Forget what came after `time`."""
-        self._count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
 
     def until(self, time: float) -> tuple[Array, Array]:
         """Return positions and times up to `time`."""
         count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
         return self._rows[:count], self._times[:count]
 
-    def _thin(self) -> None:
-        half = MOST_ROWS // 2
-        keep = np.concatenate([np.arange(0, half, 2), np.arange(half, MOST_ROWS)])
-        self._rows[: len(keep)] = self._rows[keep]
-        self._times[: len(keep)] = self._times[keep]
-        self._count = len(keep)
+    def of_robots(self, before: Sequence[int], after: Sequence[int]) -> Trail:
+        """Return it for other robots, by their numbers: nan where one was not there."""
+        twin, k = Trail(len(after)), self._count
+        twin._rows[:k], twin._times[:k], twin._count = of_robots(self.positions, before, after), self.time, k
+        return twin
 
 
-def trail_of(history: History, pane: int, last: int) -> Trail:
-    """Return where the robots that worked in a pane at moment `last` went until then."""
+def of_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
+    """Return positions, (..., n, 2) m, for other robots, by their numbers: nan where one was not there."""
+    found = np.full((*positions.shape[:-2], len(after), 2), np.nan)
+    for row, number in enumerate(after):
+        if number in before:
+            found[..., row, :] = positions[..., before.index(number), :]
+    return found
+
+
+def way_of(history: History, pane: int, last: int) -> tuple[Trail, Array]:
+    """Return the trail of the robots that worked in a pane at moment `last`, and their starts, (n, 2) m."""
     numbers = history[last].states[pane].setup.numbers
-    trail = Trail(len(numbers))
+    trail, starts = Trail(len(numbers)), dict[int, list[float]]()
     before: PaneSetup | None = None
-    rows: list[int] = []
-    their_rows: list[int] = []
     latest = -np.inf
     for k in range(last + 1):
         time, state = history.time(k), history[k].states[pane]
@@ -334,23 +297,7 @@ def trail_of(history: History, pane: int, last: int) -> Trail:
             continue
         if touched:
             before = state.setup
-            rows = [row for row, number in enumerate(numbers) if number in before.numbers]
-            their_rows = [before.numbers.index(numbers[row]) for row in rows]
-        places = np.full((len(numbers), 2), np.nan)
-        places[rows] = state.positions[their_rows]
-        trail.add(time, places, always=True)
+            starts = dict(zip(before.numbers, state.positions.tolist(), strict=True)) | starts
+        trail.add(time, of_robots(state.positions, state.setup.numbers, numbers), always=True)
         latest = time
-    return trail
-
-
-def starts_of(history: History, pane: int, last: int) -> Array:
-    """Return where the robots that worked in a pane at moment `last` had come in, (n, 2) m."""
-    starts: dict[int, list[float]] = {}
-    before: PaneSetup | None = None
-    for k in range(last + 1):
-        state = history[k].states[pane]
-        if state.setup is not before:
-            before = state.setup
-            for number, place in zip(before.numbers, state.positions.tolist(), strict=True):
-                starts.setdefault(number, place)
-    return np.array([starts[number] for number in history[last].states[pane].setup.numbers])
+    return trail, np.array([starts[number] for number in numbers])

@@ -12,30 +12,14 @@ from robocov.arrays import Array
 from robocov.conditions import SOON
 from robocov.environment import Point
 from robocov.errors import ParameterError
-from robocov_app.viewer.session.changes import (
-    Change,
-    Drag,
-    EditObstacles,
-    Fail,
-    Join,
-    Paint,
-    Place,
-    Release,
-    RemovePane,
-    Restart,
-    SetController,
-    SetDensity,
-    SetLimits,
-)
+from robocov_app.viewer.session import changes
+from robocov_app.viewer.session.changes import Drag, Fail, Join, Place, Release, Touch
 from robocov_app.viewer.session.history import Moment, PaneSetup
 from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
 from robocov_app.viewer.session.scenario import Scenario
 
-SPRING = 60.0
-"""Stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²."""
-
-STRONGEST = 80.0
-"""Largest pull of the spring, per kg, m/s²."""
+SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
+STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
 
 
 class Happening(NamedTuple):
@@ -72,8 +56,6 @@ class Lockstep:
 
     @classmethod
     def resumed(cls, moment: Moment) -> Lockstep:
-        """Return panes that go on from a moment, bit for bit as it went on."""
-        assert moment.scenario is not None
         run = cls.__new__(cls)
         run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
         run.panes = [
@@ -83,17 +65,14 @@ class Lockstep:
         return run
 
     def moment(self, node: int = 0) -> Moment:
-        """Return the present, as a moment in the time of a node of the document."""
         states = {pane.number: pane.state() for pane in self.panes}
         return Moment(self.step, states, self.scenario, self.hand, node)
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
         return self.step * self.scenario.dt
 
     def advance(self) -> list[Happening]:
-        """Make one control step; return who failed and joined by itself."""
         for pane in self.panes:
             pane.decide()  # a controller that fails does so before any pane has moved on
         for pane in self.panes:
@@ -101,42 +80,28 @@ class Lockstep:
         self.step += 1
         return list(self._come_and_go())
 
-    def apply(self, change: Change) -> None:
+    def apply(self, change: Touch) -> None:
         """Carry a change out, or nothing of it; StartError, ParameterError, MapError say why it cannot be."""
         match change:
-            case Drag(robot, to):
-                self.hand = robot, to
-            case Release():
-                self.hand = None
-            case RemovePane(number):
+            case Drag() | Release():
+                self.hand = (change.robot, change.to) if isinstance(change, Drag) else None
+                return
+            case changes.RemovePane(number):
                 if len(self.panes) == 1:
                     raise ParameterError("the last pane stays")
                 self.panes = [pane for pane in self.panes if pane.number != number]
-                self._note_laws()
-            case EditObstacles() | Paint() | SetDensity():
+            case changes.EditObstacles() | changes.Paint() | changes.SetDensity():
                 environment = change.on(self.scenario.environment)
                 self._change_all(lambda pane: Continuation(replace(pane.setup, environment=environment)))
-                self.scenario = replace(self.scenario, environment=environment)
-            case SetController(_, law):
-                law.made()
-                self._change_all(change.of)
-                self._note_laws()
-            case SetLimits(limits):
-                limits.team(1)
-                self._change_all(change.of)
-                self.scenario = replace(self.scenario, limits=limits)
-            case Restart():
-                raise AssertionError("a restart is a run of its own")
             case _:
                 self._change_all(change.of)
                 if self.hand is not None and (isinstance(change, Place) or not self._works(self.hand[0])):
                     self.hand = None
+        setup, laws = self.panes[0].setup, tuple(pane.law for pane in self.panes)
+        self.scenario = replace(self.scenario, environment=setup.environment, limits=setup.limits, laws=laws)
 
     def _works(self, robot: int) -> bool:
         return robot in self.panes[0].numbers
-
-    def _note_laws(self) -> None:
-        self.scenario = replace(self.scenario, laws=tuple(pane.law for pane in self.panes))
 
     def _change_all(self, wanted: Callable[[Pane], Continuation]) -> None:
         """Let every pane go on as is wanted; if one cannot, none does."""
@@ -148,8 +113,7 @@ class Lockstep:
 
     def _pull(self, pane: Pane) -> Array | None:
         """Return the pull of the hand on the robots of a pane, N."""
-        row = pane.row(self.hand[0]) if self.hand is not None else None
-        if row is None or self.hand is None:
+        if self.hand is None or (row := pane.row(self.hand[0])) is None:
             return None
         simulation = pane.simulation
         pull = SPRING * (np.array(self.hand[1]) - simulation.positions[row])
@@ -160,7 +124,6 @@ class Lockstep:
         return pulls
 
     def _come_and_go(self) -> Iterator[Happening]:
-        """Let robots fail and join whose time has come; the last one that works goes on."""
         conditions = self.scenario.conditions
         if conditions is None or not conditions.team_changes:
             return

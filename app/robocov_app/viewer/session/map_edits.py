@@ -19,8 +19,7 @@ from robocov.environment import (
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 
-SHORTEST = 0.02
-"""Metres below which what is drawn is taken for a slip of the hand."""
+SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
 
 
 def with_obstacles(environment: Environment, obstacles: tuple[Obstacle, ...]) -> Environment:
@@ -37,7 +36,6 @@ def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
 
 
 def without_obstacle(environment: Environment, index: int) -> Environment:
-    """Return the map without obstacle number `index`."""
     return with_obstacles(environment, environment.obstacles[:index] + environment.obstacles[index + 1 :])
 
 
@@ -48,8 +46,6 @@ def with_moved(environment: Environment, index: int, dx: float, dy: float) -> En
 
 
 def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
-    """Return the obstacle moved by (dx, dy) m, its coordinates to the tenth of a millimetre."""
-
     def at(point: tuple[float, float]) -> tuple[float, float]:
         return round(point[0] + dx, 4), round(point[1] + dy, 4)
 
@@ -110,7 +106,6 @@ def passage_words(before: Environment, after: Environment, radius: float) -> str
 
 
 def words_for(obstacle: Obstacle) -> str:
-    """Return what people call an obstacle."""
     kind = {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(obstacle)]
     return f"{kind} “{obstacle.name}”" if obstacle.name else kind
 
@@ -170,22 +165,14 @@ def _checked(environment: Environment) -> Environment:
 
 
 def _is_about(message: str, start: str) -> bool:
-    """Whether a message begins with the place of a start, or of something in it."""
     where = place(("starts", start))
     return message.startswith(tuple(f"{where}{after}" for after in (":", ".", "[")))
 
 
-CELLS = 96
-"""Cells along the longer side of a map whose density is painted."""
-
-LEAST, MOST = 0.05, 50.0
-"""Between these a place counts once it has been painted."""
-
-_DAB = 1.15
-"""Factor of one dab on the density at its centre."""
-
-_DECIMALS = 3
-"""Of what is painted, so that a map that is saved stays short."""
+CELLS = 96  # cells along the longer side of a map whose density is painted
+LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
+_DAB = 1.15  # factor of one dab on the density at its centre
+_DECIMALS = 3  # of what is painted, so that a map that is saved stays short
 
 
 def painted(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 MOST_OF_RECORDS = 400_000_000
 """Bytes that the moments of records may take, beside their arrays; of longer ones old moments are thinned."""
 
-_OF_A_MOMENT = 1500
-"""About how many bytes a moment of one pane takes, beside those arrays."""
+_OF_A_MOMENT = 1500  # about how many bytes a moment of one pane takes, beside those arrays
 
 
 @dataclass(frozen=True)
@@ -49,12 +48,10 @@ class LostController(ControllerChoice):
 
     @property
     def label(self) -> str:
-        """The controller as people called it."""
         return self.title
 
     @property
     def known(self) -> dict[str, Gain | Option]:
-        """Nothing is known of its gains."""
         return {}
 
     def made(self) -> Controller:
@@ -81,7 +78,6 @@ class _Nobody:
         """Nothing is remembered."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
-        """Say that there is no such controller."""
         LostController.made(self.law)
         raise AssertionError
 
@@ -171,7 +167,6 @@ def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
 
 
 def _check(saved: Sequence[Saved]) -> None:
-    """Make sure that the window can show the runs, all of them in step."""
     if not 1 <= len(saved) <= MOST_PANES:
         raise InputError(
             f"{saved[0].folder.parent}: {len(saved)} runs, but the window has room for {MOST_PANES}; "
@@ -198,7 +193,6 @@ def _check(saved: Sequence[Saved]) -> None:
 
 
 def _standing(setup: PaneSetup) -> PaneSetup:
-    """Return the circumstances with somebody in the place of a controller that is not there any more."""
     law = setup.law
     if not isinstance(law, LostController):
         return setup
@@ -206,7 +200,6 @@ def _standing(setup: PaneSetup) -> PaneSetup:
 
 
 def _history_of(records: Sequence[Record], casts: Sequence[PaneSetup], scenario: Scenario) -> History:
-    """Return the past that records tell of; its arrays are theirs."""
     first, dt = records[0], scenario.dt
     stride = round(first.dt / dt)
     needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
@@ -283,7 +276,6 @@ def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
 
 
 def _put(pane: Pane, saved: Saved, history: History) -> None:
-    """Let a pane be at the end of a run."""
     record, last = saved.record, history.last
     state = last.states[pane.number]
     standing = state._replace(setup=_standing(state.setup))

@@ -21,14 +21,9 @@ from robocov.errors import ParameterError, RobocovError, shown
 from robocov.robots import TURNING_RATE, UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
-MOST_ROBOTS = 1000
-"""So many robots can be asked for in the window."""
-
-MOST_THAT_TALK = 100
-"""So many robots can be asked for where each has messages of its own of every other."""
-
-MOST_PANES = 4
-"""So many controllers can be compared side by side."""
+MOST_ROBOTS = 1000  # so many robots can be asked for in the window
+MOST_THAT_TALK = 100  # so many robots can be asked for where each has messages of its own of every other
+MOST_PANES = 4  # so many controllers can be compared side by side
 
 
 def read_as(kind: Any, made: Callable[[Any, Any], object], plain: Callable[[Any, Any], object]) -> Any:
@@ -47,7 +42,6 @@ def read_as(kind: Any, made: Callable[[Any, Any], object], plain: Callable[[Any,
 
 
 def refused(error: object) -> PydanticCustomError:
-    """Return an error as pydantic notes it, with the place in the file."""
     return PydanticCustomError("refused", "{words}", {"words": str(error)})
 
 
@@ -115,16 +109,13 @@ class ControllerChoice:
 
     @cached_property
     def label(self) -> str:
-        """The controller as people call it."""
         return str(controller_kind(self.name).label)
 
     @cached_property
     def known(self) -> dict[str, Gain | Option]:
-        """Known gains of the controller, by name."""
         return gains_of(controller_kind(self.name))
 
     def value(self, gain: str) -> Value:
-        """Return the value of a gain."""
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
     def with_gain(self, gain: str, value: Value) -> ControllerChoice:
@@ -134,7 +125,6 @@ class ControllerChoice:
         return changed.plain()
 
     def plain(self) -> ControllerChoice:
-        """Return the law without gains that are as by default."""
         usual = {name: gain.default for name, gain in self.known.items()}.items()
         return replace(
             self, gains={name: value for name, value in self.gains.items() if (name, value) not in usual}
@@ -142,13 +132,11 @@ class ControllerChoice:
 
 
 def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
-    """Return which gains differ, as people write them."""
     changed = [name for name in after.known if before.value(name) != after.value(name)]
     return ", ".join(f"{name} = {_said(after.value(name))}" for name in changed)
 
 
 def branch_words(law: ControllerChoice) -> str:
-    """Return how a branch that was left is called."""
     return ", ".join([law.label, *(f"{name} {_said(value)}" for name, value in law.plain().gains.items())])
 
 
@@ -192,7 +180,6 @@ class TeamSpec:
 
     @classmethod
     def of(cls, team: Team, numbers: Sequence[int] | None = None) -> TeamSpec:
-        """Return what the robots of a team are and can do; by default they are numbered from 1."""
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
         different = {
@@ -249,7 +236,6 @@ class Scenario:
 
     @property
     def start_name(self) -> str:
-        """The name of the start, also of one that an obstacle has covered since."""
         if self.start is not None and self.start not in self.environment.starts:
             return self.start
         return self.environment.start(self.start).name

@@ -13,8 +13,7 @@ from robocov_app.viewer.session.session import Session
 
 KIND = "robocov-session-draft"
 
-_PAUSE = 0.9
-"""Seconds between two copies of a session that goes on."""
+_PAUSE = 0.9  # seconds between two copies of a session that goes on
 
 
 class Recovered(NamedTuple):
@@ -27,7 +26,6 @@ class Recovered(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Words of the offer."""
         where = "never saved" if self.path is None else f"not saved to {self.path.name}"
         touches = "1 touch" if self.touches == 1 else f"{self.touches} touches"
         return f"a session of {self.when:%H:%M}, {touches}, {where}"
@@ -47,7 +45,6 @@ class Workspace:
 
     @property
     def unsaved(self) -> bool:
-        """Whether there are touches that are in no file."""
         return self.session.revision != self._saved
 
     def keep(self, view: Mapping[str, Any]) -> None:
@@ -77,7 +74,6 @@ class Workspace:
         return target
 
     def close(self) -> None:
-        """End; what is not saved stays aside, and is offered at the next start."""
         self._autosaver.close(discard=not self.unsaved)
 
 
@@ -90,8 +86,6 @@ def opened(
 
 
 def recoverable(folder: Path | None) -> tuple[Recovered, ...]:
-    """Return the sessions that windows left behind which live no more, the newest first."""
-
     def read(record: autosave.Record) -> Recovered | None:
         content = record.content.get("session")
         if content is None:
@@ -104,7 +98,6 @@ def recoverable(folder: Path | None) -> tuple[Recovered, ...]:
 def recovered(
     work: Recovered, controllers: Collection[str], folder: Path | None
 ) -> tuple[Workspace, Mapping[str, Any]]:
-    """Return a session that was left behind, to go on with."""
     record = autosave.read_record(work.folder, KIND)
     saved = session_of(record.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
