@@ -23,7 +23,6 @@ from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
-from robocov_app.viewer.session.curves import TIME, compared
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
@@ -187,8 +186,7 @@ class ViewerCanvas:
 
     def _caption_cost(self, pane: Pane) -> str:
         session = self.viewer.session
-        time, distances = compared(session)
-        _, times = compared(session, TIME)
+        (time, distances), (_, times) = session.compared(), session.compared("time")
         if pane.number not in distances:
             return ""
         what = mean_label(session.setup(pane).environment)

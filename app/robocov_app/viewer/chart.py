@@ -16,7 +16,7 @@ from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared
+from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted
 from robocov_app.viewer.session.pane import Pane
 
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
@@ -83,11 +83,15 @@ class Chart:
 
     @property
     def plotted(self) -> Plotted:
-        return chosen(self.viewer.session, self._wanted)
+        return self._wanted if self._timed else DISTANCE
+
+    @property
+    def _timed(self) -> bool:
+        return any(len(pane.curves["time"]) for pane in self.viewer.session.panes)
 
     def switch(self) -> str:
         wanted = TIME if self.plotted is DISTANCE else DISTANCE
-        if wanted is TIME and chosen(self.viewer.session, TIME) is not TIME:
+        if wanted is TIME and not self._timed:
             return "all robots are equally fast: the mean time goes as the mean distance"
         self._wanted, self._page = wanted, None
         return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
@@ -219,7 +223,7 @@ class Chart:
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         self._other = None
-        if chosen(self.viewer.session, TIME) is DISTANCE:
+        if not self._timed:
             return
         scale, words = self.layout.scale, f"{(DISTANCE if self.plotted is TIME else TIME).short} ›"
         left += 16 * scale
@@ -252,7 +256,7 @@ class Chart:
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)
         _, right, _ = self._span
-        time, known = compared(session, self.plotted)
+        time, known = session.compared(self.plotted.name)
         if not known:
             return
         best = min(known.values())

@@ -16,7 +16,7 @@ from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET
-from robocov_app.viewer.session.workspace import recoverable
+from robocov_app.viewer.session.workspace import offer, recoverable
 from robocov_app.viewer.settings import Settings
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Launcher:
                 window = self._opened(settings)
                 window.viewer.say(trouble)
                 if not self._alone and (left := recoverable(autosave_folder())):
-                    window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
+                    window.viewer.say(f"{offer(left[0])}: Ctrl K, “recover” opens it")
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)

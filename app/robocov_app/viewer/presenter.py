@@ -18,7 +18,7 @@ from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
+from robocov_app.viewer.session.workspace import Workspace, offer, opened, recoverable, recovered
 from robocov_app.viewer.tools import Brush, Hand, Tool, Wall, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
@@ -313,7 +313,7 @@ class Presenter:
             self.say("nothing was left behind")
             return
         self._take(*recovered(found[0], self.laws, self._kept_in))
-        self.say(f"recovered: {found[0].words}")
+        self.say(f"recovered: {offer(found[0])}")
 
     def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
         self.workspace.close()

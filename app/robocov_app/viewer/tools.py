@@ -124,8 +124,10 @@ class Hand(Tool):
         if robot is not None:
             session.release()
         elif obstacle is not None:
-            words = f"{map_edits.words_for(session.environment.obstacles[obstacle])} moved"
-            return edited(session, map_edits.with_moved(session.environment, obstacle, *self._by()), words)
+            there = session.environment.obstacles[obstacle]
+            after = map_edits.moved(there, *self._by())
+            words = f"{map_edits.words_for(there)} moved"
+            return edited(session, map_edits.with_replaced(session.environment, obstacle, 1, [after]), words)
         return None
 
     def cancel(self, session: Session) -> bool:
@@ -398,7 +400,7 @@ def _erase(session: Session, point: Point, reach: float, number: int | None) -> 
     if index is None:
         return None
     words = f"{map_edits.words_for(session.environment.obstacles[index])} deleted"
-    return edited(session, map_edits.without_obstacle(session.environment, index), words)
+    return edited(session, map_edits.with_replaced(session.environment, index, 1), words)
 
 
 def _add(session: Session, point: Point, reach: float, number: int | None) -> str:

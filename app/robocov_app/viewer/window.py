@@ -28,7 +28,6 @@ from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.saving import RunSaver
-from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.status import HINT, facts, suggestion
 
@@ -160,7 +159,7 @@ class Window(BaseWindow):
             positions, known = session.positions(pane), viewer.costs.known.get(pane.number)
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
             if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
-                viewer.costs.ask(pane.number, session.time, positions, point, speeds_of(session, pane))
+                viewer.costs.ask(pane.number, session.time, positions, point, session.setup(pane).speeds)
         for number, known in viewer.costs.poll():
             self._answers += 1
             for pane in session.panes:

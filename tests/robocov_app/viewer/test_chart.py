@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from robocov_app.viewer.chart import curve_colour, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.session.curves import compared
 from robocov_app.viewer.session.scenario import ControllerChoice
 
 
@@ -109,7 +108,7 @@ def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> N
     values = {pane.number: pane.curve.value[-1] for pane in (first, second)}
     second.curve.add(last + 0.01, 99.0)
     driver.session._run.step += 60
-    time, known = compared(driver.session)
+    time, known = driver.session.compared()
     assert time == last
     assert known == pytest.approx(values)
 

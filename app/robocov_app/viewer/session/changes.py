@@ -19,7 +19,7 @@ from robocov.mapfile import density_of, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, plain
 from robocov.world.relocation import nearest_free
 from robocov_app.viewer.session.history import PaneSetup
-from robocov_app.viewer.session.map_edits import painted, with_obstacles
+from robocov_app.viewer.session.map_edits import painted, with_replaced
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Position, Scenario, read_as, refused
 
@@ -184,10 +184,7 @@ class EditObstacles(_Change):
     do: Literal["obstacles"] = field(default="obstacles", kw_only=True)
 
     def on(self, environment: Environment) -> Environment:
-        there = environment.obstacles
-        return with_obstacles(
-            environment, (*there[: self.first], *self.added, *there[self.first + self.removed :])
-        )
+        return with_replaced(environment, self.first, self.removed, self.added)
 
 
 @dataclass(frozen=True)

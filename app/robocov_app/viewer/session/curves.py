@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from robocov.arrays import Array
-    from robocov_app.viewer.session.pane import Pane
-    from robocov_app.viewer.session.session import Session
+from robocov.arrays import Array
 
 MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
 
@@ -51,6 +48,7 @@ class Curve:
         return self._time[-1] if self._time else -np.inf
 
     def add(self, time: float, value: float) -> None:
+        """Take a sample at any time; one of the same time is replaced."""
         if not np.isfinite([time, value]).all():
             return
         k = bisect_left(self._time, time - 1e-9)
@@ -87,6 +85,7 @@ class Curve:
                 self.add(time, value)
 
     def at(self, time: float) -> float:
+        """Return the value at a time, between samples on the straight line; nan before the first."""
         if not self._time or time < self._time[0] - 1e-6:
             return float("nan")
         return float(np.interp(time, self._time, self._value))
@@ -118,20 +117,3 @@ class Plotted(NamedTuple):
 
 DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean distance", "m")
 TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")
-
-
-def speeds_of(session: Session, pane: Pane) -> Array | None:
-    """Return how fast each robot that is shown can go, (n,) m/s; None where all, failed too, are alike."""
-    there = session.setup(pane)
-    return there.team.max_speed if "max_speed" in there.limits.different else None
-
-
-def chosen(session: Session, wanted: Plotted) -> Plotted:
-    return wanted if any(len(pane.curves["time"]) for pane in session.panes) else DISTANCE
-
-
-def compared(session: Session, what: Plotted = DISTANCE) -> tuple[float, dict[int, float]]:
-    curves = {pane.number: curve for pane in session.panes if len(curve := pane.curves[what.name])}
-    time = min([session.time, *(curve.last_time for curve in curves.values())])
-    values = {number: curve.at(time) for number, curve in curves.items()}
-    return time, {number: value for number, value in values.items() if np.isfinite(value)}

@@ -57,6 +57,11 @@ class PaneSetup:
     def team(self) -> Team:
         return self.limits.team(self.numbers)
 
+    @property
+    def speeds(self) -> Array | None:
+        """How fast each robot can go, (n,) m/s; None where all, failed too, are alike."""
+        return self.team.max_speed if "max_speed" in self.limits.different else None
+
 
 # circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
 @lru_cache(maxsize=8)

@@ -1,7 +1,8 @@
 """Edits of a map: obstacles drawn, moved and deleted, each a new environment; what cannot be is refused."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 import shapely
@@ -20,29 +21,41 @@ from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 
 SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
+CELLS = 96  # cells along the longer side of a map whose density is painted
+LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
+_DAB = 1.15  # factor of one dab on the density at its centre
+_DECIMALS = 3  # of what is painted, so that a map that is saved stays short
 
 
-def with_obstacles(environment: Environment, obstacles: tuple[Obstacle, ...]) -> Environment:
-    """Return the map with other obstacles, without starts that they cover.
+def with_replaced(
+    environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
+) -> Environment:
+    """Return the map with obstacles in the place of `removed` ones from number `first` on.
 
-    Raises MapError where it would break a rule; the message is a sentence for people.
+    It is as a file would give it, without starts that are covered. Raises MapError where it would break a
+    rule; the message is a sentence for people.
     """
-    return _checked(replace(environment, obstacles=obstacles))
+    there, starts = environment.obstacles, dict(environment.starts)
+    obstacles = (*there[:first], *added, *there[first + removed :])
+    while True:
+        try:
+            return from_json(to_json(replace(environment, obstacles=obstacles, starts=starts)), "map")
+        except MapError as error:
+            # an obstacle on a start takes that start away, nothing else
+            message = str(error).removeprefix("map: ")
+            told = {name: place(("starts", name)) for name in starts}
+            blocked = [
+                name for name, at in told.items() if message.startswith((f"{at}:", f"{at}.", f"{at}["))
+            ]
+            if not blocked:
+                raise MapError(message) from None
+            for name in blocked:
+                del starts[name]
 
 
 def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return the map with one obstacle more, on top of the others; MapError as `with_obstacles`."""
-    return with_obstacles(environment, (*environment.obstacles, obstacle))
-
-
-def without_obstacle(environment: Environment, index: int) -> Environment:
-    return with_obstacles(environment, environment.obstacles[:index] + environment.obstacles[index + 1 :])
-
-
-def with_moved(environment: Environment, index: int, dx: float, dy: float) -> Environment:
-    """Return the map with one obstacle moved by (dx, dy) m; MapError as `with_obstacles`."""
-    there = environment.obstacles
-    return with_obstacles(environment, (*there[:index], moved(there[index], dx, dy), *there[index + 1 :]))
+    """Return the map with one obstacle more, on top of the others; MapError as `with_replaced`."""
+    return with_replaced(environment, len(environment.obstacles), 0, [obstacle])
 
 
 def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
@@ -140,39 +153,8 @@ def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleOb
 
 def _rounded(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     """Return points to the tenth of a millimetre, so that files stay short; repeated ones once."""
-    ring: list[tuple[float, float]] = []
-    for x, y in points:
-        point = round(float(x), 4), round(float(y), 4)
-        if not ring or point != ring[-1]:
-            ring.append(point)
-    return tuple(ring)
-
-
-def _checked(environment: Environment) -> Environment:
-    """Return the map as a file would give it, without the starts that it has covered."""
-    starts = dict(environment.starts)
-    while True:
-        try:
-            return from_json(to_json(replace(environment, starts=starts)), "map")
-        except MapError as error:
-            # an obstacle on a start takes that start away, nothing else
-            message = str(error).removeprefix("map: ")
-            blocked = [name for name in starts if _is_about(message, name)]
-            if not blocked:
-                raise MapError(message) from None
-            for name in blocked:
-                del starts[name]
-
-
-def _is_about(message: str, start: str) -> bool:
-    where = place(("starts", start))
-    return message.startswith(tuple(f"{where}{after}" for after in (":", ".", "[")))
-
-
-CELLS = 96  # cells along the longer side of a map whose density is painted
-LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
-_DAB = 1.15  # factor of one dab on the density at its centre
-_DECIMALS = 3  # of what is painted, so that a map that is saved stays short
+    rounded = [(round(float(x), 4), round(float(y), 4)) for x, y in points]
+    return tuple(point for point, _ in groupby(rounded))
 
 
 def painted(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:

@@ -230,6 +230,13 @@ class Session:
                 places.append(state.positions[state.setup.numbers.index(number)])
         return np.array(places).reshape(-1, 2)
 
+    def compared(self, what: str = "distance") -> tuple[float, dict[int, float]]:
+        """Return the newest time not after now when the costs of all panes with any are known, and these."""
+        curves = {pane.number: curve for pane in self.panes if len(curve := pane.curves[what])}
+        time = min([self.time, *(curve.last_time for curve in curves.values())])
+        values = {number: curve.at(time) for number, curve in curves.items()}
+        return time, {number: value for number, value in values.items() if np.isfinite(value)}
+
     # time
 
     def advance(self, seconds: float) -> int:

@@ -1,10 +1,9 @@
 """Saved and autosaved state of the open session: no work is lost."""
 
 from collections.abc import Collection, Mapping
-from datetime import datetime
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import Any
 
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import autosave
@@ -14,21 +13,6 @@ from robocov_app.viewer.session.session import Session
 KIND = "robocov-session-draft"
 
 _PAUSE = 0.9  # seconds between two copies of a session that goes on
-
-
-class Recovered(NamedTuple):
-    """A session that a window left behind."""
-
-    folder: Path
-    path: Path | None
-    when: datetime
-    touches: int
-
-    @property
-    def words(self) -> str:
-        where = "never saved" if self.path is None else f"not saved to {self.path.name}"
-        touches = "1 touch" if self.touches == 1 else f"{self.touches} touches"
-        return f"a session of {self.when:%H:%M}, {touches}, {where}"
 
 
 class Workspace:
@@ -85,19 +69,21 @@ def opened(
     return Workspace(Session.opened(saved), folder, path), saved.view
 
 
-def recoverable(folder: Path | None) -> tuple[Recovered, ...]:
-    def read(record: autosave.Record) -> Recovered | None:
-        content = record.content.get("session")
-        if content is None:
-            return None
-        return Recovered(record.folder, record.path, record.when, len(content["touches"]) - 1)
+def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
+    """Return the sessions that windows left behind which live no more, the newest first."""
+    return autosave.recoverable(folder, KIND, lambda record: record if "session" in record.content else None)
 
-    return autosave.recoverable(folder, KIND, read)
+
+def offer(work: autosave.Record) -> str:
+    """Return what is said of a session that was left behind."""
+    where = "never saved" if work.path is None else f"not saved to {work.path.name}"
+    count = len(work.content["session"]["touches"]) - 1
+    return f"a session of {work.when:%H:%M}, {count} {'touch' if count == 1 else 'touches'}, {where}"
 
 
 def recovered(
-    work: Recovered, controllers: Collection[str], folder: Path | None
+    work: autosave.Record, controllers: Collection[str], folder: Path | None
 ) -> tuple[Workspace, Mapping[str, Any]]:
-    record = autosave.read_record(work.folder, KIND)
-    saved = session_of(record.content["session"], str(work.folder), controllers)
+    """Return a session that was left behind, to go on with."""
+    saved = session_of(work.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
