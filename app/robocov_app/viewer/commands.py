@@ -59,9 +59,6 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def robot_numbers() -> list[str]:
         return [str(number) for number in viewer.numbers]
 
-    def speeds() -> list[str]:
-        return [speed_words(speed).rstrip("×") for speed in SPEEDS]
-
     def files() -> list[str]:
         return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
 
@@ -77,17 +74,11 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def next_seed() -> None:
         viewer.restart(seed=viewer.session.scenario.seed + 1)
 
-    def begin_at(start: str) -> None:
-        viewer.restart(start=start)
-
     def look_on(seconds: float) -> None:
         viewer.look_at(viewer.session.time + seconds)
 
-    def finish() -> str | None:
-        return viewer.tool.finish(viewer.session)
-
     more, fewer = partial(viewer.change_robots, 1), partial(viewer.change_robots, -1)
-    fail, start = viewer.fail_or_revive, Takes("start", options=viewer.starts)
+    start, speeds = Takes("start", options=viewer.starts), [speed_words(each).rstrip("×") for each in SPEEDS]
 
     def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
         return Row(name, title, run, takes=takes)
@@ -118,9 +109,9 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
             taking("robots", "Number of robots", lambda n: viewer.restart(robots=n), _whole("robots")),
             taking("seed", "Seed", lambda n: viewer.restart(seed=n), _whole("seed")),
-            taking("start", "Start of the map", begin_at, start),
+            taking("start", "Start of the map", lambda name: viewer.restart(start=name), start),
             taking("map", "Open a map", viewer.open_map, Takes("map or file", options=viewer.maps)),
-            taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, speeds)),
+            taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, lambda: speeds)),
         ),
         *grouped(
             "Time",
@@ -156,9 +147,9 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row(
                 "robot:previous", "Ask the previous robot", lambda: viewer.ask_next(-1), "shift+tab", REPEATS
             ),
-            Row("robot:fail", "Fail or revive the robot asked", fail, "shift+d"),
+            Row("robot:fail", "Fail or revive the robot asked", viewer.fail_or_revive, "shift+d"),
             Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
-            Row("finish", "Finish what is being drawn", finish, "return, enter"),
+            Row("finish", "Finish what is being drawn", viewer.finish, "return, enter"),
             Row("cancel", "Give up; close", viewer.cancel, "escape"),
             Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
             Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),

@@ -94,7 +94,7 @@ class Panel(SidePanel):
             viewer.attempt(lambda: viewer.restart(start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
-        if (robots := ui.text_entry("robots", str(viewer.robots))) is not None:
+        if (robots := ui.text_entry("robots", str(len(viewer.numbers)))) is not None:
             viewer.attempt(lambda: self._commands.typed(f"robots {robots}"))
         self._does(ui, "−", "fewer")
         self._does(ui, "+", "more")

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from robocov.controllers import CONTROLLERS
 from robocov.controllers.gains import Value
@@ -19,12 +19,10 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace, offer, opened, recoverable, recovered
-from robocov_app.viewer.tools import Brush, Hand, Tool, Wall, toolbox
+from robocov_app.viewer.tools import Brush, Hand, Tool, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
-
 _RECENT = 9  # sessions that are offered again
-
 FADE = 12.0  # seconds of path that trajectories show where they fade
 
 
@@ -52,7 +50,8 @@ class Presenter:
         self.map_name, self._kept_in = map_name, kept_in
         self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
         self.tools = toolbox()
-        self.tool: Tool = self.tools["hand"]
+        self.hand = cast(Hand, self.tools["hand"])
+        self.tool: Tool = self.hand
         self.active = self.version = 0
         self.theme = "light"
         self.panel, self.fade, self.suggests, self.filming = True, False, True, False
@@ -67,12 +66,6 @@ class Presenter:
     # what there is
 
     @property
-    def hand(self) -> Hand:
-        tool = self.tools["hand"]
-        assert isinstance(tool, Hand)
-        return tool
-
-    @property
     def numbers(self) -> list[int]:
         setup = self.session.setup(self.pane)
         return sorted([*setup.numbers, *setup.failed])
@@ -85,10 +78,6 @@ class Presenter:
     def pane(self) -> Pane:
         self.active = min(self.active, len(self.session.panes) - 1)
         return self.session.panes[self.active]
-
-    @property
-    def robots(self) -> int:
-        return len(self.numbers)
 
     def parameters(self) -> list[Parameter | Pick]:
         setup = self.session.setup(self.pane)
@@ -109,6 +98,7 @@ class Presenter:
             self.message = ""
 
     def attempt(self, action: Callable[[], object]) -> None:
+        """Do something; say what it returns, or in a sentence why it cannot be done."""
         try:
             words = action()
         except RobocovError as error:
@@ -120,9 +110,10 @@ class Presenter:
         self.look_at_map()
 
     def look_at_map(self) -> None:
+        """Let the cost know when there is another map."""
         environment = self.session.environment
         # while it is painted the cost would never be ready
-        if environment is not self._mapped and not getattr(self.tool, "painting", False):
+        if environment is not self._mapped and not self.tool.painting:
             self._mapped = environment
             self.costs.environment(environment)
 
@@ -152,7 +143,7 @@ class Presenter:
         self.session.restart(**changes)
 
     def change_robots(self, by: int) -> None:
-        self.restart(robots=self.robots + by)
+        self.restart(robots=len(self.numbers) + by)
 
     def change_speed(self, by: int) -> None:
         k = speed_index(self.session.clock.speed) + by
@@ -163,11 +154,8 @@ class Presenter:
         self.say(f"speed {speed_words(speed)}")
 
     def next_start(self) -> None:
-        names = self.starts()
-        now = self.session.scenario.start_name
         # an obstacle may have covered the start since
-        k = names.index(now) if now in names else -1
-        self.restart(start=names[(k + 1) % len(names)])
+        self.restart(start=_after(self.starts(), self.session.scenario.start_name))
 
     def starts(self) -> list[str]:
         return list(dict.fromkeys([*self.session.environment.starts, "uniform"]))
@@ -206,9 +194,8 @@ class Presenter:
             self.say("this is the present: go back first (←, or drag the time line)")
 
     def next_law(self) -> None:
-        now = self.session.setup(self.pane).law.name
-        k = self.laws.index(now) if now in self.laws else -1
-        self.session.set_law(self.pane, ControllerChoice(self.laws[(k + 1) % len(self.laws)]))
+        name = _after(self.laws, self.session.setup(self.pane).law.name)
+        self.session.set_law(self.pane, ControllerChoice(name))
 
     def add_pane(self) -> None:
         there = {pane.law.name for pane in self.session.panes}
@@ -234,11 +221,7 @@ class Presenter:
         self.hand.selected = numbers[(k + by) % len(numbers)]
 
     def fail_or_revive(self) -> None:
-        number = self._asked()
-        if number in self.session.setup(self.pane).failed:
-            self.session.revive_robot(number)
-        else:
-            self.session.fail_robot(number)
+        self.session.fail_or_revive(self._asked())
 
     def remove_robot(self) -> None:
         self.session.remove_robot(self._asked())
@@ -248,18 +231,17 @@ class Presenter:
             raise ParameterError("no robot is chosen: click one first, or press Tab")
         return self.selected
 
+    def finish(self) -> str | None:
+        return self.tool.finish(self.session)
+
     def cancel(self) -> None:
         if not self.tool.cancel(self.session) and self.tool is not self.hand:
             self.tool = self.hand
 
     def widen(self, factor: float) -> None:
-        if isinstance(self.tool, Brush):
-            self.say(self.tool.widen(self.session, factor))
-            return
-        wall = self.tools["wall"]
-        assert isinstance(wall, Wall)
-        wall.widen(factor)
-        self.say(f"walls are {wall.width:g} m wide")
+        """Draw wider walls; with the brush in hand, take a larger one."""
+        tool = self.tool if isinstance(self.tool, Brush) else self.tools["wall"]
+        self.say(tool.widen(self.session, factor))
 
     def switch_theme(self) -> None:
         self.theme = "dark" if self.theme == "light" else "light"
@@ -369,6 +351,10 @@ class Presenter:
 
     def enter_named_branch(self, name: str) -> None:
         self.session.enter(self.session.document.branch(name).node)
+
+
+def _after(names: list[str], now: str) -> str:
+    return names[(names.index(now) + 1) % len(names)] if now in names else names[0]
 
 
 def plain(message: str) -> str:

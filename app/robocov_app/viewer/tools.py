@@ -45,6 +45,7 @@ class Tool:
     name: str = ""
     title: str = ""
     hint: str = ""
+    painting = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         return None
@@ -63,6 +64,9 @@ class Tool:
 
     def preview(self, session: Session) -> Preview | None:
         return None
+
+    def widen(self, session: Session, factor: float) -> str:
+        return ""
 
 
 def edited(session: Session, environment: Environment, words: str) -> str:
@@ -90,18 +94,14 @@ class Hand(Tool):
     obstacle: int | None = None
     _from: Point = (0.0, 0.0)
     _at: Point = (0.0, 0.0)
-    _taken: Obstacle | None = None
+    _taken: tuple[Obstacle, ...] = ()
     _drags: bool = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         self._from, self._at, self._drags = point, point, False
-        self.robot, self.obstacle = number, None
-        if number is not None:
-            self.selected = number
-            return None
-        self.obstacle = map_edits.obstacle_at(session.environment, point)
-        if self.obstacle is not None:
-            self._taken = session.environment.obstacles[self.obstacle]
+        self.robot, self._taken = number, session.environment.obstacles
+        self.obstacle = None if number is not None else map_edits.obstacle_at(session.environment, point)
+        self.selected = self.selected if number is None else number
         return None
 
     @property
@@ -119,16 +119,15 @@ class Hand(Tool):
 
     def release(self, session: Session, point: Point) -> str | None:
         self._at = point
-        robot, obstacle = self.robot, self._dragged(session)
+        robot, dragged = self.robot, self._dragged(session)
         self.robot = self.obstacle = None
         if robot is not None:
             session.release()
-        elif obstacle is not None:
-            there = session.environment.obstacles[obstacle]
-            after = map_edits.moved(there, *self._by())
-            words = f"{map_edits.words_for(there)} moved"
-            return edited(session, map_edits.with_replaced(session.environment, obstacle, 1, [after]), words)
-        return None
+        if dragged is None:
+            return None
+        k, moved = dragged
+        words = f"{map_edits.words_for(moved)} moved"
+        return edited(session, map_edits.with_replaced(session.environment, k, 1, [moved]), words)
 
     def cancel(self, session: Session) -> bool:
         something = self.holds or self.selected is not None
@@ -140,21 +139,17 @@ class Hand(Tool):
         return something
 
     def preview(self, session: Session) -> Preview | None:
-        obstacle = self._dragged(session)
-        if obstacle is None:
+        if (dragged := self._dragged(session)) is None:
             return None
-        shape = map_edits.moved(session.environment.obstacles[obstacle], *self._by())
-        return Preview((self._from, self._at), False, shape, f"{dist(self._from, self._at):.2f} m")
+        return Preview((self._from, self._at), False, dragged[1], f"{dist(self._from, self._at):.2f} m")
 
-    def _dragged(self, session: Session) -> int | None:
-        """Return the number of the obstacle that is dragged somewhere; meanwhile there may be another map."""
-        there = session.environment.obstacles
-        if self.obstacle is None or self.obstacle >= len(there) or there[self.obstacle] != self._taken:
+    def _dragged(self, session: Session) -> tuple[int, Obstacle] | None:
+        """Return the obstacle that is dragged somewhere: its number, and how it would be there."""
+        there, k, (dx, dy) = session.environment.obstacles, self.obstacle, np.subtract(self._at, self._from)
+        # meanwhile there may be another map
+        if k is None or there[k : k + 1] != self._taken[k : k + 1] or np.hypot(dx, dy) < 1e-3:
             return None
-        return self.obstacle if dist(self._from, self._at) >= 1e-3 else None
-
-    def _by(self) -> tuple[float, float]:
-        return self._at[0] - self._from[0], self._at[1] - self._from[1]
+        return k, map_edits.moved(there[k], float(dx), float(dy))
 
 
 @dataclass
@@ -191,13 +186,9 @@ class Polygon(Tool):
         return self.outline.cancel()
 
     def preview(self, session: Session) -> Preview | None:
-        if not self.outline.points:
-            return None
         points = (*self.outline.points, self.outline.at)
-        return self._previewed(points, f"{dist(*points[-2:]):.2f} m")
-
-    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
-        return Preview(points, len(points) > 2, None, words)
+        words = f"{dist(*points[-2:]):.2f} m" if len(points) > 1 else ""
+        return Preview(points, len(points) > 2, None, words) if words else None
 
     def _snapped(self, session: Session, point: Point) -> Point:
         return map_edits.snapped(session.environment, point, SNAPS_WITHIN * self._reach)
@@ -217,14 +208,17 @@ class Wall(Polygon):
     width: float = WALL_WIDTH
     _same = 0.3
 
-    def widen(self, factor: float) -> None:
+    def widen(self, session: Session, factor: float) -> str:
         self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
+        return f"walls are {self.width:g} m wide"
 
-    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
-        wall = None
+    def preview(self, session: Session) -> Preview | None:
+        if (drawn := super().preview(session)) is None:
+            return None
+        wall, words = None, f"{drawn.words}, {self.width:g} m wide"
         with suppress(RobocovError):
-            wall = self._made(list(points))
-        return Preview(points, False, wall, f"{words}, {self.width:g} m wide")
+            wall = self._made(list(drawn.line))
+        return Preview(drawn.line, False, wall, words)
 
     def _made(self, corners: list[Point]) -> Obstacle:
         return map_edits.wall_of(corners, self.width)
@@ -259,12 +253,11 @@ class Ruler(Tool):
         return had
 
     def preview(self, session: Session) -> Preview | None:
-        return None if self._from is None else self._measured(self._from)
-
-    def _measured(self, begin: Point) -> Preview:
-        dx, dy = self._at[0] - begin[0], self._at[1] - begin[1]
+        if self._from is None:
+            return None
+        dx, dy = np.subtract(self._at, self._from)
         words = f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})"
-        return Preview((begin, self._at), False, None, words)
+        return Preview((self._from, self._at), False, None, words)
 
 
 @dataclass
@@ -277,13 +270,15 @@ class Circle(Ruler):
 
     def release(self, session: Session, point: Point) -> str | None:
         middle, self._from = self._from, None
-        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), self.name)
+        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), "circle")
 
-    def _measured(self, begin: Point) -> Preview:
-        circle = None
+    def preview(self, session: Session) -> Preview | None:
+        if self._from is None:
+            return None
+        circle, line = None, (self._from, self._at)
         with suppress(RobocovError):
-            circle = map_edits.circle_of(begin, self._at)
-        return Preview((begin, self._at), False, circle, f"radius {dist(begin, self._at):.2f} m")
+            circle = map_edits.circle_of(*line)
+        return Preview(line, False, circle, f"radius {dist(*line):.2f} m")
 
 
 def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
@@ -350,9 +345,9 @@ class Brush(Tool):
     def release(self, session: Session, point: Point) -> str | None:
         if self.painting:
             self.move(session, point)
-        painting, self.painting = self.painting, False
-        if not painting:
+        if not self.painting:
             return None
+        self.painting = False
         if self._dabs:
             self._show(session)
         return "density lowered" if self.lowers else "density raised"
@@ -381,7 +376,7 @@ class Brush(Tool):
 
 @dataclass
 class Click(Tool):
-    """Does something at a place, or to the robot there; returns what to tell."""
+    """Does something at a place, or to the robot there."""
 
     name: str
     title: str
@@ -408,13 +403,7 @@ def _add(session: Session, point: Point, reach: float, number: int | None) -> st
 
 
 def _fail(session: Session, point: Point, reach: float, number: int | None) -> str | None:
-    if number is None:
-        return None
-    if number in session.setup(session.panes[0]).failed:
-        session.revive_robot(number)
-        return f"robot {number} works again"
-    session.fail_robot(number)
-    return f"robot {number} failed"
+    return None if number is None else session.fail_or_revive(number)
 
 
 def toolbox() -> dict[str, Tool]:

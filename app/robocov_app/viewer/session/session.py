@@ -580,6 +580,11 @@ class Session:
     def revive_robot(self, number: int) -> None:
         self.do(changes.Revive(number), "robot", f"robot {number} works again")
 
+    def fail_or_revive(self, number: int) -> str:
+        failed = number in self.setup(self.panes[0]).failed
+        (self.revive_robot if failed else self.fail_robot)(number)
+        return self.head.words
+
 
 def _sensed_in(history: History, pane: int) -> Sensed:
     """Return what a pane's robots have sensed, as far as kept moments tell."""
