@@ -4,19 +4,17 @@ A chapter does again what was done on the way to a touch of the session. It may 
 and hand a task over afterwards. It ends by conditions of the simulation, however slow the machine is.
 """
 
-from __future__ import annotations
-
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, Mistake
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.file import (
     ChapterModel,
     ConditionModel,
-    LessonModel,
     SavedSession,
     load_session,
     session_of,
@@ -24,24 +22,16 @@ from robocov_app.viewer.session.file import (
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from robocov_app.viewer.presenter import Presenter
-
 FIRST = "lesson-1.robocov"  # the lesson that comes with robocov
+# seconds on the wall after a chapter's end until the next, and for an answer where nobody answers
 READING = 4.0
-"""Seconds on the wall after a chapter's end until the next, and for an answer where nobody answers."""
-
 LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
 
-PLAIN = frozenset(
-    {
-        *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
-        *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
-    }
-)
-"""Layers that every chapter shows."""
+# layers that every chapter shows
+PLAIN = {
+    *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
+    *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
+}
 
 
 def first_lesson() -> SavedSession:
@@ -65,17 +55,14 @@ def holds(condition: ConditionModel, session: Session) -> bool:
         return True
     if condition.mean_distance_below is not None and len(pane.curve):
         return bool(pane.curve.value[-1] < condition.mean_distance_below)
-    row = None if condition.robot is None else pane.row(condition.robot)
-    if row is None:
+    if condition.robot is None or (row := pane.row(condition.robot)) is None:
         return False
-    x, y = (float(each) for each in pane.simulation.positions[row])
+    place, inside, outside = pane.simulation.positions[row], condition.inside, condition.outside
 
     def within(box: list[float]) -> bool:
-        return box[0] <= x <= box[2] and box[1] <= y <= box[3]
+        return bool((box[:2] <= place).all() and (place <= box[2:]).all())
 
-    return (condition.inside is not None and within(condition.inside)) or (
-        condition.outside is not None and not within(condition.outside)
-    )
+    return (inside is not None and within(inside)) or (outside is not None and not within(outside))
 
 
 class LessonPlayer:
@@ -95,7 +82,7 @@ class LessonPlayer:
     ) -> None:
         saved = saved or first_lesson()
         assert saved.lesson is not None
-        self.lesson: LessonModel = saved.lesson
+        self.lesson = saved.lesson
         self._viewer, self._fit, self.alone = viewer, fit, alone
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
         self.session = _begun(saved)
@@ -111,15 +98,8 @@ class LessonPlayer:
         return self.lesson.chapters[self.number]
 
     @property
-    def title(self) -> str:
-        return f"{self.number + 1}  {self.chapter.title}"
-
-    @property
-    def text(self) -> str:
-        return self.chapter.text
-
-    @property
     def asks(self) -> list[str]:
+        """Question or task of now, line by line."""
         chapter = self.chapter
         if self.state == "left":
             return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
@@ -132,10 +112,6 @@ class LessonPlayer:
         if chapter.task is not None and self.state in ("task", "ended"):
             lines += ["Now you: " + chapter.task.text if self.state == "task" else chapter.task.done]
         return [line for line in lines if line]
-
-    @property
-    def chapters(self) -> tuple[str, ...]:
-        return tuple(chapter.title for chapter in self.lesson.chapters)
 
     @property
     def seconds(self) -> float:
@@ -184,11 +160,15 @@ class LessonPlayer:
             self._begin(max(self.number + by, 0))
 
     def leave(self) -> None:
+        """Let whoever watches play with what is there."""
         if self.state != "task":
             self._turn("left")
 
-    def come_back(self) -> None:
-        self._begin(self.number)
+    def leave_or_come_back(self) -> None:
+        if self.state == "left":
+            self._begin(self.number)
+        else:
+            self.leave()
 
     def end(self) -> None:
         viewer = self._viewer
@@ -205,10 +185,7 @@ class LessonPlayer:
     def _begin(self, number: int) -> None:
         self.number, self.answer = number, None
         chapter, viewer, session = self.chapter, self._viewer, self.session
-        target = session.document.nodes[chapter.touch]
-        session.enter(session.document.path(target)[0], 0)
-        session.remake()
-        session.follow(target)
+        _set_out(session, chapter)
         session.playing, session.stop_when_settled = chapter.question is None, False
         session.clock.speed = chapter.speed
         viewer.workspace = self._workspace
@@ -216,10 +193,18 @@ class LessonPlayer:
         viewer.map_name = session.environment.name
         viewer.tool, viewer.active = viewer.hand, 0
         viewer.hand.selected = chapter.robot
-        viewer.shown = set(PLAIN | frozenset(chapter.show))
+        viewer.shown = PLAIN | set(chapter.show)
         viewer.message = ""
         self._fit()
         self._turn("asks" if chapter.question is not None else "plays")
+
+
+def _set_out(session: Session, chapter: ChapterModel) -> None:
+    """Go to the beginning of a chapter's branch; what was done on its way will be done again."""
+    target = session.document.nodes[chapter.touch]
+    session.enter(session.document.path(target)[0], 0)
+    session.remake()
+    session.follow(target)
 
 
 def _begun(saved: SavedSession) -> Session:
@@ -235,9 +220,7 @@ def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
     session = _begun(saved)
     found = []
     for chapter in saved.lesson.chapters:
-        target = session.document.nodes[chapter.touch]
-        session.enter(session.document.path(target)[0], 0)
-        session.follow(target)
+        _set_out(session, chapter)
         while not (ended := holds(chapter.until, session)) and session.end < LONGEST_TASK:
             session.step()
         found.append((chapter.title, session.end, ended))

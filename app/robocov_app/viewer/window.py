@@ -202,8 +202,7 @@ class Window(BaseWindow):
         elif layout.panel[2]:
             self.panel.draw(self.screen)
         if self.tour is not None and self._lesson_shown and not layout.panel[2]:
-            words = " ".join([self.tour.text, *self.tour.asks])
-            draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
+            draw_caption(self.screen, layout, theme, self.tour)
         said = viewer.message
         if not said and not self._patient and not self._lesson_shown:
             said = suggestion(viewer)
@@ -357,10 +356,8 @@ class Window(BaseWindow):
     def _start_tour(self) -> None:
         if self.tour is None:
             self.tour = LessonPlayer(self.viewer, self.canvas.fit, alone=self._patient)
-        elif self.tour.state == "left":
-            self.tour.come_back()
         else:
-            self.tour.leave()
+            self.tour.leave_or_come_back()
 
     def start_lesson(self, path: Path) -> None:
         """Play a lesson of a file; MapError as `load_lesson`."""

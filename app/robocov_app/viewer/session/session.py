@@ -191,7 +191,7 @@ class Session:
 
     def positions(self, pane: Pane) -> Array:
         """Return where the robots are at the moment that is looked at, (n, 2) m."""
-        return self._state(pane).positions
+        return pane.simulation.positions if self.live else self._state(pane).positions
 
     def trail(self, pane: Pane) -> tuple[Array, Array]:
         """Return where the robots went up to the moment that is looked at: (k, n, 2) m and (k,) s."""
