@@ -73,14 +73,8 @@ class LessonPlayer:
     """
 
     def __init__(
-        self,
-        viewer: Presenter,
-        fit: Callable[[], None],
-        saved: SavedSession | None = None,
-        *,
-        alone: bool = False,
+        self, viewer: Presenter, fit: Callable[[], None], saved: SavedSession, *, alone: bool = False
     ) -> None:
-        saved = saved or first_lesson()
         assert saved.lesson is not None
         self.lesson = saved.lesson
         self._viewer, self._fit, self.alone = viewer, fit, alone

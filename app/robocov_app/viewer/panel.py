@@ -1,8 +1,10 @@
 """The panel at the right: what is chosen often stays in sight, the rest is on pages."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +22,8 @@ from robocov_app.viewer.session.scenario import MOST_PANES
 
 TABS = ("parameters", "show", "robot", "keep")
 
+# layers without a check box: a picture without them is no use; they have keys all the same
 NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-"""Layers without a check box: a picture without them is no use; they have keys all the same."""
 
 _KEPT = (
     (("Screenshot", "screenshot"), ("Record film", "film")),
@@ -34,7 +36,6 @@ _KEPT = (
 )
 
 _ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
-
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
 
@@ -77,8 +78,8 @@ class Panel(SidePanel):
         pages = {"parameters": self._parameters, "show": self._show, "robot": self._robot, "keep": self._keep}
         pages[self.tab](ui)
 
-    def _does(self, ui: Ui, text: str, action: str, *, chosen: bool = False, small: bool = False) -> None:
-        if ui.button(text, key=action, tip=self._commands[action].tip, chosen=chosen, small=small):
+    def _does(self, ui: Ui, text: str, action: str, **look: Any) -> None:
+        if ui.button(text, key=action, tip=self._commands[action].tip, **look):
             self._do(action)
 
     def _environment(self, ui: Ui) -> None:
@@ -89,7 +90,7 @@ class Panel(SidePanel):
         ui.row(172, 0, height=28, below=5)
         now = files.get(viewer.map_name, viewer.map_name)
         if (name := ui.dropdown("map", list(names), now)) is not None:
-            viewer.attempt(lambda: viewer.open_map(names[name]))
+            viewer.attempt(partial(viewer.open_map, names[name]))
         if (start := ui.dropdown("start", viewer.starts(), session.scenario.start_name)) is not None:
             viewer.attempt(lambda: viewer.restart(start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
@@ -111,15 +112,12 @@ class Panel(SidePanel):
         names = {label: name for name, label in labels.items()}
         count = len(laws)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
-        if count == 1:
-            ui.row(0, 0, height=28, below=4)
-        elif count == 2:  # three in a row, for which the third is small
-            ui.row(0, 24, 3, 0, 24, 3, 28, height=28, gap=2, below=4)
-        else:
-            ui.row(0, 24, 3, 0, 24, height=28, gap=2, below=4)
+        # of two there are three in a row, for which the third is small
+        widths = {1: (0, 0), 2: (0, 24, 3, 0, 24, 3, 28)}.get(count, (0, 24, 3, 0, 24))
+        ui.row(*widths, height=28, gap=2 if count > 1 else 6, below=4)
         for k, law in enumerate(laws):
             if (label := ui.dropdown(f"law:{k}", list(names), labels[law.name])) is not None:
-                viewer.attempt(lambda k=k, label=label: viewer.set_law(k, names[label]))  # type: ignore[misc]
+                viewer.attempt(partial(viewer.set_law, k, names[label]))
             if count > 1:
                 if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
                     viewer.active = k
@@ -232,15 +230,13 @@ class Panel(SidePanel):
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
         failed = self.viewer.selected in self.viewer.session.setup(self.viewer.pane).failed
-        for text, action in (("Revive" if failed else "Fail", "robot:fail"), ("Remove", "robot:remove")):
-            if ui.button(text, key=action, tip=self._commands[action].tip, why=why):
-                self._do(action)
-        report = self.report
+        self._does(ui, "Revive" if failed else "Fail", "robot:fail", why=why)
+        self._does(ui, "Remove", "robot:remove", why=why)
         with ui.scroll(f"robot:{self.viewer.selected}"):
-            if report is None:
+            if self.report is None:
                 ui.words(_NOBODY, colour=ui.theme.faint)
-                return
-            show_report(ui, report)
+            else:
+                show_report(ui, self.report)
 
     def _keep(self, ui: Ui) -> None:
         ui.row(0, 0, height=28, below=5)

@@ -39,10 +39,6 @@ class Pointer:
         self._last_click = -1.0, (0, 0)
         self._shape = -1
 
-    @property
-    def dragging(self) -> bool:
-        return bool(self._drag)
-
     def take(self, event: pygame.event.Event, now: float) -> None:
         if event.type != pygame.MOUSEWHEEL:
             self.at = event.pos

@@ -1,6 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
 from robocov_app.viewer.lesson_page import draw_caption, draw_tour
-from robocov_app.viewer.lessons import LessonPlayer, load_lesson
+from robocov_app.viewer.lessons import LessonPlayer, first_lesson, load_lesson
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import Presenter, plain
@@ -34,12 +34,10 @@ from robocov_app.viewer.status import HINT, facts, suggestion
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
 
-_GOES_ON_WITH = {
+_GOES_ON_WITH = {  # commands that do not leave the lesson
     *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
-    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot"),
+    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot", "tour"),
 }
-"""Commands that do not leave the lesson."""
-
 _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 
 
@@ -104,7 +102,7 @@ class Window(BaseWindow):
         self._ask_costs()
         self._arrange()
         self._inspect()
-        self.panel.covered = self._lesson_shown
+        self.panel.covered = self._lesson is not None
         self.panel.update(seconds)
         self.pointer.show()
 
@@ -158,7 +156,7 @@ class Window(BaseWindow):
         for pane in session.panes:
             positions, known = session.positions(pane), viewer.costs.known.get(pane.number)
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
-            if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
+            if known is None or not (fresh and np.array_equal(known.result.positions, positions)):
                 viewer.costs.ask(pane.number, session.time, positions, point, session.setup(pane).speeds)
         for number, known in viewer.costs.poll():
             self._answers += 1
@@ -197,18 +195,14 @@ class Window(BaseWindow):
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
         draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
-        if layout.panel[2] and self.tour is not None and self._lesson_shown:
-            draw_tour(self.screen, layout, theme, self.tour)
+        if (lesson := self._lesson) is not None:
+            (draw_tour if layout.panel[2] else draw_caption)(self.screen, layout, theme, lesson)
         elif layout.panel[2]:
             self.panel.draw(self.screen)
-        if self.tour is not None and self._lesson_shown and not layout.panel[2]:
-            draw_caption(self.screen, layout, theme, self.tour)
-        said = viewer.message
-        if not said and not self._patient and not self._lesson_shown:
+        said, trouble = viewer.message, bool(viewer.message) and viewer.trouble
+        if not said and not self._patient and lesson is None:
             said = suggestion(viewer)
-        draw_message(
-            self.screen, said, layout.arena, theme, layout.scale, bool(viewer.message) and viewer.trouble
-        )
+        draw_message(self.screen, said, layout.arena, theme, layout.scale, trouble)
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
@@ -230,12 +224,12 @@ class Window(BaseWindow):
     # doing
 
     def do(self, name: str) -> None:
-        if self.tour is not None and self.tour.state != "left" and name in ("back", "forward"):
-            self.tour.skip(1 if name == "forward" else -1)
+        if self._lesson is not None and name in ("back", "forward"):
+            self._lesson.skip(1 if name == "forward" else -1)
             return
         if name == "cancel" and self._end_tour():
             return
-        if name not in _GOES_ON_WITH and name != "tour":
+        if name not in _GOES_ON_WITH:
             self._leave_lesson()
         if name == "cancel" and self.help:
             self.help = False
@@ -246,22 +240,17 @@ class Window(BaseWindow):
             self.panel.show_tab("robot")
 
     def _own_commands(self) -> list[Command]:
-        def panned(x: int, y: int) -> Callable[[], None]:
-            return lambda: self.canvas.pan(_PAN * x, _PAN * y)
-
-        def zoomed(factor: float) -> Callable[[], None]:
-            return lambda: self.canvas.zoom(factor, self._middle())
-
+        pan, zoom = self.canvas.pan, self._zoom
         return [
             *grouped(
                 "View",
                 Row("fit", "Show the whole map", self.canvas.fit, "f"),
-                Row("zoom:in", "Zoom in", zoomed(1.25), "ctrl+=, ctrl++", REPEATS),
-                Row("zoom:out", "Zoom out", zoomed(0.8), "ctrl+-", REPEATS),
-                Row("pan:left", "Pan left", panned(1, 0), "ctrl+left", REPEATS),
-                Row("pan:right", "Pan right", panned(-1, 0), "ctrl+right", REPEATS),
-                Row("pan:up", "Pan up", panned(0, 1), "ctrl+up", REPEATS),
-                Row("pan:down", "Pan down", panned(0, -1), "ctrl+down", REPEATS),
+                Row("zoom:in", "Zoom in", partial(zoom, 1.25), "ctrl+=, ctrl++", REPEATS),
+                Row("zoom:out", "Zoom out", partial(zoom, 0.8), "ctrl+-", REPEATS),
+                Row("pan:left", "Pan left", partial(pan, _PAN, 0), "ctrl+left", REPEATS),
+                Row("pan:right", "Pan right", partial(pan, -_PAN, 0), "ctrl+right", REPEATS),
+                Row("pan:up", "Pan up", partial(pan, 0, _PAN), "ctrl+up", REPEATS),
+                Row("pan:down", "Pan down", partial(pan, 0, -_PAN), "ctrl+down", REPEATS),
                 Row("plot", "Plot mean distance or mean time", self.chart.switch, "y"),
                 Row("tab", "Next page of the panel", self._next_tab, "ctrl+tab"),
                 Row("fullscreen", "Full screen", self.toggle_fullscreen, "f11"),
@@ -291,11 +280,10 @@ class Window(BaseWindow):
         self.viewer.say("the lesson has ended; what was before it is there again")
         return True
 
-    def _middle(self) -> tuple[float, float]:
-        if self.canvas.pane_at(self.pointer.at) is not None:
-            return self.pointer.at
+    def _zoom(self, factor: float) -> None:
         left, top, width, height = self.layout.panes[0]
-        return left + width / 2, top + height / 2
+        over = self.canvas.pane_at(self.pointer.at) is not None
+        self.canvas.zoom(factor, self.pointer.at if over else (left + width / 2, top + height / 2))
 
     def _next_tab(self) -> None:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
@@ -355,20 +343,19 @@ class Window(BaseWindow):
 
     def _start_tour(self) -> None:
         if self.tour is None:
-            self.tour = LessonPlayer(self.viewer, self.canvas.fit, alone=self._patient)
+            self.start_lesson()
         else:
             self.tour.leave_or_come_back()
 
-    def start_lesson(self, path: Path) -> None:
-        """Play a lesson of a file; MapError as `load_lesson`."""
-        self.tour = LessonPlayer(self.viewer, self.canvas.fit, load_lesson(path), alone=self._patient)
+    def start_lesson(self, path: Path | None = None) -> None:
+        """Play a lesson of a file, or the first; MapError as `load_lesson`."""
+        lesson = first_lesson() if path is None else load_lesson(path)
+        self.tour = LessonPlayer(self.viewer, self.canvas.fit, lesson, alone=self._patient)
 
     @property
-    def _lesson_shown(self) -> bool:
-        return self.tour is not None and self.tour.state != "left"
-
-    def _asked(self) -> bool:
-        return self.tour is not None and self.tour.state == "asks"
+    def _lesson(self) -> LessonPlayer | None:
+        """The lesson, where it has the place of the panel."""
+        return self.tour if self.tour is not None and self.tour.state != "left" else None
 
     def _leave_lesson(self) -> None:
         if self.tour is not None:
@@ -403,11 +390,11 @@ class Window(BaseWindow):
         elif event.type == pygame.DROPFILE:
             path = Path(event.file)
             self.viewer.attempt(lambda: self.viewer.open_file(path))
-        elif event.type == pygame.KEYDOWN and self._asked() and event.unicode in "1234" and event.unicode:
-            assert self.tour is not None
-            self.tour.reply(int(event.unicode))
         elif event.type == pygame.KEYDOWN:
-            self._press(event)
+            if self.tour is not None and self.tour.state == "asks" and event.unicode in tuple("1234"):
+                self.tour.reply(int(event.unicode))
+            else:
+                self._press(event)
         elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif event.type in OF_THE_MOUSE:
