@@ -12,7 +12,7 @@ from driven_window import Driver, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.viewer.chart import curve_colour, spread, time_axis, value_axis
+from robocov_app.viewer.chart import curve_colours, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.scenario import ControllerChoice
 
@@ -70,7 +70,7 @@ def test_curves_are_drawn_in_the_colours_of_their_controllers(driver: Driver) ->
     left, top, width, height = window.layout.chart
     picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
     for pane in driver.session.panes:
-        colour = np.array(curve_colour(driver.viewer, window.theme, pane))
+        colour = np.array(curve_colours(driver.session.panes, window.theme)[pane.number])
         assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, pane.law.name
 
 
@@ -82,7 +82,7 @@ def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
         ControllerChoice("rpf"),
         ControllerChoice("rpf"),
     ) as driver:
-        colours = {curve_colour(driver.viewer, driver.window.theme, pane) for pane in driver.session.panes}
+        colours = set(curve_colours(driver.session.panes, driver.window.theme).values())
         assert len(colours) == 4
 
 
