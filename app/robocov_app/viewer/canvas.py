@@ -1,5 +1,6 @@
 """The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,6 +24,7 @@ from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
+from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
@@ -46,8 +48,7 @@ class ViewerCanvas:
         self._strip_key: object = None
         self._camera: Camera | None = None
         self._rows: tuple[object, int] = (None, 1)
-        self.hovered = -1, -1
-        """Pane and number of the robot under the cursor."""
+        self.hovered = -1, -1  # pane and number of the robot under the cursor
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
         self.layout, self.theme = layout, theme
@@ -119,11 +120,9 @@ class ViewerCanvas:
         scene = self._scenes[pane]
         canvas = self._canvas(pygame.Surface((1, 1)), pane, scene)
         point = np.array(self.to_world(pixel, pane))
-        near: list[tuple[float, int]] = []
-        if scene.snapshot is not None:
-            far = np.hypot(*(scene.snapshot.positions - point).T) * canvas.camera.zoom
-            radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
-            near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
+        far = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
+        radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
+        near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
         for number, place in scene.failed.items():
             away = float(np.hypot(*(np.array(place) - point))) * canvas.camera.zoom
             if away <= 9.0 * self.layout.scale:
@@ -141,45 +140,39 @@ class ViewerCanvas:
             if before is not None and before.region.bounds != session.environment.region.bounds:
                 self.fit()
         self._scenes = []
-        for k, (pane, box) in enumerate(zip(session.panes, self.layout.panes, strict=False)):
-            painter = self._painters[k]
-            painter.visible = set(self.viewer.shown)
-            painter.visible |= {"caption"} & {layer.name for layer in painter.layers}
-            scene = self._scene(pane, painter)
-            self._scenes.append(scene)
-            surface = screen.subsurface(pygame.Rect(box))
+        for pane, painter, box in zip(session.panes, self._painters, self.layout.panes, strict=False):
+            painter.visible = self.viewer.shown | ({"caption"} & {layer.name for layer in painter.layers})
+            scene, surface = self._scene(pane, painter), screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
-            self._draw_tool(surface, k, scene)
+            self._draw_tool(surface, len(self._scenes), scene)
+            self._scenes.append(scene)
         self._draw_frames(screen)
 
     def _scene(self, pane: Pane, painter: Painter) -> Scene:
         viewer, session = self.viewer, self.viewer.session
         setup, snapshot = session.setup(pane), session.snapshot(pane)
-        trail, times = session.trail(pane)
-        team = pane.simulation.team if session.live else setup.team
-        numbers, failed = setup.numbers, setup.failed
         known, field = viewer.costs.known.get(pane.number), None
         if known is not None and painter.needs_field:
-            field = known.field
-            self._scale_colours(known.field.largest)
+            field, largest = known.field, known.field.largest
+            # the scale of colours follows what is shown, without trembling
+            if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
+                self._limit = round_limit(1.1 * largest)
+        numbers, scans = setup.numbers, list[tuple[Array, Array]]()
         selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
-        return Scene.of(
-            setup.environment,
-            team,
+        if "scan" in viewer.shown:  # of the robot that is asked about, else of all unless they are many
+            scans = self._scans(
+                pane, setup, snapshot, range(len(numbers)) if selected is None else [selected]
+            )
+        return pane.scene(
+            setup,
             snapshot,
-            starts=pane.starts if len(pane.starts) == len(numbers) else None,
-            trail=trail if len(trail) else None,
-            trail_time=times,
+            session.trail(pane),
             trail_fade=FADE if viewer.fade else None,
-            label=setup.law.label,
             cost=self._caption_cost(pane),
             field=field,
             field_limit=self._limit,
-            numbers=numbers,
-            failed=failed,
-            failed_radii={number: setup.limits.radius_of(number) for number in failed},
             selected=selected,
-            scans=self._scans(pane, snapshot, team.sensing_range, selected) if "scan" in viewer.shown else (),
+            scans=scans,
             sensed=pane.sensed,
             path=known.path if known is not None and viewer.cursor is not None else None,
         )
@@ -193,23 +186,15 @@ class ViewerCanvas:
         words = cost_label(what, distances[pane.number], times.get(pane.number))
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
-    def _scale_colours(self, largest: float) -> None:
-        if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
-            self._limit = round_limit(1.1 * largest)
-
     def _scans(
-        self, pane: Pane, snapshot: Snapshot, ranges: Array, selected: int | None
+        self, pane: Pane, setup: PaneSetup, snapshot: Snapshot, rows: Sequence[int]
     ) -> list[tuple[Array, Array]]:
-        rows = [selected] if selected is not None else list(range(len(snapshot.positions)))
-        rays = min(RAYS, MOST_RAYS // len(rows))
-        if rays < 24:
+        if (rays := min(RAYS, MOST_RAYS // len(rows))) < 24:
             return []
-        scans = []
-        for row in rows:
-            reach = float(ranges[row]) if np.isfinite(ranges[row]) else FAR_SCAN
-            place = snapshot.positions[row]
-            scans.append((place, pane.simulation.sensor.scan(place, rays, reach)[1]))
-        return scans
+        ranges, places = setup.team.sensing_range, snapshot.positions
+        reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
+        scan = pane.simulation.sensor.scan
+        return [(places[row], scan(places[row], rays, reach[row])[1]) for row in rows]
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
@@ -218,11 +203,9 @@ class ViewerCanvas:
     def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
         canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
-        numbers = list(scene.numbers or ()) if scene.snapshot is not None else []
-        if self.viewer.session.hand is not None and self.viewer.session.hand[0] in numbers:
-            number, target = self.viewer.session.hand
-            assert scene.snapshot is not None
-            place = scene.snapshot.positions[numbers.index(number)]
+        numbers, positions = list(scene.numbers or ()), scene.now.positions
+        if (hand := self.viewer.session.hand) is not None and hand[0] in numbers:
+            place, target = positions[numbers.index(hand[0])], hand[1]
             begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
             canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
         asked = self.viewer.selected
@@ -233,9 +216,8 @@ class ViewerCanvas:
         if pane == self.hovered[0] and self.hovered[1] in numbers:  # it can be taken hold of
             row = numbers.index(self.hovered[1])
             if row != scene.selected:
-                assert scene.snapshot is not None
                 radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
-                center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
+                center = canvas.camera.to_pixels(positions[row]).tolist()
                 canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
         preview = self.viewer.tool.preview(self.viewer.session)
         if preview is not None:

@@ -288,28 +288,15 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
 
 
 def _scene(pane: Pane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
-    setup, snapshot = pane.setup, pane.simulation.snapshot
     known = [
-        (begin + time, value)
+        value
         for begin, of, history in histories
-        if of == name and begin <= pane.time + 1e-9
+        if of == name
         for time, value in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True)
+        if begin + time <= pane.time + 1e-9
     ]
-    values = [value for time, value in known if time <= pane.time + 1e-9]
-    cost = cost_label(mean_label(setup.environment), values[-1], None) if values else ""
-    trail, times = pane.trail.until(pane.time)
-    scene = Scene.of(
-        setup.environment,
-        setup.team,
-        snapshot,
-        starts=pane.starts if len(pane.starts) == len(setup.numbers) else None,
-        trail=trail if len(trail) else None,
-        trail_time=times,
-        label=setup.law.label,
-        cost=cost,
-    )
-    radii = {number: setup.limits.radius_of(number) for number in setup.failed}
-    return replace(scene, numbers=setup.numbers, failed=setup.failed, failed_radii=radii)
+    cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
+    return pane.scene(pane.setup, pane.simulation.snapshot, pane.trail.until(pane.time), cost=cost)
 
 
 def _file_name(words: str) -> str:

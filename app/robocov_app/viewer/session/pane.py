@@ -12,10 +12,10 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers import remembers
 from robocov.errors import StartError
-from robocov.observation import Decision
+from robocov.observation import Decision, Snapshot
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
-from robocov_app.render.scene import Sensed
+from robocov_app.render.scene import Scene, Sensed
 from robocov_app.runs.spec import RunSpec
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import PaneSetup, State, Trail, of_robots
@@ -72,6 +72,23 @@ class Pane:
         self._steps += 1
         self.simulation.step(pushes)
         self.trail.add(self.time, self.simulation.positions)
+
+    def scene(self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any) -> Scene:
+        """Return what a picture shows of a moment; `trail`: positions and times until then."""
+        radii = {number: setup.limits.radius_of(number) for number in setup.failed}
+        return Scene.of(
+            setup.environment,
+            self.simulation.team if setup is self.setup else setup.team,
+            snapshot,
+            starts=self.starts if len(self.starts) == len(setup.numbers) else None,
+            trail=trail[0] if len(trail[0]) else None,
+            trail_time=trail[1],
+            label=setup.law.label,
+            numbers=setup.numbers,
+            failed=setup.failed,
+            failed_radii=radii,
+            **more,
+        )
 
     def state(self) -> State:
         simulation = self.simulation
