@@ -17,7 +17,6 @@ from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
-
 _INDICES = ("owner", "corner", "last_corner")
 
 
@@ -57,11 +56,10 @@ class Costs:
             else LatestWorker("robocov_app.viewer.costs:CostService", "computes the cost", _CostWire)
         )
         self._map: CostQuestion | None = None
-        self._number = 0
-        self._ready = False
-        self._waiting: dict[int, CostQuestion] = {}
         self._asked: CostQuestion | None = None
-        self._pane: int | None = None
+        self._number, self._ready = 0, False
+        self._waiting: dict[int, CostQuestion] = {}
+        self._pane: int | None = None  # of what is asked; None for a map, or where nobody wants it any more
 
     def environment(self, environment: Environment) -> None:
         self._number += 1
@@ -83,10 +81,12 @@ class Costs:
         """
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
-            asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
-            self._waiting[pane] = asked
+            self._waiting[pane] = replace(
+                self._map, time=time, positions=np.array(at), point=point, speeds=speeds
+            )
 
     def poll(self) -> list[tuple[int, Known]]:
+        """Return what has been answered since the last call, by pane."""
         answers, worker = [], self._worker
         while self._asked is not None or self._ask_next():
             answer = worker.poll()
@@ -250,12 +250,6 @@ def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
             path = momentary.at(now).path(positions[momentary.counted(now, positions)], question.point)
     # half as long on the way
     indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
-    nothing = np.empty((0, 2))
-    same: dict[str, Any] = {
-        "points": nothing,
-        "corners": nothing,
-        "weights": None,
-        "environment": None,
-        "sites": None,
-    }
+    same: dict[str, Any] = dict.fromkeys(["weights", "environment", "sites"])
+    same |= dict.fromkeys(["points", "corners"], np.empty((0, 2)))
     return _Answer(None, now, replace(result, **indices, **same), path, travel_time)

@@ -7,7 +7,7 @@ import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
@@ -17,13 +17,6 @@ from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.document import Document
 from robocov_app.viewer.session.file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
-
-
-class Said(NamedTuple):
-    """Something to tell."""
-
-    words: str
-    trouble: bool
 
 
 @dataclass
@@ -40,7 +33,7 @@ class RunSaver:
     def __init__(self, lattice: int) -> None:
         self._lattice = lattice
         self._jobs: list[_Job] = []
-        self._said: list[Said] = []
+        self._said: list[tuple[str, bool]] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
         """Begin to save the story up to the present in a new folder; return what to tell.
@@ -63,9 +56,11 @@ class RunSaver:
         self._jobs.append(_Job(target, process, errors, temporary))
         return f"saving the run: {target}/"
 
-    def poll(self) -> list[Said]:
-        for job in [job for job in self._jobs if job.process.poll() is not None]:
-            self._end(job)
+    def poll(self) -> list[tuple[str, bool]]:
+        """Return what is to be told since the last call, in words, and whether it is trouble."""
+        for job in self._jobs[:]:
+            if job.process.poll() is not None:
+                self._end(job)
         said, self._said = self._said, []
         return said
 
@@ -93,12 +88,12 @@ class RunSaver:
             errors.seek(0)
             lines = errors.read().decode(errors="replace").strip().splitlines()
         if job.process.returncode == 0:
-            self._said.append(Said(f"run saved: {job.target}/ (record, cost, pictures)", trouble=False))
+            self._said.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
             return
         reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
         with suppress(OSError):
             job.target.rmdir()  # fails, as it should, where there is something in it
-        self._said.append(Said(f"run not saved: {job.target}/: {reason}", trouble=True))
+        self._said.append((f"run not saved: {job.target}/: {reason}", True))
 
 
 def own_controllers(document: Document) -> list[str]:

@@ -174,7 +174,7 @@ def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
     words = saver.save(played(), tmp_path)
     assert words == f"saving the run: {tmp_path / 'hall-comparison-1'}/" and saver.poll() == []
     saver.finish()
-    (said,) = saver.poll()
-    assert said.words.startswith("run saved: ") and not said.trouble
+    ((words, trouble),) = saver.poll()
+    assert words.startswith("run saved: ") and not trouble
     assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
     assert not list(aside.iterdir())
