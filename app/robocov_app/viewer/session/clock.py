@@ -5,13 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
+# simulated seconds per second; infinite for as fast as it goes
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
-"""Simulated seconds per second; infinite for as fast as it goes."""
-
 LONGEST_FRAME = 0.1  # longest frame, s: what it took beyond is not made up for
-FRAME_BUDGET = 0.008
-"""So many seconds of a frame a window that people look at gives to the steps of the simulation."""
-
+FRAME_BUDGET = 0.008  # seconds of a frame that go to the steps of the simulation, where people look on
 _PATIENT = 16.0  # speed of "as fast as it goes" where no time runs out
 
 
@@ -45,22 +42,17 @@ class Clock:
         becomes slower, the window does not.
         """
         speed = _PATIENT if math.isinf(self.speed) and math.isinf(self.budget) else self.speed
-        wanted = math.inf
-        if math.isfinite(speed):
-            self._due += min(seconds, LONGEST_FRAME) * speed
-            wanted = math.floor(self._due / self.dt + 1e-9)
-        due, self._due = self._due, 0.0
-        began, made = perf_counter(), 0
-        self.behind = False
+        endless, began, made = math.isinf(speed), perf_counter(), 0
+        due = self._due + (0.0 if endless else min(seconds, LONGEST_FRAME) * speed)
+        wanted = math.inf if endless else math.floor(due / self.dt + 1e-9)
+        self._due, self.behind = 0.0, False
         while made < wanted:
             made += 1
             if not step():
                 return made
             if perf_counter() - began > self.budget:
-                self.behind = math.isfinite(wanted) and made < wanted
+                self.behind = not endless and made < wanted
                 break
-        if math.isfinite(wanted) and not self.behind:
-            self._due = max(due - made * self.dt, 0.0)
-        elif not math.isfinite(wanted):
-            self._due = due
+        if not self.behind:
+            self._due = due if endless else max(due - made * self.dt, 0.0)
         return made

@@ -126,18 +126,18 @@ class ControllerChoice:
 
     def plain(self) -> ControllerChoice:
         usual = {name: gain.default for name, gain in self.known.items()}.items()
-        return replace(
-            self, gains={name: value for name, value in self.gains.items() if (name, value) not in usual}
-        )
+        return replace(self, gains=dict(each for each in self.gains.items() if each not in usual))
 
+    @property
+    def words(self) -> str:
+        """How a branch that was left with it is called."""
+        gains = [f"{name} {_said(value)}" for name, value in self.plain().gains.items()]
+        return ", ".join([self.label, *gains])
 
-def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
-    changed = [name for name in after.known if before.value(name) != after.value(name)]
-    return ", ".join(f"{name} = {_said(after.value(name))}" for name in changed)
-
-
-def branch_words(law: ControllerChoice) -> str:
-    return ", ".join([law.label, *(f"{name} {_said(value)}" for name, value in law.plain().gains.items())])
+    def words_since(self, before: ControllerChoice) -> str:
+        """Return which gains differ from those before, as people write them."""
+        changed = [name for name in self.known if self.value(name) != before.value(name)]
+        return ", ".join(f"{name} = {_said(self.value(name))}" for name in changed)
 
 
 def _said(value: Value) -> str:

@@ -30,26 +30,17 @@ from robocov_app.viewer.session.document import Document, Node, replayed
 from robocov_app.viewer.session.history import History, Moment, PaneSetup, State, Trail, way_of
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
-from robocov_app.viewer.session.scenario import (
-    MOST_PANES,
-    ControllerChoice,
-    Scenario,
-    TeamSpec,
-    branch_words,
-    gain_words,
-)  # fmt: skip
+from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 
 if TYPE_CHECKING:
     from robocov_app.viewer.session.file import SavedSession
 
 MOST_GHOSTS = 8  # branches whose curves are shown
+# metres from which on a robot counts as pushed out of the way: who leans on something moves in any case
 PUSHED = 5e-3
-"""Metres from which on a robot counts as pushed out of the way: who leans on something moves in any case."""
-
 MOST_SENSED = 300  # moments of another branch from which it is found out anew what was sensed
+# seconds of simulation within which changes of a value are one touch, as of a slider that is dragged
 _SLIDE = 1.0
-"""Seconds of simulation within which changes of a value are one touch, as of a slider that is dragged."""
-
 _SLICE = 0.03  # seconds of a frame for making a branch again
 
 
@@ -436,7 +427,7 @@ class Session:
         limits, dt, found = self.document.limits(self.head, self._run.step), self.scenario.dt, []
         root = self.document.path(self.head)[0]
         for branch in self.document.branches():
-            path = self.document.path(branch.node)
+            path, number = self.document.path(branch.node), branch.node.number
             if path[0] is not root:
                 continue
             theirs = self.document.limits(branch.node, branch.end)
@@ -449,10 +440,7 @@ class Session:
                             known = node.curves[pane, what].between(since * dt, theirs[node.number] * dt)
                             curve.extend(known, np.inf)
                     if len(curve) > 1:
-                        words = branch_words(law)
-                        found.append(
-                            Ghost(law.name, words, curve.time, curve.value, what, branch.node.number)
-                        )
+                        found.append(Ghost(law.name, law.words, curve.time, curve.value, what, number))
         return found
 
     # how it is touched
@@ -516,7 +504,7 @@ class Session:
         if law.name != before.name:
             self.do(change, "law", f"{law.label} takes over")
         else:
-            words = gain_words(before, law)
+            words = law.words_since(before)
             gesture = "gain", pane.number, words.partition(" = ")[0]
             self.do(change, "law", f"{law.label}: {words}", gesture)
 
