@@ -1,7 +1,7 @@
 """The list of the viewer's commands: keys, buttons, tool tips, help and palette all read it."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,8 +13,8 @@ from robocov_app.viewer.session.clock import SPEEDS, speed_words
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.tools import Tool
 
+# headings of the help, in their order
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
-"""Headings of the help, in their order."""
 
 _LAYER_KEYS = {
     **{
@@ -56,8 +56,7 @@ def grouped(group: str, *rows: Row) -> list[Command]:
 
 
 def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
-    def robot_numbers() -> list[str]:
-        return [str(number) for number in viewer.numbers]
+    """Return the commands that need no window; `titles` are the layers', by their names."""
 
     def files() -> list[str]:
         return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
@@ -77,8 +76,15 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def look_on(seconds: float) -> None:
         viewer.look_at(viewer.session.time + seconds)
 
-    more, fewer = partial(viewer.change_robots, 1), partial(viewer.change_robots, -1)
-    start, speeds = Takes("start", options=viewer.starts), [speed_words(each).rstrip("×") for each in SPEEDS]
+    def more(robots: int) -> None:
+        viewer.restart(robots=len(viewer.numbers) + robots)
+
+    def enter(branch: str) -> None:
+        viewer.session.enter(viewer.session.document.branch(branch).node)
+
+    start = Takes("start", options=viewer.starts)
+    law = Takes("controller", options=lambda: viewer.laws)
+    ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
 
     def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
         return Row(name, title, run, takes=takes)
@@ -87,8 +93,11 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         run = partial(viewer.take_tool, tool.name)
         return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
 
+    def switch(layer: str) -> None:
+        viewer.shown ^= {layer}
+
     def layer_row(name: str) -> Row:
-        return Row(f"layer:{name}", titles[name], partial(viewer.switch_layer, name), keys.get(name, ""))
+        return Row(f"layer:{name}", titles[name], partial(switch, name), keys.get(name, ""))
 
     keys = {name: key for key, name in _LAYER_KEYS.items()}
     layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
@@ -103,8 +112,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("faster", "Faster", lambda: viewer.change_speed(1), "=, +", REPEATS),
             Row("seed:next", "Other starting positions (next seed)", next_seed, "n"),
             Row("start:next", "Next start of the map", viewer.next_start, "shift+n"),
-            Row("more", "One robot more, from the start", more, "shift+=, shift++", REPEATS),
-            Row("fewer", "One robot fewer, from the start", fewer, "shift+-", REPEATS),
+            Row("more", "One robot more, from the start", partial(more, 1), "shift+=, shift++", REPEATS),
+            Row("fewer", "One robot fewer, from the start", partial(more, -1), "shift+-", REPEATS),
             Row("map:next", "Next map", lambda: viewer.next_map(1), "page down"),
             Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
             taking("robots", "Number of robots", lambda n: viewer.restart(robots=n), _whole("robots")),
@@ -125,7 +134,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
             taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
-            taking("branch", "Enter a branch", viewer.enter_named_branch, Takes("branch", options=branches)),
+            taking("branch", "Enter a branch", enter, Takes("branch", options=branches)),
         ),
         *grouped(
             "Compare",
@@ -135,25 +144,21 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
                 "pane:remove", "Remove this pane", lambda: viewer.session.remove_pane(viewer.pane), "shift+k"
             ),
             Row("pane:next", "Next pane", viewer.next_pane, "`"),
-            taking(
-                "controller", "Controller", viewer.use_law, Takes("controller", options=lambda: viewer.laws)
-            ),
+            taking("controller", "Controller", viewer.use_law, law),
         ),
         *grouped(
             "Touch",
             Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
             Row("redo", "Redo", viewer.redo, "ctrl+y, ctrl+shift+z", REPEATS),
-            Row("robot:next", "Ask the next robot", lambda: viewer.ask_next(1), "tab", REPEATS),
-            Row(
-                "robot:previous", "Ask the previous robot", lambda: viewer.ask_next(-1), "shift+tab", REPEATS
-            ),
+            Row("robot:next", "Ask the next robot", partial(ask_next, 1), "tab", REPEATS),
+            Row("robot:previous", "Ask the previous robot", partial(ask_next, -1), "shift+tab", REPEATS),
             Row("robot:fail", "Fail or revive the robot asked", viewer.fail_or_revive, "shift+d"),
             Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
             Row("finish", "Finish what is being drawn", viewer.finish, "return, enter"),
             Row("cancel", "Give up; close", viewer.cancel, "escape"),
             Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
             Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
-            taking("robot", "Ask a robot", viewer.ask, _whole("robot", robot_numbers)),
+            taking("robot", "Ask a robot", viewer.ask, _whole("robot", lambda: map(str, viewer.numbers))),
         ),
         *grouped(
             "View",
@@ -186,14 +191,14 @@ def parameter_commands(viewer: Presenter) -> Iterator[Command]:
             yield Command(each.name, f"Set {each.label}", "Run", run, takes=takes, hidden=True)
 
 
-def _whole(word: str, options: object = None) -> Takes:
+def _whole(word: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
     def read(text: str) -> int:
         try:
             return int(text)
         except ValueError:
             raise ParameterError(f"{word}: {text!r}, but a whole number was wanted") from None
 
-    return Takes("whole number", read, options if callable(options) else tuple)
+    return Takes("whole number", read, options)
 
 
 def _speed(text: str) -> float:

@@ -22,17 +22,13 @@ _INDICES = ("owner", "corner", "last_corner")
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """The newest that is known of a pane's cost.
-
-    `path`: way-points from the cursor to its nearest robot, empty where none can come. `lattice` returns the
-    sites as a field wants them. `travel_time`, s: mean time until the first robot is at a place.
-    """
+    """The newest that is known of a pane's cost."""
 
     time: float
     result: CoverageResult
-    path: Array | None
-    lattice: Callable[[], FieldLattice]
-    travel_time: float | None = None
+    path: Array | None  # way-points from the cursor to its nearest robot, empty where none can come
+    lattice: Callable[[], FieldLattice]  # returns the sites as a field wants them
+    travel_time: float | None = None  # s, mean time until the first robot is at a place
 
     @cached_property
     def field(self) -> Field:
@@ -40,16 +36,12 @@ class Known:
 
 
 class Costs:
-    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it.
-
-    `known`: by pane, of the map as it is. `state`: how far a new map is, or why there is no cost. `lattice`:
-    sites along a side.
-    """
+    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it."""
 
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
-        self.known: dict[int, Known] = {}
-        self.state = ""
-        self.lattice = lattice
+        self.known: dict[int, Known] = {}  # by pane, of the map as it is
+        self.state = ""  # how far a new map is, or why there is no cost
+        self.lattice = lattice  # sites along a side
         self._worker: Worker[Known | _Sites] = (
             DirectWorker(CostService(), _CostWire())
             if direct

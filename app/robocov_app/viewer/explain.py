@@ -29,14 +29,11 @@ _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "sou
 
 @dataclass(frozen=True)
 class Line:
-    """One thing that is said about a robot; with a `vector`, N, of a force for a small arrow.
-
-    `kind`: the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force.
-    """
+    """One thing that is said about a robot."""
 
     text: str
-    vector: tuple[float, float] | None = None
-    kind: str = ""
+    vector: tuple[float, float] | None = None  # N, of a force, for a small arrow
+    kind: str = ""  # the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force
 
 
 @dataclass(frozen=True)
@@ -52,15 +49,16 @@ class Report:
 
 
 def report_on(viewer: Presenter, number: int) -> Report:
+    """Return what the inspector says of a robot of the chosen pane."""
     session, pane = viewer.session, viewer.pane
     setup = session.setup(pane)
     if number in setup.failed:
         x, y = setup.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    snapshot, team, names = session.snapshot(pane), setup.team, setup.numbers
-    recent, solid = session.recent(pane, number), setup.solid
-    return explain(snapshot, team, solid, names.index(number), names=names, recent=recent)
+    names, recent = setup.numbers, session.recent(pane, number)
+    robot = session.snapshot(pane), setup.team, setup.solid, names.index(number)
+    return explain(*robot, names=names, recent=recent)
 
 
 def explain(
@@ -72,19 +70,11 @@ def explain(
     names: Sequence[int] | None = None,
     recent: Array | None = None,
 ) -> Report:
-    """Return why a robot moves, or why it does not.
+    """Return why a robot, by its row, moves, or why it does not.
 
-    Parameters
-    ----------
-    environment : Environment
-        The robot does not know it, but who asks does.
-    robot : int
-        Row of the robot.
-    names : n numbers, or None
-        What people call the robots; by default 1, 2, ...
-    recent : (k, 2) m or None
-        Where the robot was during the last `metrics.SETTLED_WINDOW` seconds, oldest first. Without it
-        the speed alone says whether the robot is at rest.
+    The robot does not know the environment, but who asks does. `names`: what people call the robots, by
+    default 1, 2, ... `recent`, (k, 2) m: where the robot was during the last `SETTLED_WINDOW` seconds, oldest
+    first; without it the speed alone says whether the robot is at rest.
     """
     case = _Case(snapshot, team, environment, robot, range(1, len(team) + 1) if names is None else names)
     motion = _motion(case, recent)
@@ -134,13 +124,12 @@ class _Case:
         point = _row(snapshot.seen.obstacle_points, robot)
         self.sensing = point is not None
         self.solid = _solid(environment, here, point, self.radius)
-        others = []
+        self.others = []
         for j in snapshot.seen.neighbours.of(robot).tolist():
             offset = (_row(snapshot.positions, j) or 0j) - here
-            others.append(
-                _Thing(f"robot {names[j]}", offset, abs(offset) - self.radius - float(team.radius[j]))
-            )
-        self.others = sorted(others, key=lambda other: abs(other.offset))
+            gap = abs(offset) - self.radius - float(team.radius[j])
+            self.others.append(_Thing(f"robot {names[j]}", offset, gap))
+        self.others.sort(key=lambda other: abs(other.offset))
         self.forces, self.broken = _terms(snapshot.decision, robot)
         self.drag = -self.viscosity * self.velocity
         self.resultant = sum(self.forces.values(), self.drag)
@@ -317,9 +306,8 @@ def _cause(case: _Case, kind: str, vector: complex) -> str:
         return f"{'not pulled to' if none else how} {aim.name}, {aim.away}"
     cause = "the rest of its law" if kind == REST and len(case.forces) > 1 else _plain(kind)
     if kind == "repulsion_robots" and case.others and not none:
-        nearest = [
-            thing for thing in case.others[:2] if abs(thing.offset) <= 1.5 * abs(case.others[0].offset)
-        ]
+        far = 1.5 * abs(case.others[0].offset)
+        nearest = [thing for thing in case.others[:2] if abs(thing.offset) <= far]
         cause = " and ".join(thing.there for thing in nearest)
         cause += f" ({_robots(len(case.others))} in range)"
         away = len(nearest) == 1 and _along(vector, nearest[0].offset) < -0.9
@@ -377,8 +365,7 @@ def _surroundings(case: _Case) -> list[str]:
     if solid and case.sensing and solid not in case.touched:
         texts.append(f"{_length(solid.gap)} clear of {solid.beside}")
     if not case.sensing:
-        texts.append(
-            "senses nothing" + (f" within {_length(case.reach)}" if 0.0 < case.reach < _HUGE else "")
-        )
+        within = f" within {_length(case.reach)}" if 0.0 < case.reach < _HUGE else ""
+        texts.append(f"senses nothing{within}")
     hears = f"{_robots(len(others))}, the nearest is {others[0].there}" if others else "no other robot"
     return [*texts, f"hears {hears}"]

@@ -52,18 +52,16 @@ STRIP = 30  # height of a film's strip with what was done, px at scale 1
 
 @dataclass(eq=False)
 class Part:
-    """A stretch of a story with the same map, team and controllers in all panes.
-
-    `begin`: step. `touched`: steps between which a robot was moved by hand. `scenes`: of its beginning, and
-    at the end of the story of that, one for each pane: what a legend explains.
-    """
+    """A stretch of a story with the same map, team and controllers in all panes."""
 
     node: Node
-    begin: int
+    begin: int  # step
     setups: dict[int, PaneSetup]
     recorders: dict[int, Recorder]
-    scenes: list[Scene]
-    touched: list[list[int]] = field(default_factory=list)
+    scenes: list[Scene]  # of its beginning, and of the story's end, one for each pane: what a legend explains
+    touched: list[list[int]] = field(
+        default_factory=list
+    )  # between which steps which robot was moved by hand
     ends: int = 0
 
 

@@ -35,25 +35,19 @@ HEADLESS_FPS = 30  # frames per second of what is rendered without a display
 
 @dataclass
 class Launcher:
-    """Launch settings of a window.
-
-    `folder`: where things are saved. `theme`, `size`, `scale`: None for what was used last. `also`,
-    `without`: names of layers. `headless`: draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever
-    that takes. `served`: draw without a display, but live; nothing is remembered. `laws`: names of
-    controllers to choose from beside the built-in ones.
-    """
+    """Launch settings of a window."""
 
     session: Session
     map_name: str
-    folder: Path
-    theme: str | None = None
+    folder: Path  # where things are saved
+    theme: str | None = None  # this and the next two: None for what was used last
     size: tuple[int, int] | None = None
     scale: float | None = None
-    also: frozenset[str] = frozenset()
+    also: frozenset[str] = frozenset()  # names of layers
     without: frozenset[str] = frozenset()
-    headless: bool = False
-    served: bool = False
-    laws: tuple[str, ...] = ()
+    headless: bool = False  # draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes
+    served: bool = False  # draw without a display, but live; nothing is remembered
+    laws: tuple[str, ...] = ()  # names of controllers to choose from beside the built-in ones
     lattice: int = LATTICE
     file: Path | None = None
     offers_lesson: bool = False

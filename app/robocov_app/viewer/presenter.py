@@ -27,24 +27,18 @@ FADE = 12.0  # seconds of path that trajectories show where they fade
 
 
 class Presenter:
-    """The user's actions in terms of the session, and what of it is shown.
-
-    `shown`: names of layers. `folder`: where things are saved. `map_name`: a bundled name or a path. `laws`:
-    names of controllers to choose from beside the built-in ones. `kept_in`: the folder for unsaved work.
-    `file`: of the session. `active`: the pane that gains and controllers are chosen for. `version` grows
-    whenever panel and canvas have to look again at what there is. `now`: seconds since the start.
-    """
+    """The user's actions in terms of the session, and what of it is shown."""
 
     def __init__(
         self,
         session: Session,
         costs: Costs,
-        shown: set[str],
-        folder: Path,
-        map_name: str = "",
-        laws: Iterable[str] = (),
-        kept_in: Path | None = None,
-        file: Path | None = None,
+        shown: set[str],  # names of layers
+        folder: Path,  # where things are saved
+        map_name: str = "",  # a bundled name or a path
+        laws: Iterable[str] = (),  # names of controllers to choose from beside the built-in ones
+        kept_in: Path | None = None,  # the folder for unsaved work
+        file: Path | None = None,  # of the session
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
         self.map_name, self._kept_in = map_name, kept_in
@@ -52,11 +46,13 @@ class Presenter:
         self.tools = toolbox()
         self.hand = cast(Hand, self.tools["hand"])
         self.tool: Tool = self.hand
-        self.active = self.version = 0
+        self.active = 0  # the pane that gains and controllers are chosen for
+        self.version = 0  # grows whenever panel and canvas have to look again at what there is
         self.theme = "light"
         self.panel, self.fade, self.suggests, self.filming = True, False, True, False
         self.recent: list[str] = []
-        self.message, self.trouble, self._said, self.now = "", False, 0.0, 0.0
+        self.message, self.trouble, self._said = "", False, 0.0
+        self.now = 0.0  # seconds since the start
         self.cursor: Point | None = None
         self.cursor_pane = 0
         self._mapped: object = None
@@ -119,9 +115,6 @@ class Presenter:
 
     # doing
 
-    def switch_layer(self, name: str) -> None:
-        self.shown ^= {name}
-
     def take_tool(self, name: str) -> None:
         self.tool.cancel(self.session)
         self.tool = self.tools[name]
@@ -141,9 +134,6 @@ class Presenter:
 
     def restart(self, **changes: object) -> None:
         self.session.restart(**changes)
-
-    def change_robots(self, by: int) -> None:
-        self.restart(robots=len(self.numbers) + by)
 
     def change_speed(self, by: int) -> None:
         k = speed_index(self.session.clock.speed) + by
@@ -174,7 +164,7 @@ class Presenter:
             passed.append(name)
 
     def open_map(self, name: str) -> None:
-        """Begin anew on another map; MapError or StartError where that cannot be."""
+        """Begin on another map; MapError or StartError where that cannot be."""
         self.session.restart(environment=load_map(name))
         self.map_name = name
 
@@ -246,13 +236,13 @@ class Presenter:
     def switch_theme(self) -> None:
         self.theme = "dark" if self.theme == "light" else "light"
 
-    def switch_fade(self) -> None:
+    def switch_fade(self) -> str:
         self.fade = not self.fade
-        self.say(f"trajectories show the last {FADE:g} s" if self.fade else "trajectories stay")
+        return f"trajectories show the last {FADE:g} s" if self.fade else "trajectories stay"
 
-    def switch_suggestions(self) -> None:
+    def switch_suggestions(self) -> str:
         self.suggests = not self.suggests
-        self.say(f"suggestions {'on' if self.suggests else 'off'}")
+        return f"suggestions {'on' if self.suggests else 'off'}"
 
     def switch_panel(self) -> None:
         self.panel = not self.panel
@@ -289,13 +279,11 @@ class Presenter:
         self._note_recent(path)
         self.say(f"session opened: {path}")
 
-    def recover(self) -> None:
-        found = recoverable(self._kept_in)
-        if not found:
-            self.say("nothing was left behind")
-            return
+    def recover(self) -> str:
+        if not (found := recoverable(self._kept_in)):
+            return "nothing was left behind"
         self._take(*recovered(found[0], self.laws, self._kept_in))
-        self.say(f"recovered: {offer(found[0])}")
+        return f"recovered: {offer(found[0])}"
 
     def _take(self, workspace: Workspace, view: Mapping[str, Any]) -> None:
         self.workspace.close()
@@ -315,9 +303,9 @@ class Presenter:
 
     def enter_branch(self, by: int) -> None:
         session = self.session
-        branches = session.document.branches()
-        now = next((k for k, each in enumerate(branches) if each.node is session.head), -1)
-        self.enter(branches[(now + by) % len(branches)].node.number)
+        ends = [each.node for each in session.document.branches()]
+        now = ends.index(session.head) if session.head in ends else -1
+        self.enter(ends[(now + by) % len(ends)].number)
 
     def enter(self, node: int) -> None:
         branches = self.session.document.branches()
@@ -348,9 +336,6 @@ class Presenter:
         if number not in self.numbers:
             raise ParameterError(f"there is no robot {number}")
         self.hand.selected = number
-
-    def enter_named_branch(self, name: str) -> None:
-        self.session.enter(self.session.document.branch(name).node)
 
 
 def _after(names: list[str], now: str) -> str:

@@ -287,19 +287,15 @@ def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
 
 @dataclass
 class Brush(Tool):
-    """Paints the density: the left button raises it, the right one lowers it.
-
-    `radius`: None until it is first needed: then a tenth of the map. `lowers`: what a press does. `painting`:
-    whether a stroke has begun and not yet ended.
-    """
+    """Paints the density: the left button raises it, the right one lowers it."""
 
     name = "brush"
     title = "Brush"
     hint = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
-    radius: float | None = None
-    lowers: bool = False
+    radius: float | None = None  # m, None until it is first needed: then a tenth of the map
+    lowers: bool = False  # what a press does
     clock: Callable[[], float] = field(default=perf_counter, repr=False)
-    painting: bool = False
+    painting: bool = False  # whether a stroke has begun and not yet ended
     _dabs: list[Point] = field(default_factory=list, repr=False)
     _stroke: int = 0
     _boundary: Ring = ()

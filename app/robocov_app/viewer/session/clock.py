@@ -23,16 +23,12 @@ def speed_index(speed: float) -> int:
 
 @dataclass
 class Clock:
-    """Turns seconds that have passed into steps of `dt` seconds, at a speed.
-
-    `budget`, s: so long the steps of one frame may take, infinite to make them all whatever they take.
-    `behind`: whether the last frame's steps were more than its budget.
-    """
+    """Turns seconds that have passed into steps of `dt` seconds, at a speed."""
 
     dt: float
     speed: float = 1.0
-    budget: float = math.inf
-    behind: bool = False
+    budget: float = math.inf  # s, so long the steps of a frame may take; infinite: all, whatever they take
+    behind: bool = False  # whether the last frame's steps were more than its budget
     _due: float = 0.0
 
     def advance(self, seconds: float, step: Callable[[], bool]) -> int:

@@ -93,17 +93,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Ghost:
-    """The rest of a curve, of "distance" or "time", that was left when the run was resumed from before.
+    """The rest of a curve that was left when the run was resumed from before."""
 
-    `law`: name of the controller. `words`: what was different then. `node`: at whose end the branch ends.
-    """
-
-    law: str
-    words: str
+    law: str  # name of the controller
+    words: str  # what was different then
     time: Array
     value: Array
-    of: str = "distance"
-    node: int = 0
+    of: str = "distance"  # or "time"
+    node: int = 0  # at whose end the branch ends
 
 
 class Plotted(NamedTuple):

@@ -25,24 +25,21 @@ MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
 class Node:
     """One touch, and the time that passed after it until the next.
 
-    `at`: step of the parent's time at which it was made. `kind`, `words`: as of an `Event`. `end`: step up to
-    which the run has come. `name`: what people call the branch that ends here. `redo`: the child that was
-    left by undo. The rest is remembered while another branch is shown: moments, cost curves by pane and kind,
-    controllers of the panes, who failed and joined by itself. It can be made again, and is in no file.
+    What is remembered while another branch is shown can be made again, and is in no file.
     """
 
     number: int
     parent: Node | None
-    at: int
-    kind: str
+    at: int  # step of the parent's time at which it was made
+    kind: str  # as of an `Event`
     words: str
     changes: list[Change]
-    end: int
-    name: str = ""
-    redo: Node | None = field(default=None, repr=False)
+    end: int  # step up to which the run has come
+    name: str = ""  # what people call the branch that ends here
+    redo: Node | None = field(default=None, repr=False)  # the child that was left by undo
     kept: list[Moment] = field(default_factory=list, repr=False)
-    curves: dict[tuple[int, str], Curve] = field(default_factory=dict, repr=False)
-    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)
+    curves: dict[tuple[int, str], Curve] = field(default_factory=dict, repr=False)  # by pane and kind
+    controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)  # by pane
     happenings: set[Happening] = field(default_factory=set, repr=False)
 
     @property

@@ -145,11 +145,11 @@ class SessionModel(_Model, title="robocov session"):
 
 @dataclass(frozen=True, eq=False)
 class SavedSession:
-    """Content of a session file. `step`: the present. `view`: what is shown, and how."""
+    """Content of a session file."""
 
     document: Document
     head: Node
-    step: int
+    step: int  # the present
     view: Mapping[str, Any] = field(default_factory=dict)
     lesson: LessonModel | None = None
 

@@ -30,20 +30,14 @@ MOST_ROWS = 4096  # when there are so many, every second of the older half goes
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """Setup of a pane, which stays from one touch to the next.
+    """Setup of a pane, which stays from one touch to the next."""
 
-    `environment`: the map as it is, without robots that failed. `numbers`, (n,) int: what people call the
-    robots that work, in the order of the rows. `failed`, (x, y) m each: robots that stand where they failed.
-    `conditions`: what goes wrong with messages and sensors; None: nothing. Failing and joining is not among
-    it.
-    """
-
-    environment: Environment
+    environment: Environment  # the map as it is, without robots that failed
     law: ControllerChoice
     limits: TeamSpec
-    numbers: tuple[int, ...]
-    failed: Mapping[int, tuple[float, float]]
-    conditions: Conditions | None = None
+    numbers: tuple[int, ...]  # what people call the robots that work, in the order of the rows
+    failed: Mapping[int, tuple[float, float]]  # robots that stand where they failed, (x, y) m each
+    conditions: Conditions | None = None  # of messages and sensors; failing and joining is not among them
 
     @property
     def solid(self) -> Environment:
@@ -73,36 +67,25 @@ def _with_wrecks(
 
 
 class State(NamedTuple):
-    """One pane at one moment.
-
-    `positions`, `velocities`: (n, 2) m and m/s. `memory`: what the controller remembered; None where it can
-    do without. `recorded`: what was decided then, where it comes from a record. `inbox`: the messages that
-    the robots had; None where they know the others as they are. `steering`: heading and turning rate of
-    unicycles, (n, 2) rad and rad/s; None in a team of points.
-    """
+    """One pane at one moment."""
 
     setup: PaneSetup
-    positions: Array
-    velocities: Array
-    memory: Any
-    recorded: Decision | None = None
-    inbox: Inbox | None = None
-    steering: Array | None = None
+    positions: Array  # (n, 2) m
+    velocities: Array  # (n, 2) m/s
+    memory: Any  # what the controller remembered; None where it can do without
+    recorded: Decision | None = None  # what was decided then, where it comes from a record
+    inbox: Inbox | None = None  # the messages that robots had; None where they know the others as they are
+    steering: Array | None = None  # heading and turning rate of unicycles, (n, 2) rad and rad/s
 
 
 class Moment(NamedTuple):
-    """All panes at one moment: enough to go on from there, bit for bit.
+    """All panes at one moment: enough to go on from there, bit for bit."""
 
-    `step`: steps since the start. `scenario`: controllers, limits and map as they were last chosen. `hand`,
-    (number, (x, y) m) or None: the robot that is dragged, and where to. `node`: node of the document in whose
-    time it is.
-    """
-
-    step: int
+    step: int  # since the start
     states: Mapping[int, State]
-    scenario: Scenario
-    hand: tuple[int, tuple[float, float]] | None = None
-    node: int = 0
+    scenario: Scenario  # with controllers, limits and map as they were last chosen
+    hand: tuple[int, tuple[float, float]] | None = None  # the robot that is dragged, and where to, m
+    node: int = 0  # of the document, in whose time it is
 
 
 class History:
@@ -110,15 +93,15 @@ class History:
 
     When they would take more than `most_bytes`, the older ones are thinned: of those that have grown old only
     every second step stays, of still older ones every fourth, and so on. The newest all stay, and so do,
-    unless they are too many themselves, those since which something was touched. `dt` in s; `thinned`: number
-    of moments that are gone.
+    unless they are too many themselves, those since which something was touched. `dt` in s.
     """
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
         self.dt, self.most_bytes = dt, most_bytes
         self.moments: list[Moment] = []
         self._sizes: list[int] = []
-        self._bytes = self.thinned = 0
+        self._bytes = 0
+        self.thinned = 0  # number of moments that are gone
 
     def __len__(self) -> int:
         return len(self.moments)

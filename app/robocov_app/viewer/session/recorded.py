@@ -30,13 +30,10 @@ _OF_A_MOMENT = 1500  # about how many bytes a moment of one pane takes, beside t
 
 @dataclass(frozen=True)
 class LostController(ControllerChoice):
-    """A controller that is not loaded, or does not take its gains: its runs can be looked at.
+    """A controller that is not loaded, or does not take its gains: its runs can be looked at."""
 
-    `title`: what people called it. `reason`: why it cannot be had.
-    """
-
-    title: str = ""
-    reason: str = ""
+    title: str = ""  # what people called it
+    reason: str = ""  # why it cannot be had
 
     @property
     def label(self) -> str:
