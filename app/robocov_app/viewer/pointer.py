@@ -1,10 +1,11 @@
 """The mouse: what is pressed, dragged and let go where, and what that means."""
 
 from collections.abc import Callable
+from math import dist
 
-import numpy as np
 import pygame
 
+from robocov.environment import Point
 from robocov_app.toolkit.input import DOUBLE, SLIP, WHEEL, show_cursor, wheel_notches
 from robocov_app.toolkit.layout import inside
 from robocov_app.viewer.canvas import ViewerCanvas
@@ -23,12 +24,7 @@ class Pointer:
     """
 
     def __init__(
-        self,
-        viewer: Presenter,
-        canvas: ViewerCanvas,
-        chart: Chart,
-        panel: Panel,
-        touched: Callable[[], object],
+        self, viewer: Presenter, canvas: ViewerCanvas, chart: Chart, panel: Panel, touched: Callable[[], None]
     ) -> None:
         self._viewer, self._canvas, self._chart, self._panel = viewer, canvas, chart, panel
         self._interrupt = touched
@@ -52,18 +48,15 @@ class Pointer:
         elif event.type == pygame.MOUSEBUTTONDOWN:
             self._panel.ui.stop_typing()
             self._pressed(event, now)
-        else:
-            self._turned(WHEEL ** wheel_notches(event))
-
-    def _turned(self, factor: float) -> None:
-        if self._canvas.pane_at(self.at) is None:
-            return
-        if isinstance(self._viewer.tool, Brush):
-            self._viewer.widen(factor)
-        else:
-            self._canvas.zoom(factor, self.at)
+        elif self._canvas.pane_at(self.at) is not None:
+            factor = WHEEL ** wheel_notches(event)
+            if isinstance(self._viewer.tool, Brush):
+                self._viewer.widen(factor)
+            else:
+                self._canvas.zoom(factor, self.at)
 
     def show(self) -> None:
+        """Let the cursor, and a ring around the robot under it, tell what a press would do."""
         viewer, canvas, layout = self._viewer, self._canvas, self._canvas.layout
         pane = canvas.pane_at(self.at) if viewer.cursor is not None else None
         if pane is not None:  # the cameras may have moved below it
@@ -115,10 +108,10 @@ class Pointer:
             viewer.active = pane
             viewer.version += 1
         then, where = self._last_click
-        double = now - then < DOUBLE and _far(where, event.pos) < SLIP
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP
         self._last_click = now, event.pos
         if double and viewer.tool.name in ("polygon", "wall"):
-            viewer.attempt(lambda: viewer.tool.finish(viewer.session))
+            viewer.attempt(viewer.finish)
             return
         point = self._canvas.to_world(event.pos, pane)
         number, reach = self._canvas.robot_at(event.pos, pane), self._canvas.reach(pane)
@@ -150,8 +143,7 @@ class Pointer:
         elif self._drag == "pan":
             self._canvas.pan(*event.rel)
         elif self._drag == "tool":
-            point = self._canvas.to_world(event.pos, self._pane())
-            viewer.attempt(lambda: viewer.tool.move(viewer.session, point))
+            viewer.attempt(lambda: viewer.tool.move(viewer.session, self._place(event.pos)))
         elif viewer.cursor is not None:
             viewer.tool.move(viewer.session, viewer.cursor)
 
@@ -160,19 +152,15 @@ class Pointer:
         if event.button != self._button:  # another one than the one that is held
             return
         self._drag = ""
-        clicked = _far(event.pos, self._pressed_at) < SLIP
+        clicked = dist(event.pos, self._pressed_at) < SLIP
         if drag == "tool":
-            point = self._canvas.to_world(event.pos, self._pane())
-            viewer.attempt(lambda: viewer.tool.release(viewer.session, point))
+            viewer.attempt(lambda: viewer.tool.release(viewer.session, self._place(event.pos)))
         elif drag == "pan" and clicked and event.button == 3:
-            viewer.attempt(lambda: viewer.tool.finish(viewer.session))
+            viewer.attempt(viewer.finish)
         elif drag == "pan" and clicked and event.button == 1 and viewer.tool is viewer.hand:
             viewer.hand.selected = None
             viewer.version += 1
 
-    def _pane(self) -> int:
-        return min(self._held, len(self._canvas.layout.panes) - 1)
-
-
-def _far(a: tuple[int, int], b: tuple[int, int]) -> float:
-    return float(np.hypot(a[0] - b[0], a[1] - b[1]))
+    def _place(self, at: tuple[int, int]) -> Point:
+        """Return the place under a pixel, m, in the pane in which the button was pressed."""
+        return self._canvas.to_world(at, min(self._held, len(self._canvas.layout.panes) - 1))
