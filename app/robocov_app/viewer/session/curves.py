@@ -78,7 +78,7 @@ class Curve:
         part._time, part._value = self._time[first:last], self._value[first:last]
         return part
 
-    def extend(self, later: Curve, until: float) -> None:
+    def extend(self, later: Curve, until: float = np.inf) -> None:
         """Append those samples of another curve that are later than the last one here, up to a time, s."""
         for time, value in zip(later._time, later._value, strict=True):
             if self.last_time + 1e-9 < time <= until + 1e-6:

@@ -6,6 +6,7 @@ out of the tree: undo goes back to the node before, a touch in the past is one m
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -38,7 +39,8 @@ class Node:
     name: str = ""  # what people call the branch that ends here
     redo: Node | None = field(default=None, repr=False)  # the child that was left by undo
     kept: list[Moment] = field(default_factory=list, repr=False)
-    curves: dict[tuple[int, str], Curve] = field(default_factory=dict, repr=False)  # by pane and kind
+    # by pane and kind
+    curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)
     controllers: dict[int, ControllerChoice] = field(default_factory=dict, repr=False)  # by pane
     happenings: set[Happening] = field(default_factory=set, repr=False)
 
@@ -76,10 +78,11 @@ class Branch(NamedTuple):
     words: str
 
     def told(self, dt: float) -> str:
+        """Return when it ends and, where that is known, each pane's mean distance then."""
         words = [f"{self.end * dt:.1f} s"]
-        for pane, what in sorted(self.node.curves):
-            if what == "distance":
-                value = self.node.curves[pane, what].at(self.end * dt)
+        for (pane, what), curve in sorted(self.node.curves.items()):
+            if what == "distance" and len(curve):
+                value = curve.at(self.end * dt)
                 # of a file that was opened the controllers are known once it has been run
                 law = self.node.controllers.get(pane)
                 words.append(f"{law.label if law else ''} {value:.3f} m".lstrip())

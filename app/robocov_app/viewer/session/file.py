@@ -24,7 +24,6 @@ from robocov.files.strictjson import check_header, located, parse, read_bytes, r
 from robocov.mapfile import bundled_maps, from_json, load_map, to_json
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Restart, Robot, Step
-from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.document import Document, Node
 from robocov_app.viewer.session.scenario import Coordinate, Text
 
@@ -275,7 +274,7 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
         if not pane.isdecimal() or what not in ("distance", "time") or len(samples) != 2:
             refuse("curves", value=name, wanted='"0 distance", "0 time", ... with times and values')
         for time, value in zip(*samples, strict=False):
-            node.curves.setdefault((int(pane), what), Curve()).add(time, value)
+            node.curves[int(pane), what].add(time, value)
     return node
 
 

@@ -48,17 +48,16 @@ class Session:
     """Session of the window; StartError, ParameterError when the scenario cannot be begun.
 
     What touches it goes on from the moment that is looked at; what cannot be is refused, and nothing has
-    changed then. `head`: where in the document the present is. `recorded_until`, s: up to there the run is a
-    record, which its scenario leads to where `repeatable`. `serial`: grows when what is known of times so far
-    does not hold any more, `revision` with every touch.
+    changed then. `head`: where in the document the present is.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.clock = Clock(scenario.dt)
         self.playing, self.stop_when_settled, self.settled = True, False, False
-        self.recorded_until: float | None = None
-        self.repeatable = True
-        self.serial = self.revision = 0
+        self.recorded_until: float | None = None  # s, up to there the run is a record
+        self.repeatable = True  # whether the scenario leads to that record
+        self.serial = 0  # grows when what is known of times so far does not hold any more
+        self.revision = 0  # grows with every touch
         self._remaking: Iterator[None] | None = None
         self._script: list[Node] = []
         self.document = Document(scenario)
@@ -348,17 +347,16 @@ class Session:
 
     def undo(self) -> str | None:
         """Go back to right before the newest touch; return what it was, None if there is none."""
-        node = self.head
-        if node.parent is None:
+        node, parent = self.head, self.head.parent
+        if parent is None:
             return None
-        node.parent.redo = node
-        self.enter(node.parent, node.at)
+        parent.redo = node
+        self.enter(parent, node.at)
         return node.words
 
     def redo(self) -> str | None:
         """Go to the end of what was undone last; return what it was, None if there is none."""
-        node = self.head.redo
-        if node is None:
+        if (node := self.head.redo) is None:
             return None
         self.enter(node)
         return node.words
@@ -393,13 +391,10 @@ class Session:
             pane.trail, pane.starts = way_of(history, pane.number, len(history) - 1)
             for what, curve in pane.curves.items():
                 for each in path:
-                    if (pane.number, what) in each.curves:
-                        curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
-            if pane.number in before:
-                pane.sensed = before[pane.number].sensed.copy()
-                pane.sensed.cut(run.time)
-            else:
-                pane.sensed = _sensed_in(history, pane.number)
+                    curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
+            known = before.get(pane.number)
+            pane.sensed = _sensed_in(history, pane.number) if known is None else known.sensed.copy()
+            pane.sensed.cut(run.time)
         if change is not None:
             run.apply(change)
         self._go_on(head, run, history)
@@ -418,10 +413,8 @@ class Session:
                 node.controllers[pane.number] = pane.law
                 for what, curve in pane.curves.items():
                     known = curve.between(node.begin * dt, np.inf if after is None else after.at * dt)
-                    if (pane.number, what) in node.curves:
-                        known.extend(node.curves[pane.number, what], np.inf)
-                    if len(known):
-                        node.curves[pane.number, what] = known
+                    known.extend(node.curves[pane.number, what])
+                    node.curves[pane.number, what] = known
 
     def _other_curves(self) -> list[Ghost]:
         limits, dt, found = self.document.limits(self.head, self._run.step), self.scenario.dt, []
@@ -435,10 +428,9 @@ class Session:
                 for what in ("distance", "time"):
                     curve = Curve()
                     for node in path:
-                        since = limits.get(node.number, -np.inf)
-                        if (pane, what) in node.curves and theirs[node.number] > since:
-                            known = node.curves[pane, what].between(since * dt, theirs[node.number] * dt)
-                            curve.extend(known, np.inf)
+                        since, until = limits.get(node.number, -np.inf), theirs[node.number]
+                        if until > since:
+                            curve.extend(node.curves[pane, what].between(since * dt, until * dt))
                     if len(curve) > 1:
                         found.append(Ghost(law.name, law.words, curve.time, curve.value, what, number))
         return found
