@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pygame
@@ -163,19 +164,11 @@ class ViewerCanvas:
             scans = self._scans(
                 pane, setup, snapshot, range(len(numbers)) if selected is None else [selected]
             )
-        return pane.scene(
-            setup,
-            snapshot,
-            session.trail(pane),
-            trail_fade=FADE if viewer.fade else None,
-            cost=self._caption_cost(pane),
-            field=field,
-            field_limit=self._limit,
-            selected=selected,
-            scans=scans,
-            sensed=pane.sensed,
-            path=known.path if known is not None and viewer.cursor is not None else None,
-        )
+        path = known.path if known is not None and viewer.cursor is not None else None
+        look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
+        look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
+        fade = FADE if viewer.fade else None
+        return pane.scene(setup, snapshot, session.trail(pane), trail_fade=fade, **look)
 
     def _caption_cost(self, pane: Pane) -> str:
         session = self.viewer.session

@@ -189,11 +189,9 @@ def save_story(
         content = {"format": "robocov-story", "version": 1, "parts": told}
         write_json(result.new / STORY, content)
         header = "controller," + cost_table(histories[0][2])[0]
-        lines = (
-            (name, begin + row[0], *row[1:])
-            for begin, name, history in histories
-            for row in cost_table(history)[1]
-        )
+        lines: list[tuple[object, ...]] = []
+        for begin, name, history in histories:
+            lines += [(name, begin + row[0], *row[1:]) for row in cost_table(history)[1]]
         write_csv(result.new / "cost.csv", header, lines)
     look = options.film
     if look.video or look.frames:
@@ -254,13 +252,10 @@ def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
 
 
 def _scene(pane: Pane, histories: list[History], name: str) -> Scene:
-    known = [
-        value
-        for begin, of, history in histories
-        if of == name
-        for time, value in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True)
-        if begin + time <= pane.time + 1e-9
-    ]
+    known: list[float] = []
+    for begin, of, history in histories:
+        if of == name:
+            known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
     cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
     return pane.scene(pane.setup, pane.simulation.snapshot, pane.trail.until(pane.time), cost=cost)
 

@@ -29,17 +29,10 @@ def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snap
     setup, team, positions = state.setup, state.setup.team, state.positions
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
     sensor.show(time)
-    seen = Observations(
-        positions=positions,
-        velocities=state.velocities,
-        neighbours=Neighbours.within(positions, team.communication_range),
-        obstacle_points=sensor.nearest(positions, team.sensing_range),
-        region=region,
-        time=time,
-        max_speeds=team.max_speed,
-        density=density,
-        steering=state.steering,
-    )
+    points = sensor.nearest(positions, team.sensing_range)
+    neighbours = Neighbours.within(positions, team.communication_range)
+    seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
+    seen = replace(seen, density=density, steering=state.steering)
     if (perception := _perception(setup, dt)) is not None:
         inbox = perception.begin() if state.inbox is None else state.inbox
         seen, _ = perception.known(seen, inbox, np.ones(len(positions), dtype=bool))

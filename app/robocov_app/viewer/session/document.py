@@ -117,11 +117,9 @@ class Document:
 
     def branches(self) -> list[Branch]:
         """Return all stories, the newest last."""
-        return [
-            Branch(node, node.end, node.name or node.words)
-            for node in self.nodes
-            if all(child.at < node.end for child in self.nodes if child.parent is node)
-        ]
+        nodes = self.nodes
+        ends = [node for node in nodes if all(each.at < node.end for each in nodes if each.parent is node)]
+        return [Branch(node, node.end, node.name or node.words) for node in ends]
 
     def branch(self, name: str) -> Branch:
         """Return the story of a name, or of a number from 1 on; ParameterError if there is none."""

@@ -196,11 +196,8 @@ def _touch_json(node: Node, maps: _Maps) -> dict[str, Any]:
     parent = None if node.parent is None else node.parent.number
     named = {"name": node.name} if node.name else {}
     head = {"parent": parent, "at": node.at, "kind": node.kind, "words": node.words, **named}
-    curves = {
-        f"{pane} {what}": curve.outline(MOST_SAMPLES)
-        for (pane, what), curve in node.curves.items()
-        if len(curve)
-    }
+    drawn = {key: curve for key, curve in node.curves.items() if len(curve)}
+    curves = {f"{pane} {what}": each.outline(MOST_SAMPLES) for (pane, what), each in drawn.items()}
     return {**head, "end": node.end, "changes": told, **({"curves": curves} if curves else {})}
 
 

@@ -178,10 +178,8 @@ def _strides(age: IntArray, recent: int) -> IntArray:
 
 def _changes(before: Moment, after: Moment) -> bool:
     """Whether something was touched between two moments: such are kept, so that no event is lost."""
-    return any(
-        pane in before.states and before.states[pane].setup is not state.setup
-        for pane, state in after.states.items()
-    )
+    pairs = [(before.states[pane], state) for pane, state in after.states.items() if pane in before.states]
+    return any(old.setup is not new.setup for old, new in pairs)
 
 
 def _size(moment: Moment) -> int:

@@ -58,10 +58,8 @@ class Lockstep:
     def resumed(cls, moment: Moment) -> Lockstep:
         run = cls.__new__(cls)
         run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
-        run.panes = [
-            Pane(number, state.setup, resumed(state, run.scenario.dt, run.step))
-            for number, state in moment.states.items()
-        ]
+        again = {k: resumed(state, run.scenario.dt, run.step) for k, state in moment.states.items()}
+        run.panes = [Pane(k, state.setup, again[k]) for k, state in moment.states.items()]
         return run
 
     def moment(self, node: int = 0) -> Moment:

@@ -75,20 +75,12 @@ class Pane:
 
     def scene(self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any) -> Scene:
         """Return what a picture shows of a moment; `trail`: positions and times until then."""
-        radii = {number: setup.limits.radius_of(number) for number in setup.failed}
-        return Scene.of(
-            setup.environment,
-            self.simulation.team if setup is self.setup else setup.team,
-            snapshot,
-            starts=self.starts if len(self.starts) == len(setup.numbers) else None,
-            trail=trail[0] if len(trail[0]) else None,
-            trail_time=trail[1],
-            label=setup.law.label,
-            numbers=setup.numbers,
-            failed=setup.failed,
-            failed_radii=radii,
-            **more,
-        )
+        team = self.simulation.team if setup is self.setup else setup.team
+        more |= {"numbers": setup.numbers, "failed": setup.failed, "label": setup.law.label}
+        more["failed_radii"] = {number: setup.limits.radius_of(number) for number in setup.failed}
+        more["starts"] = self.starts if len(self.starts) == len(setup.numbers) else None
+        more |= {"trail": trail[0] if len(trail[0]) else None, "trail_time": trail[1]}
+        return Scene.of(setup.environment, team, snapshot, **more)
 
     def state(self) -> State:
         simulation = self.simulation

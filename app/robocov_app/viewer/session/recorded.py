@@ -78,23 +78,13 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     first, dt = records[0], control_dt(records[0])
     limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record, controllers) for record in records]
-    scenario = Scenario(
-        environment,
-        tuple(map(_standing, laws)),
-        len(first.team),
-        first.start if first.start in environment.starts else None,
-        first.seed or 0,
-        limits,
-        dt,
-        np.array(first.positions[0]),
-        np.array(first.velocities[0]),
-        first.conditions,
-    )
-    session = Session(scenario)
-    casts = [
-        PaneSetup(environment, law, limits, roster.numbers, roster.failed)
-        for law, roster in zip(laws, rosters, strict=True)
-    ]
+    robots, given, moving = len(first.team), np.array(first.positions[0]), np.array(first.velocities[0])
+    start, seed = first.start if first.start in environment.starts else None, first.seed or 0
+    choice = tuple(map(_standing, laws)), robots, start, seed
+    scenario = Scenario(environment, *choice, limits, dt, given, moving, first.conditions)
+    session, casts = Session(scenario), list[PaneSetup]()
+    for law, roster in zip(laws, rosters, strict=True):
+        casts.append(PaneSetup(environment, law, limits, roster.numbers, roster.failed))
     history = _history_of(records, casts, replace(scenario, laws=tuple(laws)))
     for pane, each in zip(session.panes, saved, strict=True):
         _put(pane, each, history)

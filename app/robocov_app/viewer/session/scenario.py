@@ -180,11 +180,8 @@ class TeamSpec:
     def of(cls, team: Team, numbers: Sequence[int] | None = None) -> TeamSpec:
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
-        different = {
-            name: dict(zip(numbers, values, strict=True))
-            for name, values in columns.items()
-            if len(set(values)) > 1
-        }
+        varied = {name: values for name, values in columns.items() if len(set(values)) > 1}
+        different = {name: dict(zip(numbers, values, strict=True)) for name, values in varied.items()}
         return cls(**{name: values[0] for name, values in columns.items()}, different=different)
 
 
