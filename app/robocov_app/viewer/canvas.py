@@ -101,7 +101,6 @@ class ViewerCanvas:
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
-        """Return the place under a pixel of the window, m."""
         left, top, _, _ = self.layout.panes[pane]
         place = np.array([pixel[0] - left, pixel[1] - top])
         x, y = self._painters[pane].camera.to_world(place).tolist()

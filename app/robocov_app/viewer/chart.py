@@ -121,13 +121,11 @@ class Chart:
         return left + LEFT * scale, left + width - beside, end
 
     def time_at(self, x: float) -> float:
-        """Return the time at a pixel's column, s, within the run."""
         left, right, end = self._span
         time = (x - left) / max(right - left, 1.0) * end
         return float(np.clip(time, 0.0, self.viewer.session.end))
 
     def column(self, time: Any) -> Any:
-        """Return the pixel's column of a time, or of many."""
         left, right, end = self._span
         return left + (right - left) * time / end
 

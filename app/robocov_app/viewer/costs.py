@@ -78,7 +78,6 @@ class Costs:
             )
 
     def poll(self) -> list[tuple[int, Known]]:
-        """Return what has been answered since the last call, by pane."""
         answers, worker = [], self._worker
         while self._asked is not None or self._ask_next():
             answer = worker.poll()

@@ -49,7 +49,6 @@ class Report:
 
 
 def report_on(viewer: Presenter, number: int) -> Report:
-    """Return what the inspector says of a robot of the chosen pane."""
     session, pane = viewer.session, viewer.pane
     setup = session.setup(pane)
     if number in setup.failed:

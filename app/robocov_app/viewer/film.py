@@ -57,7 +57,6 @@ class Film:
                 self.left_out += 1
 
     def close(self) -> None:
-        """End the film; wait until it is written. Raises OutputError when the encoder failed."""
         self._queue.put(None)
         self._thread.join()
         if self._process.wait() != 0:

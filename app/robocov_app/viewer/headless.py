@@ -66,7 +66,6 @@ class Part:
 
 
 def parts_of(document: Document, node: Node, end: int) -> list[Part]:
-    """Return the parts of a branch, with records of all their steps."""
     parts: list[Part] = []
     for run, here in replayed(document, node, end):
         setups = {pane.number: pane.setup for pane in run.panes}
@@ -106,7 +105,6 @@ def records_of_part(part: Part, root: Node) -> list[Record]:
 
 
 def _recorder(setup: PaneSetup, dt: float) -> Recorder:
-    """Return what makes a record in which the robots that failed are obstacles with names."""
     environment, law = setup.environment, setup.law
     for number, place in setup.failed.items():
         wreck = CircleObstacle(place, setup.limits.radius_of(number), wreck_name(number))
@@ -152,7 +150,6 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 def save_story(
     document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
 ) -> dict[str, Any]:
-    """Write a branch into a folder: numbers and pictures of its parts, all costs, a film."""
     root = document.path(node)[0]
     parts, dt = parts_of(document, node, end), root.begun.dt
     several, histories = len(parts) > 1, list[History]()

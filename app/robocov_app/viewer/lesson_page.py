@@ -13,7 +13,6 @@ from robocov_app.viewer.lessons import LessonPlayer
 
 
 def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
-    """Show what a chapter says over the lower arena, where there is no panel."""
     scale, title = layout.scale, f"{tour.number + 1}  {tour.chapter.title}"
     left, top, width, height = layout.arena
     size, bold = round(14 * scale), round(15.5 * scale)

@@ -93,7 +93,6 @@ class LessonPlayer:
 
     @property
     def asks(self) -> list[str]:
-        """Question or task of now, line by line."""
         chapter = self.chapter
         if self.state == "left":
             return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
@@ -109,7 +108,6 @@ class LessonPlayer:
 
     @property
     def seconds(self) -> float:
-        """Longest duration of the lesson where nobody answers, s on the wall."""
         return sum(
             (each.until.step or 0) / 60 / each.speed + READING * (2 if each.question else 1) + 0.5
             for each in self.lesson.chapters
@@ -154,7 +152,6 @@ class LessonPlayer:
             self._begin(max(self.number + by, 0))
 
     def leave(self) -> None:
-        """Let whoever watches play with what is there."""
         if self.state != "task":
             self._turn("left")
 

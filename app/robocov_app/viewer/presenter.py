@@ -229,7 +229,6 @@ class Presenter:
             self.tool = self.hand
 
     def widen(self, factor: float) -> None:
-        """Draw wider walls; with the brush in hand, take a larger one."""
         tool = self.tool if isinstance(self.tool, Brush) else self.tools["wall"]
         self.say(tool.widen(self.session, factor))
 

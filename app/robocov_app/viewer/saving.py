@@ -7,7 +7,6 @@ import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from robocov.controllers import CONTROLLERS
 from robocov.errors import OutputError
@@ -18,13 +17,14 @@ from robocov_app.viewer.session.document import Document
 from robocov_app.viewer.session.file import SUFFIX, save_session
 from robocov_app.viewer.session.session import Session
 
+_ERRORS = "errors.txt"
+
 
 @dataclass
 class _Job:
     target: Path
     process: subprocess.Popen[bytes]
-    errors: IO[bytes]
-    temporary: tempfile.TemporaryDirectory[str]
+    temporary: tempfile.TemporaryDirectory[str]  # with the session, and what the process says on stderr
 
 
 class RunSaver:
@@ -46,14 +46,14 @@ class RunSaver:
         temporary = tempfile.TemporaryDirectory(prefix="robocov-")
         file = Path(temporary.name) / f"session{SUFFIX}"
         save_session(file, session.document, session.head, session.step_now, {})
-        errors = tempfile.TemporaryFile()  # noqa: SIM115, read when the process has ended
         command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
         command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
         if own := own_controllers(session.document):
             command += ["--controller", ",".join(own)]
         nothing = subprocess.DEVNULL
-        process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
-        self._jobs.append(_Job(target, process, errors, temporary))
+        with file.with_name(_ERRORS).open("wb") as errors:
+            process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+        self._jobs.append(_Job(target, process, temporary))
         return f"saving the run: {target}/"
 
     def poll(self) -> list[tuple[str, bool]]:
@@ -84,9 +84,8 @@ class RunSaver:
 
     def _end(self, job: _Job) -> None:
         self._jobs.remove(job)
-        with job.errors as errors, job.temporary:
-            errors.seek(0)
-            lines = errors.read().decode(errors="replace").strip().splitlines()
+        with job.temporary as folder:
+            lines = Path(folder, _ERRORS).read_text("utf-8", "replace").strip().splitlines()
         if job.process.returncode == 0:
             self._said.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
             return

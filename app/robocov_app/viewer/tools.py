@@ -303,7 +303,6 @@ class Brush(Tool):
     _shown: float = -1e9
 
     def size(self, session: Session) -> float:
-        """Return the radius, m."""
         if self.radius is None:
             self.radius = float(f"{0.1 * session.environment.region.diameter:.2g}")
         return self.radius

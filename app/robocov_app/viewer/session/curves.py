@@ -34,12 +34,10 @@ class Curve:
 
     @property
     def time(self) -> Array:
-        """Times, (k,) s."""
         return np.array(self._time)
 
     @property
     def value(self) -> Array:
-        """Mean distances, (k,) m, or times, (k,) s."""
         return np.array(self._value)
 
     @property
@@ -71,7 +69,6 @@ class Curve:
         ]
 
     def between(self, begin: float, end: float) -> Curve:
-        """Return the samples from a time, s, to another."""
         first = int(np.searchsorted(self._time, begin - 1e-6))
         last = int(np.searchsorted(self._time, end + 1e-6, side="right"))
         part = Curve()

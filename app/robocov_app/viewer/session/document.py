@@ -78,7 +78,6 @@ class Branch(NamedTuple):
     words: str
 
     def told(self, dt: float) -> str:
-        """Return when it ends and, where that is known, each pane's mean distance then."""
         words = [f"{self.end * dt:.1f} s"]
         for (pane, what), curve in sorted(self.node.curves.items()):
             if what == "distance" and len(curve):
@@ -116,7 +115,6 @@ class Document:
         return {each.number: after.at for each, after in pairwise(path)} | {node.number: step}
 
     def branches(self) -> list[Branch]:
-        """Return all stories, the newest last."""
         nodes = self.nodes
         ends = [node for node in nodes if all(each.at < node.end for each in nodes if each.parent is node)]
         return [Branch(node, node.end, node.name or node.words) for node in ends]

@@ -118,11 +118,9 @@ class History:
         return [moment.step for moment in self.moments]
 
     def time(self, k: int) -> float:
-        """Return the time of moment `k`, s."""
         return self.moments[k].step * self.dt
 
     def add(self, moment: Moment) -> None:
-        """Append a moment that is later than all."""
         self.moments.append(moment)
         self._sizes.append(_size(moment))
         self._bytes += self._sizes[-1]
@@ -183,7 +181,6 @@ def _changes(before: Moment, after: Moment) -> bool:
 
 
 def _size(moment: Moment) -> int:
-    """Return about how many bytes a moment takes."""
     return sum(
         _OVERHEAD + sum(_bytes_of(part) for part in (each.memory, each.inbox, each.steering))
         + each.positions.nbytes + each.velocities.nbytes
@@ -228,7 +225,6 @@ class Trail:
 
     @property
     def time(self) -> Array:
-        """Their times, (k,) s."""
         return self._times[: self._count]
 
     def add(self, time: float, positions: Array, *, always: bool = False) -> None:

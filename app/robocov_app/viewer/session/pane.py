@@ -74,7 +74,6 @@ class Pane:
         self.trail.add(self.time, self.simulation.positions)
 
     def scene(self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any) -> Scene:
-        """Return what a picture shows of a moment; `trail`: positions and times until then."""
         team = self.simulation.team if setup is self.setup else setup.team
         more |= {"numbers": setup.numbers, "failed": setup.failed, "label": setup.law.label}
         more["failed_radii"] = {number: setup.limits.radius_of(number) for number in setup.failed}
@@ -128,7 +127,6 @@ class Pane:
         return alike and wanted.setup.environment.same_place(self.setup.environment)
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:
-        """Go on with what `changed` returned."""
         before, after = self.numbers, setup.numbers
         if after != before:
             self.trail, starts = self.trail.of_robots(before, after), of_robots(self.starts, before, after)

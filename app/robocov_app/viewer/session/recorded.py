@@ -44,7 +44,6 @@ class LostController(ControllerChoice):
         return {}
 
     def made(self) -> Controller:
-        """Raise ParameterError, always."""
         raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
 
 
@@ -237,7 +236,6 @@ def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
 
 
 def _put(pane: Pane, saved: Saved, history: History) -> None:
-    """Let a pane be at the end of a run."""
     record, last = saved.record, history.last
     state = last.states[pane.number]
     standing = replace(state.setup, law=_standing(state.setup.law))

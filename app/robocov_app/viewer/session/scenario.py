@@ -173,7 +173,6 @@ class TeamSpec:
         return replace(team, **changed) if changed else team
 
     def radius_of(self, number: int) -> float:
-        """Return the radius of the robot with a number, m."""
         return float(self.team((number,)).radius[0])
 
     @classmethod

@@ -113,7 +113,6 @@ class Session:
 
     @property
     def hand(self) -> tuple[int, Point] | None:
-        """The robot that is dragged, and where to, m."""
         return self._run.hand
 
     @property
@@ -122,12 +121,10 @@ class Session:
 
     @property
     def time(self) -> float:
-        """Time of the moment that is looked at, s."""
         return self.history.time(self._number)
 
     @property
     def end(self) -> float:
-        """Time up to which the run has come, s."""
         return self._run.time
 
     @property
@@ -161,7 +158,6 @@ class Session:
 
     @property
     def _number(self) -> int:
-        """Index of the moment that is looked at."""
         return len(self.history) - 1 if self._cursor is None else self._cursor
 
     def _state(self, pane: Pane) -> State:
@@ -236,7 +232,6 @@ class Session:
         return self.clock.advance(seconds, self._play_on) if self.playing else 0
 
     def step(self) -> None:
-        """Make a single step, or show the next moment of the past; it pauses what is playing."""
         self.playing = False
         if self._cursor is not None:
             self._look(self._cursor + 1)
@@ -244,7 +239,6 @@ class Session:
             self._advance()
 
     def look_at(self, time: float) -> None:
-        """Look at the last moment not after `time`; at the end, at the present."""
         cursor = self.history.at(time)
         self.release()
         self._look(cursor)
@@ -306,7 +300,6 @@ class Session:
         self._script = self.document.path(node)
 
     def _follow(self) -> None:
-        """Carry out what the script says of this step."""
         if self.head not in self._script:
             self._script = []
         for node in self._script[self._script.index(self.head) + 1 :] if self._script else ():

@@ -70,12 +70,10 @@ def opened(
 
 
 def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
-    """Return the sessions that windows left behind which live no more, the newest first."""
     return autosave.recoverable(folder, KIND, lambda record: record if "session" in record.content else None)
 
 
 def offer(work: autosave.Record) -> str:
-    """Return what is said of a session that was left behind."""
     where = "never saved" if work.path is None else f"not saved to {work.path.name}"
     count = len(work.content["session"]["touches"]) - 1
     return f"a session of {work.when:%H:%M}, {count} {'touch' if count == 1 else 'touches'}, {where}"
@@ -84,6 +82,5 @@ def offer(work: autosave.Record) -> str:
 def recovered(
     work: autosave.Record, controllers: Collection[str], folder: Path | None
 ) -> tuple[Workspace, Mapping[str, Any]]:
-    """Return a session that was left behind, to go on with."""
     saved = session_of(work.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
