@@ -106,7 +106,7 @@ class _Thing:
 class _Case:
     """All that is said about one robot, before it is put in words; SI units.
 
-    `forces` has the terms and, as `REST`, what they leave of the force; `broken` when that is no number.
+    `forces` has the terms and, as `REST`, what they leave of the force; none where that is no number.
     `solid` is what the robot senses or else touches, `others` whom it hears, the nearest first.
     """
 
@@ -129,7 +129,7 @@ class _Case:
             gap = abs(offset) - self.radius - float(team.radius[j])
             self.others.append(_Thing(f"robot {names[j]}", offset, gap))
         self.others.sort(key=lambda other: abs(other.offset))
-        self.forces, self.broken = _terms(snapshot.decision, robot)
+        self.forces = _terms(snapshot.decision, robot)
         self.drag = -self.viscosity * self.velocity
         self.resultant = sum(self.forces.values(), self.drag)
         # whether that is too little to move a robot visibly from rest
@@ -142,23 +142,21 @@ class _Case:
         self.stuck = self.aim is not None and abs(self.aim.offset) > FAR and self.aim.hidden != ""
 
 
-def _terms(decision: Decision, robot: int) -> tuple[dict[str, complex], bool]:
-    """Return the forces by cause, N, and whether their sum is no number."""
-    total = _row(decision.forces, robot)
-    if total is None:
-        return {}, True
+def _terms(decision: Decision, robot: int) -> dict[str, complex]:
+    """Return the forces by cause, N; none where their sum is no number."""
+    if (total := _row(decision.forces, robot)) is None:
+        return {}
     rows = {name: _row(term, robot) for name, term in decision.terms.items()}
     taken = {"", REST, "viscosity", "resultant"}  # names that mean something else here
     terms = {name: row for name, row in rows.items() if row is not None and name not in taken}
     rest = total - sum(terms.values())
     if not terms or abs(rest) > 1e-6 + 1e-9 * max(map(abs, (total, *terms.values()))):
         terms[REST] = rest
-    return terms, False
+    return terms
 
 
 def _aim(decision: Decision, environment: Environment, here: complex, robot: int) -> _Thing | None:
-    goal = _row(decision.goals, robot)
-    if goal is None:
+    if (goal := _row(decision.goals, robot)) is None:
         return None
     centroid = decision.cells is not None and goal == _row(decision.cells.centroid, robot)
     point = shapely.Point(goal.real, goal.imag)
@@ -335,7 +333,7 @@ def _robots(count: int) -> str:
 
 
 def _reasons(case: _Case, motion: str) -> list[str]:
-    texts = ["its law gives no force that is a number"] if case.broken else []
+    texts = ["its law gives no force that is a number"] if not case.forces else []
     wanted, speed, top = abs(case.resultant) / case.mass, abs(case.velocity), case.max_speed
     if wanted > 1.001 * case.strength:
         texts.append(f"limited: {_number(case.strength)} m/s² instead of {_number(wanted)} m/s²")
