@@ -1,7 +1,5 @@
 """Cost against time, one curve for each pane, with what happened; bounded like everything here."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -68,14 +66,14 @@ class Curve:
             [float(f"{value:.5g}") for value in self._value[::-stride][::-1]],
         ]
 
-    def between(self, begin: float, end: float) -> Curve:
+    def between(self, begin: float, end: float) -> "Curve":
         first = int(np.searchsorted(self._time, begin - 1e-6))
         last = int(np.searchsorted(self._time, end + 1e-6, side="right"))
         part = Curve()
         part._time, part._value = self._time[first:last], self._value[first:last]
         return part
 
-    def extend(self, later: Curve, until: float = np.inf) -> None:
+    def extend(self, later: "Curve", until: float = np.inf) -> None:
         """Append those samples of another curve that are later than the last one here, up to a time, s."""
         for time, value in zip(later._time, later._value, strict=True):
             if self.last_time + 1e-9 < time <= until + 1e-6:

@@ -4,8 +4,6 @@ Physics is deterministic, so a scenario and the touches with their steps *are* t
 out of the tree: undo goes back to the node before, a touch in the past is one more child of its node.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -30,14 +28,14 @@ class Node:
     """
 
     number: int
-    parent: Node | None
+    parent: "Node | None"
     at: int  # step of the parent's time at which it was made
     kind: str  # as of an `Event`
     words: str
     changes: list[Change]
     end: int  # step up to which the run has come
     name: str = ""  # what people call the branch that ends here
-    redo: Node | None = field(default=None, repr=False)  # the child that was left by undo
+    redo: "Node | None" = field(default=None, repr=False)  # the child that was left by undo
     kept: list[Moment] = field(default_factory=list, repr=False)
     # by pane and kind
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)

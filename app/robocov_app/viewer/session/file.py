@@ -4,8 +4,6 @@ Bundled maps are named, with a digest; others are in the file whole, once. A con
 named by its path, and never run because a file says so.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping
@@ -182,7 +180,7 @@ def session_json(document: Document, head: Node, step: int, view: Mapping[str, A
     return {**content, "touches": touches, "head": head.number, "step": step, "view": dict(view)}
 
 
-def _touch_json(node: Node, maps: _Maps) -> dict[str, Any]:
+def _touch_json(node: Node, maps: "_Maps") -> dict[str, Any]:
     told: list[dict[str, Any]] = []
     for change in node.changes:
         pulled = change if isinstance(change, Drag) else None

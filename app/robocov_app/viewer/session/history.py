@@ -1,7 +1,5 @@
 """The past of a run, so that it can be looked at again and resumed from: bounded, thinned with age."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -9,7 +7,7 @@ from copy import copy, deepcopy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from itertools import compress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -150,7 +148,7 @@ class History:
         step = time / self.dt + 1e-6
         return max(bisect_right(self.moments, step, key=lambda moment: moment.step) - 1, 0)
 
-    def until(self, k: int) -> History:
+    def until(self, k: int) -> Self:
         """Return a history of its own that ends with moment `k`."""
         twin = copy(self)
         twin.moments, twin._sizes = self.moments[: k + 1], self._sizes[: k + 1]
@@ -258,7 +256,7 @@ class Trail:
         count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
         return self._rows[:count], self._times[:count]
 
-    def of_robots(self, before: Sequence[int], after: Sequence[int]) -> Trail:
+    def of_robots(self, before: Sequence[int], after: Sequence[int]) -> "Trail":
         """Return it for other robots, by their numbers: nan where one was not there."""
         twin, k = Trail(len(after)), self._count
         twin._rows[:k], twin._times[:k], twin._count = of_robots(self.positions, before, after), self.time, k

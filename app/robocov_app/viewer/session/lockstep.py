@@ -1,10 +1,8 @@
 """Panes in lockstep: several controllers on the same team, stepped together and touched alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -55,7 +53,7 @@ class Lockstep:
             self.panes.append(Pane(number, setup, begun(setup, positions[working], scenario.dt, moving)))
 
     @classmethod
-    def resumed(cls, moment: Moment) -> Lockstep:
+    def resumed(cls, moment: Moment) -> Self:
         run = cls.__new__(cls)
         run.scenario, run.step, run.hand = moment.scenario, moment.step, moment.hand
         again = {k: resumed(state, run.scenario.dt, run.step) for k, state in moment.states.items()}

@@ -1,7 +1,5 @@
 """One controller at work on the team: a pane of the window."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from functools import partial
 from operator import attrgetter

@@ -1,11 +1,9 @@
 """Scenario of a run: map, controllers, team and starts; and how these stand in session files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, WrapSerializer
@@ -45,7 +43,7 @@ def refused(error: object) -> PydanticCustomError:
     return PydanticCustomError("refused", "{words}", {"words": str(error)})
 
 
-def _known(law: ControllerChoice, info: Any) -> ControllerChoice:
+def _known(law: "ControllerChoice", info: Any) -> "ControllerChoice":
     """Return a controller of a file as the user has named it: none is run because a file says so."""
     kind, own = law.name.rpartition(":")[2], info.context.controllers
     if law.name not in CONTROLLERS and law.name not in own:
@@ -118,13 +116,13 @@ class ControllerChoice:
     def value(self, gain: str) -> Value:
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
-    def with_gain(self, gain: str, value: Value) -> ControllerChoice:
+    def with_gain(self, gain: str, value: Value) -> Self:
         """Return the law with another value of one gain; ParameterError as `made`."""
         changed = replace(self, gains={**self.gains, gain: value})
         changed.made()
         return changed.plain()
 
-    def plain(self) -> ControllerChoice:
+    def plain(self) -> Self:
         usual = {name: gain.default for name, gain in self.known.items()}.items()
         return replace(self, gains=dict(each for each in self.gains.items() if each not in usual))
 
@@ -134,7 +132,7 @@ class ControllerChoice:
         gains = [f"{name} {_said(value)}" for name, value in self.plain().gains.items()]
         return ", ".join([self.label, *gains])
 
-    def words_since(self, before: ControllerChoice) -> str:
+    def words_since(self, before: Self) -> str:
         """Return which gains differ from those before, as people write them."""
         changed = [name for name in self.known if self.value(name) != before.value(name)]
         return ", ".join(f"{name} = {_said(self.value(name))}" for name in changed)
@@ -176,7 +174,7 @@ class TeamSpec:
         return float(self.team((number,)).radius[0])
 
     @classmethod
-    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> TeamSpec:
+    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> Self:
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
         varied = {name: values for name, values in columns.items() if len(set(values)) > 1}

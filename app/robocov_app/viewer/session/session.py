@@ -5,13 +5,11 @@ the past is looked at through kept moments. Whatever fails leaves everything as 
 then taken over.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from operator import attrgetter
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
@@ -27,13 +25,11 @@ from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
 from robocov_app.viewer.session.curves import Curve, Event, Ghost
 from robocov_app.viewer.session.document import Document, Node, replayed
+from robocov_app.viewer.session.file import SavedSession
 from robocov_app.viewer.session.history import History, Moment, PaneSetup, State, Trail
 from robocov_app.viewer.session.lockstep import Lockstep
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
-
-if TYPE_CHECKING:
-    from robocov_app.viewer.session.file import SavedSession
 
 MOST_GHOSTS = 8  # branches whose curves are shown
 # metres from which on a robot counts as pushed out of the way: who leans on something moves in any case
@@ -64,7 +60,7 @@ class Session:
         self._begin_at(self.document.nodes[0], Lockstep(scenario))
 
     @classmethod
-    def opened(cls, saved: SavedSession) -> Session:
+    def opened(cls, saved: SavedSession) -> Self:
         """Return the session of a file, made again up to its present; paused."""
         root = saved.document.path(saved.head)[0]
         session = cls(root.begun)
