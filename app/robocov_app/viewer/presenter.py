@@ -63,8 +63,7 @@ class Presenter:
 
     @property
     def numbers(self) -> list[int]:
-        setup = self.session.setup(self.pane)
-        return sorted([*setup.numbers, *setup.failed])
+        return self.session.setup(self.pane).there
 
     @property
     def selected(self) -> int | None:

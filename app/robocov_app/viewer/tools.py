@@ -113,8 +113,7 @@ class Hand(Tool):
         # a click is no pull
         self._drags = self._drags or dist(self._from, point) > 0.02
         # meanwhile it may have been taken out
-        there = {*session.numbers, *session.setup(session.panes[0]).failed}
-        if self.robot is not None and self._drags and self.robot in there:
+        if self.robot is not None and self._drags and self.robot in session.setup(session.panes[0]).there:
             session.grab(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:

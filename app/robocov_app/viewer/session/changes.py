@@ -54,11 +54,11 @@ _DENSITY = read_as(DensityModel | None, _density_of, _density_json)
 def _begun(value: object, read: Any) -> Scenario:
     try:
         scenario: Scenario = read(value)
+        return scenario
     except MapError:
         raise
     except RobocovError as error:
         raise refused(error) from None
-    return scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +124,7 @@ class Join(OfRobot):
     do: Literal["join"] = field(default="join", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        there = _there(pane)
+        there = pane.setup.there
         if len(there) >= MOST_ROBOTS:
             raise ParameterError(f"there are {MOST_ROBOTS} robots already")
         if self.robot in there:
@@ -268,13 +268,9 @@ def _alike(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False)))
 
 
-def _there(pane: Pane) -> set[int]:
-    return {*pane.numbers, *pane.setup.failed}
-
-
 def _row(pane: Pane, number: int) -> int | None:
     """Return the row of a robot, None where it has failed."""
-    if number not in _there(pane):
+    if number not in pane.setup.there:
         raise ParameterError(f"there is no robot {number}")
     return pane.row(number)
 

@@ -42,6 +42,7 @@ _CHANGE = Annotated[
     _Pulled | changes.Release | changes.RemovePane | Restart | changes.PaneChange | changes.MapChange,
     Field(discriminator="do"),
 ]
+_WRITER: TypeAdapter[Change] = TypeAdapter(Change)
 _Box = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 
 
@@ -163,11 +164,10 @@ def save_session(path: Path, document: Document, head: Node, step: int, view: Ma
 
 
 def dumped(content: Mapping[str, Any]) -> str:
-    touches = ",\n  ".join(
-        json.dumps(each, ensure_ascii=False, allow_nan=False) for each in content["touches"]
-    )
-    rest = {key: value for key, value in content.items() if key != "touches"}
-    text = json.dumps(rest, ensure_ascii=False, allow_nan=False, indent=1)
+    """Return a session as text: a line for each touch."""
+    write = partial(json.dumps, ensure_ascii=False, allow_nan=False)
+    touches = ",\n  ".join(map(write, content["touches"]))
+    text = write({key: value for key, value in content.items() if key != "touches"}, indent=1)
     return text.removesuffix("\n}") + f',\n "touches": [\n  {touches}\n ]\n}}\n'
 
 
@@ -183,25 +183,18 @@ def session_json(document: Document, head: Node, step: int, view: Mapping[str, A
 def _touch_json(node: Node, maps: "_Maps") -> dict[str, Any]:
     told: list[dict[str, Any]] = []
     for change in node.changes:
-        pulled = change if isinstance(change, Drag) else None
-        if pulled is None:
-            told.append(_writer().dump_python(change, mode="json", by_alias=True, context=maps))
-        elif told and told[-1]["do"] == "drag" and told[-1]["robot"] == pulled.robot:
-            told[-1]["path"].append([pulled.step, *pulled.to])
-        else:
-            path = [[pulled.step, *pulled.to]]
-            told.append({"step": pulled.step, "do": "drag", "robot": pulled.robot, "path": path})
+        if not isinstance(change, Drag):
+            told.append(_WRITER.dump_python(change, mode="json", by_alias=True, context=maps))
+            continue
+        if not (told and told[-1]["do"] == "drag" and told[-1]["robot"] == change.robot):
+            told.append({"step": change.step, "do": "drag", "robot": change.robot, "path": []})
+        told[-1]["path"].append([change.step, *change.to])
     parent = None if node.parent is None else node.parent.number
     named = {"name": node.name} if node.name else {}
     head = {"parent": parent, "at": node.at, "kind": node.kind, "words": node.words, **named}
     drawn = {key: curve for key, curve in node.curves.items() if len(curve)}
     curves = {f"{pane} {what}": each.outline(MOST_SAMPLES) for (pane, what), each in drawn.items()}
     return {**head, "end": node.end, "changes": told, **({"curves": curves} if curves else {})}
-
-
-@cache
-def _writer() -> TypeAdapter[Change]:
-    return TypeAdapter(Change)
 
 
 def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
@@ -303,13 +296,12 @@ class _Maps:
             except MapError as error:
                 words = f"maps[{number}]: {str(error).removeprefix('map: ')}"
                 raise MapError.of(self.where, [Mistake(("maps", number), words)]) from None
+        refuse = partial(_refuse, self.where, "maps", number)
         if model.bundled not in bundled_maps():
-            wanted = "the name of a bundled map"
-            _refuse(self.where, "maps", number, "bundled", value=model.bundled, wanted=wanted)
+            refuse("bundled", value=model.bundled, wanted="the name of a bundled map")
         found = load_map(model.bundled)
         if _digest(to_json(found)) != model.digest:
-            wanted = "that of the map as it is now"
-            _refuse(self.where, "maps", number, "digest", value=model.digest, wanted=wanted)
+            refuse("digest", value=model.digest, wanted="that of the map as it is now")
         return found
 
 

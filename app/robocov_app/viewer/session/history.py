@@ -55,6 +55,11 @@ class PaneSetup:
         return _with_wrecks(self.environment, tuple(self.failed.values()), radii)
 
     @property
+    def there(self) -> list[int]:
+        """The numbers of all robots, those that failed with them."""
+        return sorted([*self.numbers, *self.failed])
+
+    @property
     def team(self) -> Team:
         return self.limits.team(self.numbers)
 

@@ -125,9 +125,8 @@ class Lockstep:
             return
         begins, ends = conditions.lives(self.scenario.robots)
         now, before = self.time + SOON, self.time - self.scenario.dt + SOON
-        there = {*self.panes[0].numbers, *self.panes[0].setup.failed}
         for number in (np.flatnonzero((begins > before) & (begins <= now)) + 1).tolist():
-            if number not in there:
+            if number not in self.panes[0].setup.there:
                 place = next(join.place for join in conditions.joins if join.robot == number)
                 x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
                 self.apply(Join(number, (x, y)))

@@ -535,7 +535,7 @@ class Session:
         self.do(changes.Place(number, at), "hand", f"robot {number} was moved", ("place", number))
 
     def add_robot(self, point: Point) -> int:
-        new = max({*self.numbers, *self.setup(self.panes[0]).failed}) + 1
+        new = self.setup(self.panes[0]).there[-1] + 1
         at = float(point[0]), float(point[1])
         self.do(changes.Join(new, at), "robot", f"robot {new} joined")
         return new
