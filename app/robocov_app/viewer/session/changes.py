@@ -4,7 +4,6 @@ Those of panes say how one is to go on; `Lockstep` carries them out in all panes
 not fit where they are wanted go as near as they fit.
 """
 
-from bisect import bisect
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Annotated, Any, Literal, TypeAlias
@@ -18,7 +17,6 @@ from robocov.errors import MapError, ParameterError, RobocovError
 from robocov.mapfile import density_of, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, plain
 from robocov.world.relocation import nearest_free
-from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import painted, with_replaced
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Position, Scenario, read_as, refused
@@ -104,16 +102,8 @@ class Place(OfRobot):
     do: Literal["place"] = field(default="place", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        setup, row = pane.setup, _row(pane, self.robot)
-        if row is None:
-            others, radii = pane.simulation.positions, pane.simulation.team.radius
-            place = _fitting(_without_wreck(setup, self.robot), self.robot, others, radii, self.at)
-            return Continuation(replace(setup, failed={**setup.failed, self.robot: place}))
-        positions, velocities = np.array(pane.simulation.positions), np.array(pane.simulation.velocities)
-        others, radii = np.delete(positions, row, axis=0), np.delete(setup.team.radius, row)
-        positions[row] = _fitting(setup, self.robot, others, radii, self.at)
-        velocities[row] = 0.0
-        return Continuation(setup, positions, velocities)
+        row, place = _row(pane, self.robot), _fitting(pane, self.robot, self.at)
+        return _with(pane, self.robot, failed=place) if row is None else _with(pane, self.robot, place)
 
 
 @dataclass(frozen=True)
@@ -129,7 +119,7 @@ class Join(OfRobot):
             raise ParameterError(f"there are {MOST_ROBOTS} robots already")
         if self.robot in there:
             raise ParameterError(f"there is a robot {self.robot} already")
-        return _with_robot(pane, pane.setup, self.robot, self.at)
+        return _with(pane, self.robot, _fitting(pane, self.robot, self.at))
 
 
 @dataclass(frozen=True)
@@ -141,7 +131,7 @@ class Leave(OfRobot):
     def of(self, pane: Pane) -> Continuation:
         _row(pane, self.robot)
         _need_another(pane, self.robot)
-        return _without_robot(pane, self.robot)
+        return _with(pane, self.robot)
 
 
 @dataclass(frozen=True)
@@ -156,9 +146,7 @@ class Fail(OfRobot):
             raise ParameterError(f"robot {self.robot} has failed already")
         _need_another(pane, self.robot)
         x, y = pane.simulation.positions[row].tolist()
-        wanted = _without_robot(pane, self.robot)
-        failed = {**wanted.setup.failed, self.robot: (x, y)}
-        return wanted._replace(setup=replace(wanted.setup, failed=failed))
+        return _with(pane, self.robot, failed=(x, y))
 
 
 @dataclass(frozen=True)
@@ -170,8 +158,7 @@ class Revive(OfRobot):
     def of(self, pane: Pane) -> Continuation:
         if _row(pane, self.robot) is not None:
             raise ParameterError(f"robot {self.robot} works")
-        setup = pane.setup
-        return _with_robot(pane, _without_wreck(setup, self.robot), self.robot, setup.failed[self.robot])
+        return _with(pane, self.robot, _fitting(pane, self.robot, pane.setup.failed[self.robot]))
 
 
 @dataclass(frozen=True)
@@ -280,30 +267,30 @@ def _need_another(pane: Pane, number: int) -> None:
         raise ParameterError("the last robot that works stays")
 
 
-def _fitting(setup: PaneSetup, number: int, others: np.ndarray, radii: np.ndarray, point: Point) -> Point:
-    return nearest_free(setup.solid, setup.limits.radius_of(number), others, point, radii)
+def _fitting(pane: Pane, number: int, point: Point) -> Point:
+    """Return the place nearest to a point where a robot fits beside all others."""
+    setup, simulation = pane.setup, pane.simulation
+    rows = [row for row, each in enumerate(pane.numbers) if each != number]
+    wrecks = {each: place for each, place in setup.failed.items() if each != number}
+    solid, radius = replace(setup, failed=wrecks).solid, setup.limits.radius_of(number)
+    return nearest_free(solid, radius, simulation.positions[rows], point, simulation.team.radius[rows])
 
 
-def _without_wreck(setup: PaneSetup, number: int) -> PaneSetup:
-    return replace(setup, failed={key: place for key, place in setup.failed.items() if key != number})
-
-
-def _without_robot(pane: Pane, number: int) -> Continuation:
-    setup, row = _without_wreck(pane.setup, number), pane.row(number)
-    if row is None:
+def _with(pane: Pane, number: int, at: Point | None = None, failed: Point | None = None) -> Continuation:
+    """Return a pane with a robot at rest at a place, or failed at one, or without it."""
+    setup, simulation, wrecks = pane.setup, pane.simulation, dict(pane.setup.failed)
+    moving = zip(simulation.positions, simulation.velocities, strict=True)
+    robots: dict[int, Any] = dict(zip(pane.numbers, moving, strict=True))
+    robots.pop(number, None)
+    if at is not None:
+        robots[number] = at, (0.0, 0.0)
+    if failed is not None:
+        wrecks[number] = failed
+    else:
+        wrecks.pop(number, None)
+    numbers = tuple(sorted(robots))
+    if numbers != setup.numbers or wrecks != setup.failed:
+        setup = replace(setup, numbers=numbers, failed=wrecks)
+    if numbers == pane.numbers and at is None:
         return Continuation(setup)
-    return Continuation(
-        replace(setup, numbers=tuple(each for each in setup.numbers if each != number)),
-        np.delete(pane.simulation.positions, row, axis=0),
-        np.delete(pane.simulation.velocities, row, axis=0),
-    )
-
-
-def _with_robot(pane: Pane, setup: PaneSetup, number: int, point: Point) -> Continuation:
-    positions, row = pane.simulation.positions, bisect(setup.numbers, number)
-    place = _fitting(setup, number, positions, pane.simulation.team.radius, point)
-    return Continuation(
-        replace(setup, numbers=(*setup.numbers[:row], number, *setup.numbers[row:])),
-        np.insert(positions, row, place, axis=0),
-        np.insert(pane.simulation.velocities, row, 0.0, axis=0),
-    )
+    return Continuation(setup, *(np.array([robots[each][k] for each in numbers]) for k in (0, 1)))
