@@ -48,10 +48,12 @@ class Row(NamedTuple):
     takes: Takes | None = None
 
 
-def grouped(group: str, *rows: Row) -> list[Command]:
+def grouped(rows: dict[str, Iterable[Row]]) -> list[Command]:
+    """Return commands from their rows by group."""
     return [
         Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
-        for name, title, run, keys, repeats, takes in rows
+        for group, each in rows.items()
+        for name, title, run, keys, repeats, takes in each
     ]
 
 
@@ -101,9 +103,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
 
     keys = {name: key for key, name in _LAYER_KEYS.items()}
     layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
-    return [
-        *grouped(
-            "Run",
+    groups: dict[str, Iterable[Row]] = {
+        "Run": [
             Row("pause", "Play or pause", viewer.pause, "space"),
             Row("step", "Single step", lambda: viewer.session.step(), ".", REPEATS),
             Row("restart", "Restart", viewer.restart, "r"),
@@ -121,9 +122,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             taking("start", "Start of the map", lambda name: viewer.restart(start=name), start),
             taking("map", "Open a map", viewer.open_map, Takes("map or file", options=viewer.maps)),
             taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, lambda: speeds)),
-        ),
-        *grouped(
-            "Time",
+        ],
+        "Time": [
             Row("back", "Back by a moment", lambda: viewer.look_by(-1), "left", REPEATS),
             Row("forward", "On by a moment", lambda: viewer.look_by(1), "right", REPEATS),
             Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
@@ -135,9 +135,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
             taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
             taking("branch", "Enter a branch", enter, Takes("branch", options=branches)),
-        ),
-        *grouped(
-            "Compare",
+        ],
+        "Compare": [
             Row("law", "Next controller in this pane", viewer.next_law, "o"),
             Row("pane:add", "Compare with one more controller", viewer.add_pane, "k"),
             Row(
@@ -145,9 +144,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             ),
             Row("pane:next", "Next pane", viewer.next_pane, "`"),
             taking("controller", "Controller", viewer.use_law, law),
-        ),
-        *grouped(
-            "Touch",
+        ],
+        "Touch": [
             Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
             Row("redo", "Redo", viewer.redo, "ctrl+y, ctrl+shift+z", REPEATS),
             Row("robot:next", "Ask the next robot", partial(ask_next, 1), "tab", REPEATS),
@@ -159,25 +157,24 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
             Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
             taking("robot", "Ask a robot", viewer.ask, _whole("robot", lambda: map(str, viewer.numbers))),
-        ),
-        *grouped(
-            "View",
+        ],
+        "View": [
             Row("theme", "Light or dark", viewer.switch_theme, "t"),
             Row("fade", "Trajectories fade", viewer.switch_fade, "shift+t"),
             Row("suggestions", "Suggestions when settled", viewer.switch_suggestions, "shift+h"),
             Row("panel", "Hide or show the panel", viewer.switch_panel, "h"),
-        ),
-        *grouped(
-            "Keep",
+        ],
+        "Keep": [
             Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
             Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
             Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
             taking("open", "Open a session", open_session, Takes("file", options=files)),
             taking("save", "Save the session as", save, Takes("file")),
-        ),
-        *grouped("Tools", *map(tool_row, viewer.tools.values())),
-        *grouped("Show", *map(layer_row, layers)),
-    ]
+        ],
+        "Tools": map(tool_row, viewer.tools.values()),
+        "Show": map(layer_row, layers),
+    }
+    return grouped(groups)
 
 
 def parameter_commands(viewer: Presenter) -> Iterator[Command]:

@@ -86,8 +86,7 @@ def edited(session: Session, environment: Environment, words: str) -> str:
 class Hand(Tool):
     """Drags and throws robots, and moves obstacles; `selected` is the robot that is asked about."""
 
-    name = "hand"
-    title = "Hand"
+    name, title = "hand", "Hand"
     hint = "drag a robot or an obstacle; click a robot to ask it; drag the floor to pan"
     selected: int | None = None
     robot: int | None = None
@@ -155,8 +154,7 @@ class Hand(Tool):
 class Polygon(Tool):
     """Draws a polygon, corner by corner."""
 
-    name = "polygon"
-    title = "Polygon"
+    name, title = "polygon", "Polygon"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     outline: Outline = field(default_factory=lambda: Outline(least=3, closes=True), repr=False)
     _reach: float = 0.0
@@ -200,8 +198,7 @@ class Polygon(Tool):
 class Wall(Polygon):
     """Draws a wall, point by point."""
 
-    name = "wall"
-    title = "Wall"
+    name, title = "wall", "Wall"
     hint = "drag, or click its points, Enter or a double click ends it; [ and ] change its width"
     outline: Outline = field(default_factory=lambda: Outline(drags=True), repr=False)
     width: float = WALL_WIDTH
@@ -227,8 +224,7 @@ class Wall(Polygon):
 class Ruler(Tool):
     """Measures."""
 
-    name = "ruler"
-    title = "Ruler"
+    name, title = "ruler", "Ruler"
     hint = "drag from one place to another"
     _from: Point | None = None
     _at: Point = (0.0, 0.0)
@@ -263,8 +259,7 @@ class Ruler(Tool):
 class Circle(Ruler):
     """Draws a round pillar from its middle."""
 
-    name = "circle"
-    title = "Circle"
+    name, title = "circle", "Circle"
     hint = "drag from the middle to the rim"
 
     def release(self, session: Session, point: Point) -> str | None:
@@ -288,8 +283,7 @@ def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
 class Brush(Tool):
     """Paints the density: the left button raises it, the right one lowers it."""
 
-    name = "brush"
-    title = "Brush"
+    name, title = "brush", "Brush"
     hint = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
     radius: float | None = None  # m, None until it is first needed: then a tenth of the map
     lowers: bool = False  # what a press does

@@ -1,5 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
@@ -241,9 +242,8 @@ class Window(BaseWindow):
 
     def _own_commands(self) -> list[Command]:
         pan, zoom = self.canvas.pan, self._zoom
-        return [
-            *grouped(
-                "View",
+        groups: dict[str, Iterable[Row]] = {
+            "View": [
                 Row("fit", "Show the whole map", self.canvas.fit, "f"),
                 Row("zoom:in", "Zoom in", partial(zoom, 1.25), "ctrl+=, ctrl++", REPEATS),
                 Row("zoom:out", "Zoom out", partial(zoom, 0.8), "ctrl+-", REPEATS),
@@ -254,23 +254,22 @@ class Window(BaseWindow):
                 Row("plot", "Plot mean distance or mean time", self.chart.switch, "y"),
                 Row("tab", "Next page of the panel", self._next_tab, "ctrl+tab"),
                 Row("fullscreen", "Full screen", self.toggle_fullscreen, "f11"),
-            ),
-            *grouped(
-                "Keep",
+            ],
+            "Keep": [
                 Row("screenshot", "Screenshot", lambda: self.save_screenshot(self.viewer.folder), "f12"),
                 Row("film", "Record a film, or end it", self.toggle_film, "f9"),
                 Row("save:run", "Save the run", self._save_run, "ctrl+e"),
                 Row("open:file", "Open a session or a map", self._open_file, "ctrl+o"),
-            ),
-            *grouped(
-                "Help",
+            ],
+            "Help": [
                 Row("help", "Keys", self._toggle_help, "f1, shift+/"),
                 Row("palette", "Commands by name", self._open_palette, "ctrl+k, /"),
                 Row("tour", "The lesson, or just play", self._start_tour, "f2"),
                 Row("quit", "Quit", self._quit, "ctrl+q"),
-            ),
-            *grouped("Time", Row("branches", "List of branches", self._list_branches, "ctrl+b")),
-        ]
+            ],
+            "Time": [Row("branches", "List of branches", self._list_branches, "ctrl+b")],
+        }
+        return grouped(groups)
 
     def _end_tour(self) -> bool:
         if self.tour is None:
