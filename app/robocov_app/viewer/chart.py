@@ -227,10 +227,7 @@ class Chart:
         self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
 
     def _values(self, screen: pygame.Surface) -> None:
-        """Write each pane's value at the right, with the gap to the best; none over another.
-
-        They are those of the captions, which are newer than a page that is drawn ten times a second.
-        """
+        """Write the captions' values, newer than the page, at the right, with the gaps; none over another."""
         session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)

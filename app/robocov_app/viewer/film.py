@@ -19,9 +19,8 @@ class Film:
     """Writes frames to an MP4 film.
 
     The encoder is a process of its own, which ends the film properly when its input ends, however that comes
-    about. `path`: not there yet. `size`, (width, height) px: of the film; frames of other sizes are fitted
-    in. `patient`: wait for the encoder instead of leaving frames out. Raises OutputError when there is no
-    encoder, or the folder cannot be made.
+    about. Frames of other sizes than `size`, px, are fitted in; `patient`: none is left out. Raises
+    OutputError when there is no encoder, the folder cannot be made, or `path` is there already.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, patient: bool = False) -> None:

@@ -68,8 +68,7 @@ def holds(condition: ConditionModel, session: Session) -> bool:
 class LessonPlayer:
     """Plays the chapters of a lesson, and then gives the session from before back.
 
-    `number`: which chapter is played, from 0. `state`: ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
-    `answer`: what was answered, from 1. `alone`: nobody is there to answer or to do tasks, as in a film.
+    `alone`: nobody is there to answer or to do tasks, as in a film.
     """
 
     def __init__(
@@ -82,8 +81,9 @@ class LessonPlayer:
         self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
-        self.number, self.state, self.done = 0, "plays", False
-        self.answer: int | None = None
+        self.number, self.done = 0, False
+        self.state = "plays"  # or asks, task, ended, left
+        self.answer: int | None = None  # from 1
         self._waited = 0.0
         self._begin(0)
 
@@ -203,10 +203,7 @@ def _begun(saved: SavedSession) -> Session:
 
 
 def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
-    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter.
-
-    Raises what touches that cannot be raise.
-    """
+    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter."""
     assert saved.lesson is not None
     session = _begun(saved)
     found = []

@@ -18,16 +18,13 @@ _TAKES_ROBOTS = ("hand", "eraser", "failure")  # tools that take hold of a robot
 
 
 class Pointer:
-    """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first.
-
-    `touched` is called when something is pressed on the canvas: a lesson waits.
-    """
+    """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first."""
 
     def __init__(
         self, viewer: Presenter, canvas: ViewerCanvas, chart: Chart, panel: Panel, touched: Callable[[], None]
     ) -> None:
         self._viewer, self._canvas, self._chart, self._panel = viewer, canvas, chart, panel
-        self._interrupt = touched
+        self._interrupt = touched  # a lesson waits
         self.at = (0, 0)
         self._drag = ""
         self._held = self._button = 0

@@ -36,11 +36,7 @@ class RunSaver:
         self._said: list[tuple[str, bool]] = []
 
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
-        """Begin to save the story up to the present in a new folder; return what to tell.
-
-        OutputError when the folder cannot be made; ParameterError where the past is a record, or a controller
-        is not there any more.
-        """
+        """Begin to save the story up to the present in a new folder; raises as `require_document`."""
         session.require_document()
         target = _made(folder, _stem(session, map_name))
         temporary = tempfile.TemporaryDirectory(prefix="robocov-")

@@ -43,11 +43,7 @@ _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan ·
 
 
 class Window(BaseWindow):
-    """Shows a session and lets it be touched.
-
-    `scale`: of text and lines. `patient`: nobody watches: films wait for their encoder instead of leaving
-    frames out. `screen`: of a window that is there already.
-    """
+    """Shows a session and lets it be touched."""
 
     hint = HINT
 
@@ -55,10 +51,10 @@ class Window(BaseWindow):
         self,
         viewer: Presenter,
         size: tuple[int, int],
-        scale: float,
+        scale: float,  # of text and lines
         *,
-        patient: bool = False,
-        screen: pygame.Surface | None = None,
+        patient: bool = False,  # nobody watches: films wait for their encoder instead of leaving frames out
+        screen: pygame.Surface | None = None,  # of a window that is there already
     ) -> None:
         super().__init__(size, screen)
         self.viewer, self.scale = viewer, scale

@@ -22,10 +22,7 @@ MOST_KEPT = 160  # moments of a node that are kept while another branch is shown
 
 @dataclass(eq=False)
 class Node:
-    """One touch, and the time that passed after it until the next.
-
-    What is remembered while another branch is shown can be made again, and is in no file.
-    """
+    """One touch, and the time that passed after it until the next."""
 
     number: int
     parent: "Node | None"
@@ -36,6 +33,7 @@ class Node:
     end: int  # step up to which the run has come
     name: str = ""  # what people call the branch that ends here
     redo: "Node | None" = field(default=None, repr=False)  # the child that was left by undo
+    # the rest is remembered while another branch is shown, can be made again, and is in no file
     kept: list[Moment] = field(default_factory=list, repr=False)
     # by pane and kind
     curves: dict[tuple[int, str], Curve] = field(default_factory=lambda: defaultdict(Curve), repr=False)

@@ -240,10 +240,7 @@ class Trail:
         return self._times[: self._count]
 
     def add(self, time: float, positions: Array, *, always: bool = False) -> None:
-        """Append the (n, 2) m positions at `time`, unless the last are younger than 1 / `RATE`.
-
-        With `always` they are taken in any case; they replace those of the same time.
-        """
+        """Append (n, 2) m positions, unless the last are younger than 1 / `RATE`; `always`: in any case."""
         since = time - self._times[self._count - 1] if self._count else np.inf
         if since < 1e-9 and always:
             self._count -= 1
@@ -298,10 +295,7 @@ def way_of(history: History, pane: int, last: int) -> tuple[Trail, Array]:
 
 
 def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snapshot:
-    """Return a moment as it was, at a time, s; a controller that fails on it decided nothing.
-
-    Messages and noise depend on the control period, `dt`, s.
-    """
+    """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
     setup, team, positions = state.setup, state.setup.team, state.positions
     region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
     sensor.show(time)

@@ -29,11 +29,7 @@ class Happening(NamedTuple):
 
 
 class Lockstep:
-    """Panes that begin as a scenario says; StartError, ParameterError when they cannot.
-
-    `scenario`: with controllers, gains, limits and map as they were last chosen. `step`: since the beginning.
-    `hand`: number of the robot that is dragged, and where to, m.
-    """
+    """Panes that begin as a scenario says; StartError, ParameterError when they cannot."""
 
     def __init__(self, scenario: Scenario) -> None:
         positions = scenario.positions()
@@ -45,8 +41,9 @@ class Lockstep:
             conditions = conditions.of_robots_that_stay()
         numbers = tuple((np.flatnonzero(working) + 1).tolist())
         moving = None if moving is None else moving[working]
-        self.scenario, self.step = scenario, 0
-        self.hand: tuple[int, Point] | None = None
+        self.scenario = scenario  # with controllers, gains, limits and map as they were last chosen
+        self.step = 0
+        self.hand: tuple[int, Point] | None = None  # the robot that is dragged, and where to, m
         self.panes = []
         for number, law in enumerate(scenario.laws):
             setup = PaneSetup(scenario.environment, law, scenario.limits, numbers, {}, conditions)

@@ -71,10 +71,7 @@ def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
 
 
 def obstacle_at(environment: Environment, point: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the number of the obstacle at a point, or else of the nearest within `reach` metres.
-
-    Of several it is the topmost; None if there is none.
-    """
+    """Return the number of the topmost obstacle at a point, else of the nearest within `reach` m, or None."""
     away = shapely.distance([shape.polygon for shape in environment.obstacles], shapely.Point(point))
     if not len(away) or away.min() > reach:
         return None
@@ -82,10 +79,7 @@ def obstacle_at(environment: Environment, point: tuple[float, float], reach: flo
 
 
 def snapped(environment: Environment, point: Point, reach: float) -> Point:
-    """Return the corner within `reach` metres of a point, else the nearest place on a wall, else the point.
-
-    What is drawn from wall to wall then leaves no crack.
-    """
+    """Return the corner within `reach` m of a point, else the nearest place on a wall, else the point."""
     walls = environment.free.boundary
     corners = shapely.get_coordinates(walls)
     away = np.hypot(*(corners - point).T)

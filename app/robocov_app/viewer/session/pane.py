@@ -136,10 +136,7 @@ class Pane:
 def begun(
     setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None, **later: Any
 ) -> Simulation:
-    """Return a simulation that begins so; StartError, ParameterError as `Simulation`.
-
-    `later`: its `steering`, and after how many `steps` it goes on, `resumed`.
-    """
+    """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
     law, steering = setup.law, later.pop("steering", None)
     spec = RunSpec(
         setup.solid, law.name, law.gains,

@@ -102,10 +102,7 @@ def control_dt(record: Record) -> float:
 
 
 def _paced(record: Record) -> Record:
-    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even.
-
-    So do those of the window that are thinned with age.
-    """
+    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even."""
     gap = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
     steps = round(gap / record.dt)
     if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
@@ -193,10 +190,7 @@ def _states_of(record: Record, cast: PaneSetup) -> list[State]:
 
 
 def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
-    """Yield the circumstances of each moment: who worked then, and who had failed.
-
-    What robots had heard no record tells: who goes on from a moment lets them begin with no messages.
-    """
+    """Yield the circumstances of each moment: who worked, and who had failed; messages no record tells."""
     if record.conditions is None:
         yield from [cast] * len(record)
         return
@@ -214,11 +208,7 @@ def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
 
 
 def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
-    """Return what the controller remembered at each moment.
-
-    A record does not tell, but the controller can be asked again. Where it does not decide as it did, it is
-    not what it was: from there on it is to begin anew.
-    """
+    """Return what the controller, asked again, remembers at each moment; None once it decides otherwise."""
     found: list[Any] = []
     with suppress(Exception, SystemExit):  # a user's controller may do anything; a lost one is not there
         controller = law.made()

@@ -144,7 +144,10 @@ def _said(value: Value) -> str:
 
 @dataclass(frozen=True)
 class TeamSpec:
-    """Properties of each robot, as `Team` has them; SI units, infinite for no limit."""
+    """Properties of each robot, as `Team` has them; SI units, infinite for no limit.
+
+    `different`: values of single robots, by parameter and number.
+    """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
@@ -157,7 +160,6 @@ class TeamSpec:
     communication_range: Limit = np.inf
     track_width: Limit = 0.0
     turning_rate: Limit = TURNING_RATE
-    # values of single robots, by parameter and number
     different: Mapping[str, Mapping[int, Limit]] = field(default_factory=dict)
 
     def team(self, robots: int | Sequence[int]) -> Team:
@@ -193,9 +195,11 @@ def _filled(plain: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """Scenario of a run, with a controller for each pane; immutable.
+    """Scenario of a run; immutable.
 
-    `given`, (n, 2) m, `moving`, (n, 2) m/s: starts from elsewhere, as a saved run.
+    `laws`: one for each pane. `start`: named start of the map, its first by default. `seed`: of the starts.
+    `dt`, s: control period. `given`, (n, 2) m, `moving`, (n, 2) m/s: starts from elsewhere, as a saved run.
+    `conditions`: what goes wrong, and when robots fail and join by themselves.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")

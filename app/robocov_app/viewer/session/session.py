@@ -43,8 +43,7 @@ _SLICE = 0.03  # seconds of a frame for making a branch again
 class Session:
     """Session of the window; StartError, ParameterError when the scenario cannot be begun.
 
-    What touches it goes on from the moment that is looked at; what cannot be is refused, and nothing has
-    changed then. `head`: where in the document the present is.
+    What touches it goes on from the moment that is looked at, or is refused, and nothing has changed then.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -76,7 +75,8 @@ class Session:
         self._go_on(head, run, history)
 
     def _go_on(self, head: Node, run: Lockstep, history: History) -> None:
-        self.head, self._run, self.history = head, run, history
+        self.head = head  # where in the document the present is
+        self._run, self.history = run, history
         self.clock.dt = run.scenario.dt
         self._cursor: int | None = None
         self._waited = 0
@@ -306,10 +306,7 @@ class Session:
             self.history.amend(self._run.moment(self.head.number))
 
     def branch(self) -> bool:
-        """Go on from the moment looked at; what came after it stays, as a branch that can be gone back to.
-
-        Return whether there was anything to leave: at the present there is not.
-        """
+        """Go on from the moment looked at, if that is past, and say so; what came after stays as a branch."""
         if self._cursor is None:
             return False
         moment = self.history[self._cursor]
@@ -513,10 +510,7 @@ class Session:
         self.do(changes.Paint(dabs, radius, lowers), "density", words, ("stroke", stroke))
 
     def grab(self, number: int, point: Point) -> None:
-        """Drag a robot towards a point: by a spring while the run goes on, at once while it is paused.
-
-        One that failed comes at once.
-        """
+        """Drag a robot to a point: by a spring while the run goes on; one that failed, or paused, at once."""
         if self.playing and number in self.numbers:
             to = round(float(point[0]), 4), round(float(point[1]), 4)
             self.do(Drag(number, to), "hand", f"robot {number} was dragged", ("hand", number))

@@ -44,10 +44,7 @@ class Workspace:
         self._autosaver.keep(lambda: {"session": content})
 
     def save(self, folder: Path, view: Mapping[str, Any], path: Path | None = None) -> Path:
-        """Write the session to a file, by default its own, or a new one in a folder; return it.
-
-        OutputError when it cannot be written; ParameterError where its past is a record that nothing repeats.
-        """
+        """Write the session to a file, by default its own or a new one; raises as `require_document`."""
         session = self.session
         session.require_document()
         session.stow()
