@@ -16,10 +16,10 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.options import FilmOptions
 from robocov_app.viewer.headless import parts_of, story_frames
-from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.workspace import RunSaver
 
 SMALL = ["--lattice", "16", "--size", "320x240"]
 

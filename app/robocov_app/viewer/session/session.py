@@ -23,11 +23,9 @@ from robocov_app.viewer.session import changes
 from robocov_app.viewer.session import history as past
 from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
-from robocov_app.viewer.session.curves import Curve, Event, Ghost
-from robocov_app.viewer.session.document import Document, Node, replayed
+from robocov_app.viewer.session.document import Document, Lockstep, Node, replayed
 from robocov_app.viewer.session.file import SavedSession
-from robocov_app.viewer.session.history import History, Moment, PaneSetup, State, Trail
-from robocov_app.viewer.session.lockstep import Lockstep
+from robocov_app.viewer.session.history import Curve, Event, Ghost, History, Moment, PaneSetup, State, Trail
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 

@@ -1,12 +1,23 @@
-"""Saved and autosaved state of the open session: no work is lost."""
+"""Saved and autosaved state of the open session, and its runs: no work is lost."""
 
+import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Collection, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from robocov.controllers import CONTROLLERS
+from robocov.errors import OutputError
+from robocov_app.runs.saved import folder_names
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import autosave
+from robocov_app.viewer.session.changes import Restart, SetController
+from robocov_app.viewer.session.document import Document
 from robocov_app.viewer.session.file import SUFFIX, load_session, save_session, session_json, session_of
 from robocov_app.viewer.session.session import Session
 
@@ -81,3 +92,111 @@ def recovered(
 ) -> tuple[Workspace, Mapping[str, Any]]:
     saved = session_of(work.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
+
+
+_ERRORS = "errors.txt"
+
+
+@dataclass
+class _Job:
+    target: Path
+    process: subprocess.Popen[bytes]
+    temporary: tempfile.TemporaryDirectory[str]  # with the session, and what the process says on stderr
+
+
+class RunSaver:
+    """Has runs saved by other processes. No call but `finish` waits for them."""
+
+    def __init__(self, lattice: int) -> None:
+        self._lattice = lattice
+        self._jobs: list[_Job] = []
+        self._said: list[tuple[str, bool]] = []
+
+    def save(self, session: Session, folder: Path, map_name: str = "") -> str:
+        """Begin to save the story up to the present in a new folder; raises as `require_document`."""
+        session.require_document()
+        target = _made(folder, _stem(session, map_name))
+        temporary = tempfile.TemporaryDirectory(prefix="robocov-")
+        file = Path(temporary.name) / f"session{SUFFIX}"
+        save_session(file, session.document, session.head, session.step_now, {})
+        command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
+        command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
+        if own := own_controllers(session.document):
+            command += ["--controller", ",".join(own)]
+        nothing = subprocess.DEVNULL
+        with file.with_name(_ERRORS).open("wb") as errors:
+            process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+        self._jobs.append(_Job(target, process, temporary))
+        return f"saving the run: {target}/"
+
+    def poll(self) -> list[tuple[str, bool]]:
+        """Return what is to be told since the last call, in words, and whether it is trouble."""
+        for job in self._jobs[:]:
+            if job.process.poll() is not None:
+                self._end(job)
+        said, self._said = self._said, []
+        return said
+
+    def finish(self) -> None:
+        try:
+            for k, job in enumerate(self._jobs):
+                try:
+                    job.process.wait(0.5)
+                except subprocess.TimeoutExpired:
+                    if k == 0:
+                        sys.stderr.write("saving runs; Ctrl-C gives up\n")
+                    job.process.wait()
+        except BaseException:
+            for job in self._jobs:
+                job.process.kill()
+                job.process.wait()
+            raise
+        finally:
+            for job in self._jobs[:]:
+                self._end(job)
+
+    def _end(self, job: _Job) -> None:
+        self._jobs.remove(job)
+        with job.temporary as folder:
+            lines = Path(folder, _ERRORS).read_text("utf-8", "replace").strip().splitlines()
+        if job.process.returncode == 0:
+            self._said.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
+            return
+        reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
+        with suppress(OSError):
+            job.target.rmdir()  # fails, as it should, where there is something in it
+        self._said.append((f"run not saved: {job.target}/: {reason}", True))
+
+
+def own_controllers(document: Document) -> list[str]:
+    names: dict[str, None] = {}
+    for node in document.nodes:
+        for change in node.changes:
+            if isinstance(change, Restart):
+                names |= dict.fromkeys(law.name for law in change.scenario.laws)
+            elif isinstance(change, SetController):
+                names[change.law.name] = None
+    return [name for name in names if name not in CONTROLLERS]
+
+
+def _stem(session: Session, map_name: str) -> str:
+    name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
+    laws = [pane.law.name for pane in session.panes]
+    what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
+    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
+    return f"{stem}-{what}"
+
+
+def _made(folder: Path, stem: str) -> Path:
+    """Make a folder that was not there before; OutputError when it cannot be made."""
+    while True:
+        target = free_name(folder, stem, "")
+        try:
+            target.mkdir(parents=True)
+        except FileExistsError:
+            if not target.exists():  # a file stands where a folder is wanted
+                raise OutputError(f"{target}: cannot be made") from None
+        except OSError as error:
+            raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
+        else:
+            return target
