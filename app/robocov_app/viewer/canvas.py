@@ -39,14 +39,12 @@ class ViewerCanvas:
     """Draws the panes of a session, and finds what is under the cursor."""
 
     def __init__(self, viewer: Presenter, theme: Theme) -> None:
-        self.viewer = viewer
-        self.theme = theme
+        self.viewer, self.theme = viewer, theme
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._limit = 1.0
         self._environment: Environment | None = None
-        self._strip: pygame.Surface | None = None
-        self._strip_key: object = None
+        self._strip: tuple[object, pygame.Surface] | None = None
         self._camera: Camera | None = None
         self._rows: tuple[object, int] = (None, 1)
         self.hovered = -1, -1  # pane and number of the robot under the cursor
@@ -77,17 +75,15 @@ class ViewerCanvas:
         pane = self.pane_at(at) or 0
         left, top, _, _ = self.layout.panes[pane]
         camera = self._painters[pane].camera
-        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
-        whole = max(high_x - low_x, high_y - low_y)
+        whole = np.ptp(np.reshape(self.viewer.session.environment.region.bounds, (2, 2)), axis=0).max()
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
         self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
         camera = self._painters[0].camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
-        x = float(np.clip(camera.center[0], low_x, high_x))
-        y = float(np.clip(camera.center[1], low_y, high_y))
+        bounds = np.reshape(self.viewer.session.environment.region.bounds, (2, 2))
+        x, y = np.clip(camera.center, *bounds).tolist()
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
@@ -211,8 +207,7 @@ class ViewerCanvas:
                 radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
                 center = canvas.camera.to_pixels(positions[row]).tolist()
                 canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
-        preview = self.viewer.tool.preview(self.viewer.session)
-        if preview is not None:
+        if (preview := self.viewer.tool.preview(self.viewer.session)) is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
 
@@ -258,14 +253,14 @@ class ViewerCanvas:
         x, y, wide, high = self.layout.legend
         entries = self._legend_entries()
         key = (tuple(entry.key() for entry in entries), wide, theme.name, scale)
-        if self._strip is None or self._strip_key != key:
+        if self._strip is None or self._strip[0] != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
             camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
             canvas = Canvas(page, camera, theme, scale, robot_hues(1), shown)
             page.blit(legend_strip(entries, canvas), (0, 0))
-            self._strip, self._strip_key = page, key
-        screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))
+            self._strip = key, page
+        screen.blit(self._strip[1], (x, y), pygame.Rect(0, 0, wide, high))
 
     def shared_rows(self) -> int:
         if len(self._scenes) < 2:

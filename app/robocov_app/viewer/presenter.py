@@ -127,8 +127,7 @@ class Presenter:
         session = self.session
         session.stop_when_settled = not session.stop_when_settled
         if session.stop_when_settled:
-            session.playing = True
-            session.settled = False
+            session.playing, session.settled = True, False
             self.say("plays until the team has settled")
 
     def restart(self, **changes: object) -> None:
@@ -188,8 +187,7 @@ class Presenter:
 
     def add_pane(self) -> None:
         there = {pane.law.name for pane in self.session.panes}
-        name = next((name for name in self.laws if name not in there), self.laws[0])
-        self.session.add_pane(ControllerChoice(name))
+        self.session.add_pane(ControllerChoice(next((n for n in self.laws if n not in there), self.laws[0])))
         self.active = len(self.session.panes) - 1
         self.say("all begin anew, from the same starts")
 

@@ -1,6 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from math import dist
 from pathlib import Path
@@ -40,11 +40,9 @@ _TAKES_ROBOTS = ("hand", "eraser", "failure")  # tools that take hold of a robot
 class Pointer:
     """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first."""
 
-    def __init__(
-        self, viewer: Presenter, canvas: ViewerCanvas, chart: Chart, panel: Panel, touched: Callable[[], None]
-    ) -> None:
-        self._viewer, self._canvas, self._chart, self._panel = viewer, canvas, chart, panel
-        self._interrupt = touched  # a lesson waits
+    def __init__(self, window: "Window") -> None:
+        self._viewer, self._canvas, self._chart = window.viewer, window.canvas, window.chart
+        self._panel, self._interrupt = window.panel, window.leave_lesson
         self.at = (0, 0)
         self._drag = ""
         self._held = self._button = 0
@@ -221,7 +219,7 @@ class Window(BaseWindow):
         listed = [*viewer_commands(viewer, self.titles), *self._own_commands()]
         self.commands = Commands(listed, viewer.attempt, lambda: parameter_commands(viewer))
         self.panel = Panel(viewer, self.titles, self.commands, self.do)
-        self.pointer = Pointer(viewer, self.canvas, self.chart, self.panel, self._leave_lesson)
+        self.pointer = Pointer(self)
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._reported: tuple[object, float] = None, 0.0
@@ -378,7 +376,7 @@ class Window(BaseWindow):
         if name == "cancel" and self._end_tour():
             return
         if name not in _GOES_ON_WITH:
-            self._leave_lesson()
+            self.leave_lesson()
         if name == "cancel" and self.help:
             self.help = False
             return
@@ -503,7 +501,7 @@ class Window(BaseWindow):
         """The lesson, where it has the place of the panel."""
         return self.tour if self.tour is not None and self.tour.state != "left" else None
 
-    def _leave_lesson(self) -> None:
+    def leave_lesson(self) -> None:
         if self.tour is not None:
             self.tour.leave()
 

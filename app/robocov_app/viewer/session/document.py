@@ -183,11 +183,6 @@ class Node:
             if change.step == run.step and not isinstance(change, Restart):
                 run.apply(change)
 
-    def keep(self, moments: list[Moment]) -> None:
-        """Remember some of the moments, the last among them."""
-        stride = -(-len(moments) // MOST_KEPT)
-        self.kept = moments[-1::-stride][::-1] if moments else []
-
 
 class Branch(NamedTuple):
     """A story that can be gone back to, up to a node after which nothing else was done; with its name."""

@@ -23,7 +23,7 @@ from robocov_app.viewer.session import changes
 from robocov_app.viewer.session import history as past
 from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
-from robocov_app.viewer.session.document import Document, Lockstep, Node, replayed
+from robocov_app.viewer.session.document import MOST_KEPT, Document, Lockstep, Node, replayed
 from robocov_app.viewer.session.file import SavedSession
 from robocov_app.viewer.session.history import Curve, Event, Ghost, History, Moment, PaneSetup, State, Trail
 from robocov_app.viewer.session.pane import Pane
@@ -392,7 +392,8 @@ class Session:
         for node, after in zip(path, [*path[1:], None], strict=True):
             now = moments.get(node.number, [])
             later = node.kept if after is None or not now else []
-            node.keep([*now, *(each for each in later if each.step > self._run.step)])
+            kept = [*now, *(each for each in later if each.step > self._run.step)]
+            node.kept = kept[:: -max(-(-len(kept) // MOST_KEPT), 1)][::-1]  # the last among them
             for pane in self.panes:
                 node.controllers[pane.number] = pane.law
                 for what, curve in pane.curves.items():
