@@ -14,11 +14,11 @@ from robocov_app.terminal.output import free_name
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
-from robocov_app.viewer.session.file import SUFFIX
+from robocov_app.viewer.session.file import SUFFIX, load_session
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace, offer, opened, recoverable, recovered
+from robocov_app.viewer.session.workspace import Workspace, offer, recoverable, recovered
 from robocov_app.viewer.tools import Brush, Hand, Tool, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
@@ -271,7 +271,8 @@ class Presenter:
         self.recent = [name, *(each for each in self.recent if each != name)][:_RECENT]
 
     def open_session(self, path: Path) -> None:
-        self._take(*opened(path, self.laws, self._kept_in))
+        saved = load_session(path, self.laws)
+        self._take(Workspace(Session.opened(saved), self._kept_in, path), saved.view)
         self._note_recent(path)
         self.say(f"session opened: {path}")
 

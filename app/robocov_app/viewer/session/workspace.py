@@ -18,7 +18,7 @@ from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import autosave
 from robocov_app.viewer.session.changes import Restart, SetController
 from robocov_app.viewer.session.document import Document
-from robocov_app.viewer.session.file import SUFFIX, load_session, save_session, session_json, session_of
+from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
 from robocov_app.viewer.session.session import Session
 
 KIND = "robocov-session-draft"
@@ -67,14 +67,6 @@ class Workspace:
 
     def close(self) -> None:
         self._autosaver.close(discard=not self.unsaved)
-
-
-def opened(
-    path: Path, controllers: Collection[str], folder: Path | None
-) -> tuple[Workspace, Mapping[str, Any]]:
-    """Return a session from its file, and what is shown of it; MapError, InputError as `load_session`."""
-    saved = load_session(path, controllers)
-    return Workspace(Session.opened(saved), folder, path), saved.view
 
 
 def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
