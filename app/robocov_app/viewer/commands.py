@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
@@ -18,7 +18,7 @@ GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "S
 
 _LAYER_KEYS = {
     **{
-        f"{modifier}{key}": name
+        name: f"{modifier}{key}"
         for modifier, names in {
             "": "cells centroids trajectories velocities force_attraction force_repulsion_robots "
             "force_repulsion_obstacle force_viscosity force_resultant links",
@@ -28,7 +28,7 @@ _LAYER_KEYS = {
         }.items()
         for key, name in zip("1234567890", names.split(), strict=True)
     },
-    "alt+d": "density",
+    "density": "alt+d",
 }
 
 _TOOLS = {"v": "hand", "p": "polygon", "w": "wall", "c": "circle", "g": "brush", "x": "eraser"}
@@ -88,9 +88,6 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     law = Takes("controller", options=lambda: viewer.laws)
     ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
 
-    def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
-        return Row(name, title, run, takes=takes)
-
     def tool_row(tool: Tool) -> Row:
         run = partial(viewer.take_tool, tool.name)
         return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
@@ -101,7 +98,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def layer_row(name: str) -> Row:
         return Row(f"layer:{name}", titles[name], partial(switch, name), keys.get(name, ""))
 
-    keys = {name: key for key, name in _LAYER_KEYS.items()}
+    keys = _LAYER_KEYS
     layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
     groups: dict[str, Iterable[Row]] = {
         "Run": [
@@ -117,11 +114,11 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("fewer", "One robot fewer, from the start", partial(more, -1), "shift+-", REPEATS),
             Row("map:next", "Next map", lambda: viewer.next_map(1), "page down"),
             Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
-            taking("robots", "Number of robots", lambda n: viewer.restart(robots=n), _whole("robots")),
-            taking("seed", "Seed", lambda n: viewer.restart(seed=n), _whole("seed")),
-            taking("start", "Start of the map", lambda name: viewer.restart(start=name), start),
-            taking("map", "Open a map", viewer.open_map, Takes("map or file", options=viewer.maps)),
-            taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, lambda: speeds)),
+            Row("robots", "Number of robots", lambda n: viewer.restart(robots=n), takes=_whole("robots")),
+            Row("seed", "Seed", lambda n: viewer.restart(seed=n), takes=_whole("seed")),
+            Row("start", "Start of the map", lambda name: viewer.restart(start=name), takes=start),
+            Row("map", "Open a map", viewer.open_map, takes=Takes("map or file", options=viewer.maps)),
+            Row("speed", "Speed", viewer.set_speed, takes=Takes("factor", _speed, lambda: speeds)),
         ],
         "Time": [
             Row("back", "Back by a moment", lambda: viewer.look_by(-1), "left", REPEATS),
@@ -133,8 +130,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("branch:here", "Go on from the moment shown", viewer.branch, "b"),
             Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
-            taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
-            taking("branch", "Enter a branch", enter, Takes("branch", options=branches)),
+            Row("time", "Go to a time", viewer.look_at, takes=Takes("seconds", partial(_positive, "time"))),
+            Row("branch", "Enter a branch", enter, takes=Takes("branch", options=branches)),
         ],
         "Compare": [
             Row("law", "Next controller in this pane", viewer.next_law, "o"),
@@ -143,7 +140,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
                 "pane:remove", "Remove this pane", lambda: viewer.session.remove_pane(viewer.pane), "shift+k"
             ),
             Row("pane:next", "Next pane", viewer.next_pane, "`"),
-            taking("controller", "Controller", viewer.use_law, law),
+            Row("controller", "Controller", viewer.use_law, takes=law),
         ],
         "Touch": [
             Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
@@ -156,7 +153,7 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("cancel", "Give up; close", viewer.cancel, "escape"),
             Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
             Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
-            taking("robot", "Ask a robot", viewer.ask, _whole("robot", lambda: map(str, viewer.numbers))),
+            Row("robot", "Ask a robot", viewer.ask, takes=_whole("robot", lambda: map(str, viewer.numbers))),
         ],
         "View": [
             Row("theme", "Light or dark", viewer.switch_theme, "t"),
@@ -168,8 +165,8 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
             Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
             Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
-            taking("open", "Open a session", open_session, Takes("file", options=files)),
-            taking("save", "Save the session as", save, Takes("file")),
+            Row("open", "Open a session", open_session, takes=Takes("file", options=files)),
+            Row("save", "Save the session as", save, takes=Takes("file")),
         ],
         "Tools": map(tool_row, viewer.tools.values()),
         "Show": map(layer_row, layers),

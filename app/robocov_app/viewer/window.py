@@ -537,8 +537,11 @@ class Window(BaseWindow):
         elif event.type == pygame.KEYDOWN:
             if self.tour is not None and self.tour.state == "asks" and event.unicode in tuple("1234"):
                 self.tour.reply(int(event.unicode))
-            else:
-                self._press(event)
+            elif not self.panel.take(event):  # a key is for a field first, else for a command
+                if (command := self.commands.of_key(event)) is not None:
+                    self.do(command.name)
+                # the key's letter is still to come, and not meant for the palette
+                self.dialogs.swallow(event.unicode)
         elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif event.type in OF_THE_MOUSE:
@@ -547,12 +550,3 @@ class Window(BaseWindow):
             self.pointer.leave()
         else:
             self.panel.take(event)
-
-    def _press(self, event: pygame.event.Event) -> None:
-        if self.panel.take(event):
-            return
-        command = self.commands.of_key(event)
-        if command is not None:
-            self.do(command.name)
-        # the key's letter is still to come, and not meant for the palette
-        self.dialogs.swallow(event.unicode)

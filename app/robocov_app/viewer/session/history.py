@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from robocov.arrays import Array, IntArray
+from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.conditions.perception import Inbox, Perception
 from robocov.controllers import informed
@@ -169,21 +169,14 @@ class History:
             whole, keep = count // 2, np.ones(count, dtype=bool)
             while whole > 1 and keep.sum() > _KEPT * count:
                 whole //= 2
-                keep = always | (steps % _strides(age, int(age[-1 - whole])) == 0)
+                # of how many steps one is kept: of 1 while recent, of 2, 4, 8 as the age doubles
+                strides = 2 ** np.ceil(np.log2(np.maximum(age / age[-1 - whole], 1.0))).astype(np.intp)
+                keep = always | (steps % strides == 0)
             if keep.sum() <= _KEPT * count:
                 break
         self.moments, self._sizes = list(compress(self.moments, keep)), list(compress(self._sizes, keep))
         self.thinned += count - len(self)
         self._bytes = sum(self._sizes)
-
-
-def _strides(age: IntArray, recent: int) -> IntArray:
-    """Return of how many steps one is kept at ages: 1 while recent, 2, 4, 8 as the age doubles.
-
-    >>> _strides(np.array([0, 100, 101, 200, 201, 401, 801]), 100).tolist()
-    [1, 1, 2, 2, 4, 8, 16]
-    """
-    return np.asarray(2 ** np.ceil(np.log2(np.maximum(age / recent, 1.0))).astype(np.intp))
 
 
 def _changes(before: Moment, after: Moment) -> bool:

@@ -84,7 +84,13 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     session, casts = Session(scenario), list[PaneSetup]()
     for law, roster in zip(laws, rosters, strict=True):
         casts.append(PaneSetup(environment, law, limits, roster.numbers, roster.failed))
-    history = _history_of(records, casts, replace(scenario, laws=tuple(laws)))
+    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
+    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
+    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
+    scenario = replace(scenario, laws=tuple(laws))
+    for k in range(len(first)):
+        now = {pane: each[k] for pane, each in enumerate(states)}
+        history.add(Moment(k * round(first.dt / dt), now, scenario))
     for pane, each in zip(session.panes, saved, strict=True):
         _put(pane, each, history)
     for touched in first.session.get("touched", ()):
@@ -161,17 +167,6 @@ def _standing(law: ControllerChoice) -> ControllerChoice:
     if not isinstance(law, LostController):
         return law
     return _StandIn(law.name, law.gains, law.title, law.reason)
-
-
-def _history_of(records: Sequence[Record], casts: Sequence[PaneSetup], scenario: Scenario) -> History:
-    first, dt = records[0], scenario.dt
-    stride = round(first.dt / dt)
-    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
-    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
-    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
-    for k in range(len(first)):
-        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}, scenario))
-    return history
 
 
 def _states_of(record: Record, cast: PaneSetup) -> list[State]:

@@ -107,7 +107,13 @@ class RunSaver:
     def save(self, session: Session, folder: Path, map_name: str = "") -> str:
         """Begin to save the story up to the present in a new folder; raises as `require_document`."""
         session.require_document()
-        target = _made(folder, _stem(session, map_name))
+        name = (
+            map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
+        )
+        laws = [pane.law.name for pane in session.panes]
+        what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
+        stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
+        target = _made(folder, f"{stem}-{what}")
         temporary = tempfile.TemporaryDirectory(prefix="robocov-")
         file = Path(temporary.name) / f"session{SUFFIX}"
         save_session(file, session.document, session.head, session.step_now, {})
@@ -169,14 +175,6 @@ def own_controllers(document: Document) -> list[str]:
             elif isinstance(change, SetController):
                 names[change.law.name] = None
     return [name for name in names if name not in CONTROLLERS]
-
-
-def _stem(session: Session, map_name: str) -> str:
-    name = map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
-    laws = [pane.law.name for pane in session.panes]
-    what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
-    stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
-    return f"{stem}-{what}"
 
 
 def _made(folder: Path, stem: str) -> Path:
