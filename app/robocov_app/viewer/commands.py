@@ -96,10 +96,9 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
         viewer.shown ^= {layer}
 
     def layer_row(name: str) -> Row:
-        return Row(f"layer:{name}", titles[name], partial(switch, name), keys.get(name, ""))
+        return Row(f"layer:{name}", titles[name], partial(switch, name), _LAYER_KEYS.get(name, ""))
 
-    keys = _LAYER_KEYS
-    layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
+    layers = dict.fromkeys([*(name for name in _LAYER_KEYS if name in titles), *titles])
     groups: dict[str, Iterable[Row]] = {
         "Run": [
             Row("pause", "Play or pause", viewer.pause, "space"),

@@ -260,11 +260,9 @@ class Trail:
 
 def of_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
     """Return positions, (..., n, 2) m, for other robots, by their numbers: nan where one was not there."""
-    found = np.full((*positions.shape[:-2], len(after), 2), np.nan)
-    for row, number in enumerate(after):
-        if number in before:
-            found[..., row, :] = positions[..., before.index(number), :]
-    return found
+    rows = {number: row for row, number in enumerate(before)}
+    found = np.array([rows.get(number, -1) for number in after])
+    return np.where(found[:, None] < 0, np.nan, positions[..., found, :])
 
 
 def way_of(history: History, pane: int, last: int) -> tuple[Trail, Array]:
@@ -327,10 +325,7 @@ def _decision(seen: Observations, state: State) -> Decision:
     return decision if good and np.isfinite(decision.forces).all() else nothing
 
 
-# as many as there are panes, and some more
-
-
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8)  # as many as there are panes, and some more
 def _controller(setup: PaneSetup) -> Controller | None:
     with suppress(ParameterError):  # what a saved run was made with may be gone
         return informed(setup.law.made(), setup.solid.static)

@@ -1,5 +1,6 @@
 """Edits of a map: obstacles drawn, moved and deleted, each a new environment; what cannot be is refused."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -43,10 +44,8 @@ def with_replaced(
         except MapError as error:
             # an obstacle on a start takes that start away, nothing else
             message = str(error).removeprefix("map: ")
-            told = {name: place(("starts", name)) for name in starts}
-            blocked = [
-                name for name, at in told.items() if message.startswith((f"{at}:", f"{at}.", f"{at}["))
-            ]
+            told = {name: re.escape(place(("starts", name))) for name in starts}
+            blocked = [name for name, at in told.items() if re.match(rf"{at}[:.\[]", message)]
             if not blocked:
                 raise MapError(message) from None
             for name in blocked:
@@ -113,7 +112,7 @@ def passage_words(before: Environment, after: Environment, radius: float) -> str
 
 
 def words_for(obstacle: Obstacle) -> str:
-    kind = {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(obstacle)]
+    kind = type(obstacle).__name__.removesuffix("Obstacle").lower()
     return f"{kind} “{obstacle.name}”" if obstacle.name else kind
 
 
@@ -171,7 +170,7 @@ def painted_raster(environment: Environment) -> Raster:
     density = environment.density
     if isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1:
         return density
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    step = max(high_x - low_x, high_y - low_y) / CELLS
-    columns, rows = (max(round(side / step), 2) for side in (high_x - low_x, high_y - low_y))
-    return sampled(density, (low_x, low_y, high_x, high_y), columns, rows)
+    bounds = low_x, low_y, high_x, high_y = environment.region.bounds
+    sides = high_x - low_x, high_y - low_y
+    columns, rows = (max(round(side / (max(sides) / CELLS)), 2) for side in sides)
+    return sampled(density, bounds, columns, rows)
