@@ -195,19 +195,14 @@ def _whole(word: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
 
 
 def _speed(text: str) -> float:
-    if text in ("max", "inf"):
-        return math.inf
-    value = _positive("speed", text)
-    if not 0.01 <= value <= 1000.0:
-        raise ParameterError(f"speed: {text!r}, but a positive number was wanted")
-    return value
+    return math.inf if text in ("max", "inf") else _positive("speed", text, 0.01, 1000.0)
 
 
-def _positive(word: str, text: str) -> float:
+def _positive(word: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
     try:
         value = float(text.rstrip("×x"))
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value >= 0.0):
+    if not low <= value <= high:
         raise ParameterError(f"{word}: {text!r}, but a positive number was wanted")
     return value

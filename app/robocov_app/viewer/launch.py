@@ -136,12 +136,8 @@ class Launcher:
     def _settings_of(self, window: Window, before: Settings) -> Settings:
         """Return how a window looks, but for layers that options showed or hid."""
         viewer, (width, height) = window.viewer, window.windowed or window.screen.get_size()
-        changes = {
-            **{name: getattr(viewer, name) for name in ("theme", "fade", "suggests")},
-            "recent": tuple(viewer.recent),
-            "shown": tuple(sorted(viewer.shown - (self.also - self._usual) | (self.without & self._usual))),
-            "tab": window.panel.tab,
-            "width": min(max(width, 900), 7680),
-            "height": min(max(height, 600), 4320),
-        }
-        return before.model_copy(update=changes)
+        look = {name: getattr(viewer, name) for name in ("theme", "fade", "suggests")}
+        shown = viewer.shown - (self.also - self._usual) | (self.without & self._usual)
+        kept = {"recent": tuple(viewer.recent), "shown": tuple(sorted(shown)), "tab": window.panel.tab}
+        size = {"width": min(max(width, 900), 7680), "height": min(max(height, 600), 4320)}
+        return before.model_copy(update=look | kept | size)

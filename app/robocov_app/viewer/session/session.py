@@ -279,11 +279,10 @@ class Session:
             return False
         before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
         for pane in self.panes:
-            state = before.states.get(pane.number)
-            if state is None or state.setup is not pane.setup:
+            state = before.states[pane.number]
+            if state.setup is not pane.setup:
                 return False
-            moved = np.hypot(*(pane.simulation.positions - state.positions).T)
-            if moved.max(initial=0.0) >= SETTLED_DISTANCE:
+            if np.hypot(*(pane.simulation.positions - state.positions).T).max() >= SETTLED_DISTANCE:
                 return False
         return True
 
@@ -477,7 +476,6 @@ class Session:
         before, change = self.setup(pane).law, changes.SetController(pane.number, law)
         if law == before:
             return
-        law.made()
         if law.name != before.name:
             self.do(change, "law", f"{law.label} takes over")
         else:
