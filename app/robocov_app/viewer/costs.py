@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
+_Sites: TypeAlias = tuple[Sites, Array, Array | None]  # with corners and weights: what all results share
 _INDICES = ("owner", "corner", "last_corner")
 
 
@@ -73,9 +74,8 @@ class Costs:
         """
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
-            self._waiting[pane] = replace(
-                self._map, time=time, positions=np.array(at), point=point, speeds=speeds
-            )
+            asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
+            self._waiting[pane] = asked
 
     def poll(self) -> list[tuple[int, Known]]:
         answers, worker = [], self._worker
@@ -130,14 +130,6 @@ class CostQuestion:
     speeds: Array | None = None
 
 
-class _Sites(NamedTuple):
-    """Shared part of all results on a map."""
-
-    sites: Sites
-    corners: Array
-    weights: Array | None
-
-
 class _Answer(NamedTuple):
     """Answer on its way: sites only where they are others than before."""
 
@@ -165,7 +157,7 @@ class _CostWire(Wire):
 
     def decode(self, answer: _Answer) -> Known | _Sites:
         if answer.sites is not None:
-            self._sites, sites = answer.sites, answer.sites.sites
+            self._sites, sites = answer.sites, answer.sites[0]
             self._lattice = cache(lambda: FieldLattice(sites))
         assert self._sites is not None and self._lattice is not None
         if answer.result is None:
@@ -197,7 +189,7 @@ class CostService:
         answer = _Answer(None)
         if question.positions is not None:
             answer, cost = _evaluated(momentary, question), momentary.at(question.time)
-        sites = None if cost is self._told else _Sites(cost.sites, cost.corners, cost.weights)
+        sites = None if cost is self._told else (cost.sites, cost.corners, cost.weights)
         self._told = cost
         return answer._replace(sites=sites)
 

@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -23,15 +23,8 @@ from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
 SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
+Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
 STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
-
-
-class Happening(NamedTuple):
-    """A robot that failed or joined by itself, as the conditions of the run say."""
-
-    step: int
-    kind: str
-    words: str
 
 
 class Lockstep:
@@ -133,11 +126,11 @@ class Lockstep:
                 place = next(join.place for join in conditions.joins if join.robot == number)
                 x, y = self.scenario.positions()[number - 1].tolist() if place is None else place
                 self.apply(Join(number, (x, y)))
-                yield Happening(self.step, "robot", f"robot {number} joined")
+                yield self.step, "robot", f"robot {number} joined"
         for number in (np.flatnonzero((ends > before) & (ends <= now)) + 1).tolist():
             if self._works(number) and len(self.panes[0].numbers) > 1:
                 self.apply(Fail(number))
-                yield Happening(self.step, "failure", f"robot {number} failed")
+                yield self.step, "failure", f"robot {number} failed"
 
 
 MOST_KEPT = 160  # moments of a node that are kept while another branch is shown

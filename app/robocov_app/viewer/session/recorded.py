@@ -17,7 +17,6 @@ from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov_app.runs.saved import Saved, roster_of
-from robocov_app.viewer.session.document import Happening
 from robocov_app.viewer.session.history import MOST_BYTES, History, Moment, PaneSetup, State
 from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
@@ -95,7 +94,7 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
         _put(pane, each, history)
     for touched in first.session.get("touched", ()):
         words = f"robot {', '.join(map(str, touched['robots']))} was dragged"
-        session.head.happenings.add(Happening(round(touched["to_s"] / dt), "hand", words))
+        session.head.happenings.add((round(touched["to_s"] / dt), "hand", words))
     session.recall(history)
     session.repeatable = all(record.session.get("repeatable", True) for record in records)
     return session
