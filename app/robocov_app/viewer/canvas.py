@@ -64,8 +64,6 @@ class ViewerCanvas:
             self._painters.append(painter)
         self._strip = None
 
-    # cameras
-
     def fit(self) -> None:
         self._camera = None
         for painter in self._painters:
@@ -90,8 +88,6 @@ class ViewerCanvas:
         self._camera = camera
         for painter in self._painters:
             painter.camera = camera.within(painter.camera.view)
-
-    # what is where
 
     def pane_at(self, pixel: tuple[float, float]) -> int | None:
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
@@ -124,8 +120,6 @@ class ViewerCanvas:
             if away <= 9.0 * self.layout.scale:
                 near.append((away, number))
         return min(near, key=lambda each: each[0])[1] if near else None
-
-    # drawing
 
     def draw(self, screen: pygame.Surface) -> None:
         session = self.viewer.session

@@ -23,9 +23,7 @@ from robocov_app.viewer.session.pane import Pane
 LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
 SHORTEST = 10.0  # seconds that the axis shows at least
 REFRESHED = 0.1  # seconds after which growing curves are drawn anew
-
 _GRASP = 6.0  # pixels at scale 1 from a ghost curve within which a click enters its branch
-
 _GLYPHS = dict(
     zip(["obstacle", "robot", "failure", "law", "limits", "hand", "density"], "■+×◆◆●▲", strict=True)
 )
@@ -79,8 +77,6 @@ class Chart:
         self.layout, self.theme = layout, theme
         self._page = None
 
-    # what is plotted
-
     @property
     def plotted(self) -> Plotted:
         return self._wanted if self._timed else DISTANCE
@@ -105,8 +101,6 @@ class Chart:
         best = min(near, default=(np.inf, 0))
         return best[1] if best[0] < _GRASP * self.layout.scale else None
 
-    # where time is
-
     @property
     def _span(self) -> tuple[float, float, float]:
         """Left and right of the axis in pixels of the window, and the time at its end."""
@@ -128,8 +122,6 @@ class Chart:
     def column(self, time: Any) -> Any:
         left, right, end = self._span
         return left + (right - left) * time / end
-
-    # drawing
 
     def draw(self, screen: pygame.Surface) -> None:
         session, layout = self.viewer.session, self.layout

@@ -15,7 +15,6 @@ from robocov_app.viewer.tools import Tool
 
 # headings of the help, in their order
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
-
 _LAYER_KEYS = {
     **{
         name: f"{modifier}{key}"
@@ -30,10 +29,8 @@ _LAYER_KEYS = {
     },
     "density": "alt+d",
 }
-
 _TOOLS = {"v": "hand", "p": "polygon", "w": "wall", "c": "circle", "g": "brush", "x": "eraser"}
 _TOOL_KEYS = {name: key for key, name in {**_TOOLS, "a": "robot", "d": "failure", "m": "ruler"}.items()}
-
 REPEATS = True
 
 

@@ -222,9 +222,6 @@ def _motion(case: _Case, recent: Array | None) -> str:
     return "moving" if ahead and abs(net) > 0.25 * speed**2 / case.strength else "trembling"
 
 
-# in words
-
-
 def _compass(vector: complex) -> str:
     return _WAYS[round(math.atan2(vector.imag, vector.real) / (math.pi / 4)) % 8] if vector else ""
 

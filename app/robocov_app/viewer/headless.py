@@ -43,8 +43,7 @@ from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.pane import Pane
 
-History: TypeAlias = tuple[float, str, CostHistory]
-"""When a part began, s, the name of a controller in it, and its cost."""
+History: TypeAlias = tuple[float, str, CostHistory]  # when a part began, s, a controller's name, its cost
 
 STORY = "story.json"
 STRIP = 30  # height of a film's strip with what was done, px at scale 1

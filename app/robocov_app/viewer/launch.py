@@ -26,7 +26,6 @@ NO_DISPLAY = (
     "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
     "(of a saved run, with --video) renders without, and robocov run needs none"
 )
-
 HEADLESS_FPS = 30  # frames per second of what is rendered without a display
 
 

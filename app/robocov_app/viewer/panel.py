@@ -24,7 +24,6 @@ TABS = ("parameters", "show", "robot", "keep")
 
 # layers without a check box: a picture without them is no use; they have keys all the same
 NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-
 _KEPT = (
     (("Screenshot", "screenshot"), ("Record film", "film")),
     (("Save session", "save:session"), ("Recover…", "recover")),
@@ -34,7 +33,6 @@ _KEPT = (
     (("Keys", "help"), ("Commands…", "palette")),
     (("Lesson", "tour"), ("Full screen", "fullscreen")),
 )
-
 _ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
@@ -64,8 +62,6 @@ class Panel(SidePanel):
         old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
         if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
-
-    # the page
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
@@ -149,8 +145,6 @@ class Panel(SidePanel):
         for tool in self.viewer.tools.values():
             self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.viewer.tool is tool, small=True)
         ui.space(6)
-
-    # pages
 
     def _parameters(self, ui: Ui) -> None:
         found = self.viewer.parameters()

@@ -11,7 +11,6 @@ from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
 SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
 _END = 0.985  # from here on a slider says "no limit" where there may be none
-
 _KINEMATIC = "kinematic limit, the same for every controller"
 _SENSES = "how far the range sensor sees obstacles, from the robot's centre"
 _KINDS = "a point moves in any direction, a unicycle has two driven wheels and has to turn"

@@ -59,8 +59,6 @@ class Presenter:
         self.workspace = Workspace(session, kept_in, file)
         self.look_at_map()
 
-    # what there is
-
     @property
     def numbers(self) -> list[int]:
         return self.session.setup(self.pane).there
@@ -80,8 +78,6 @@ class Presenter:
 
     def maps(self) -> list[str]:
         return list(dict.fromkeys([*bundled_maps(), *([self.map_name] if self.map_name else [])]))
-
-    # messages
 
     def say(self, words: str, *, trouble: bool = False) -> None:
         if words:
@@ -111,8 +107,6 @@ class Presenter:
         if environment is not self._mapped and not self.tool.painting:
             self._mapped = environment
             self.costs.environment(environment)
-
-    # doing
 
     def take_tool(self, name: str) -> None:
         self.tool.cancel(self.session)

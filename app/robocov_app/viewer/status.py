@@ -5,7 +5,6 @@ from robocov_app.viewer.session.clock import speed_words
 
 HINT = "Space pause · F1 keys"
 _SLOW = 30.0  # frames per second
-
 _OFFERED = (  # kinds of touches of the document, and the words for each
     ("obstacle", "draw a wall in a doorway (W)"),
     ("hand", "drag a robot"),

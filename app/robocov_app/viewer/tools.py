@@ -17,7 +17,6 @@ from robocov_app.viewer.session.session import Session
 
 SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
 WALL_WIDTH = 0.1  # of drawn walls, m
-
 _SPACING = 0.25  # radii from one dab of the brush to the next
 _PAUSE = 0.08  # seconds between two times that the robots get to know of what is being painted
 _RING = 48  # corners of the circle that shows the brush's size

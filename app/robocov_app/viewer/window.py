@@ -183,7 +183,6 @@ class Pointer:
 
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
-
 _GOES_ON_WITH = {  # commands that do not leave the lesson
     *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
     *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot", "tour"),
@@ -227,8 +226,6 @@ class Window(BaseWindow):
         self._answers, self._serial = 0, -1
         self._arrange()
         self.draw()
-
-    # frames
 
     def close(self) -> None:
         if self.film is not None:
@@ -366,8 +363,6 @@ class Window(BaseWindow):
         if panel.report is None or (shown != before and self._now - at >= _ASKED_AGAIN):
             self._reported = shown, self._now
             panel.report = report_on(self.viewer, number)
-
-    # doing
 
     def do(self, name: str) -> None:
         if self._lesson is not None and name in ("back", "forward"):
@@ -519,8 +514,6 @@ class Window(BaseWindow):
         film.close()
         left_out = f", {film.left_out} frames left out" if film.left_out else ""
         return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
-
-    # events
 
     def take(self, event: pygame.event.Event) -> None:
         if event.type == pygame.KEYUP:

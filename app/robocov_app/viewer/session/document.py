@@ -23,8 +23,8 @@ from robocov_app.viewer.session.pane import Continuation, Pane, begun, resumed
 from robocov_app.viewer.session.scenario import ControllerChoice, Scenario
 
 SPRING = 60.0  # stiffness, per kg, of the spring between a hand and the robot that it drags, 1/s²
-Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
 STRONGEST = 80.0  # largest pull of the spring, per kg, m/s²
+Happening: TypeAlias = tuple[int, str, str]  # step, kind and words, of robots that fail or join by themselves
 
 
 class Lockstep:

@@ -26,7 +26,6 @@ from robocov_app.viewer.session.document import Document, Node
 from robocov_app.viewer.session.scenario import Coordinate, Text
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
-
 MOST_SAMPLES = 30  # samples of a curve that stand in the file, for each touch
 
 

@@ -22,7 +22,6 @@ from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, 
 from robocov_app.viewer.session.session import Session
 
 KIND = "robocov-session-draft"
-
 _PAUSE = 0.9  # seconds between two copies of a session that goes on
 
 
