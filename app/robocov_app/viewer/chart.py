@@ -128,10 +128,8 @@ class Chart:
         curves = [pane.curves[self.plotted.name] for pane in session.panes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
         panes = tuple(pane.number for pane in session.panes)
-        rest = (
-            *(panes, len(session.events), len(session.ghosts), self._span, self.plotted),
-            *(self.viewer.costs.state, None if session.live else session.time, session.serial),
-        )
+        told = panes, len(session.events), len(session.ghosts), self._span, self.plotted
+        rest = *told, self.viewer.costs.state, None if session.live else session.time, session.serial
         # curves grow sixty times a second, which nobody sees
         old = self.viewer.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):

@@ -43,11 +43,11 @@ class Costs:
         self.known: dict[int, Known] = {}  # by pane, of the map as it is
         self.state = ""  # how far a new map is, or why there is no cost
         self.lattice = lattice  # sites along a side
-        self._worker: Worker[Known | _Sites] = (
-            DirectWorker(CostService(), _CostWire())
-            if direct
-            else LatestWorker("robocov_app.viewer.costs:CostService", "computes the cost", _CostWire)
-        )
+        self._worker: Worker[Known | _Sites] = DirectWorker(CostService(), _CostWire())
+        if not direct:
+            self._worker = LatestWorker(
+                "robocov_app.viewer.costs:CostService", "computes the cost", _CostWire
+            )
         self._map: CostQuestion | None = None
         self._asked: CostQuestion | None = None
         self._number, self._ready = 0, False
@@ -68,10 +68,7 @@ class Costs:
     def ask(
         self, pane: int, time: float, at: Array, point: Array | None = None, speeds: Array | None = None
     ) -> None:
-        """Ask for the cost of (n, 2) m positions, a path from a point and, with (n,) m/s, the mean time.
-
-        What was asked about the pane before and is not yet on its way is forgotten.
-        """
+        """Ask for the cost at (n, 2) m, a path from a point and, with (n,) m/s, the mean time."""
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
             asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)

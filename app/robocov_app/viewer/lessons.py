@@ -23,8 +23,7 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace
 
 FIRST = "lesson-1.robocov"  # the lesson that comes with robocov
-# seconds on the wall after a chapter's end until the next, and for an answer where nobody answers
-READING = 4.0
+READING = 4.0  # seconds on the wall after a chapter's end, and for an answer where nobody answers
 LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
 
 # layers that every chapter shows
@@ -66,17 +65,15 @@ def holds(condition: ConditionModel, session: Session) -> bool:
 
 
 class LessonPlayer:
-    """Plays the chapters of a lesson, and then gives the session from before back.
-
-    `alone`: nobody is there to answer or to do tasks, as in a film.
-    """
+    """Plays the chapters of a lesson, and then gives the session from before back."""
 
     def __init__(
         self, viewer: Presenter, fit: Callable[[], None], saved: SavedSession, *, alone: bool = False
     ) -> None:
         assert saved.lesson is not None
         self.lesson = saved.lesson
-        self._viewer, self._fit, self.alone = viewer, fit, alone
+        self._viewer, self._fit = viewer, fit
+        self.alone = alone  # nobody is there to answer or to do tasks, as in a film
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
         self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget

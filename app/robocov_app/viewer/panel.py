@@ -149,10 +149,9 @@ class Panel(SidePanel):
     def _parameters(self, ui: Ui) -> None:
         found = self.viewer.parameters()
         law = self.viewer.session.setup(self.viewer.pane).law
-        groups = {
-            f"GAINS OF {law.label.upper()}": [each for each in found if not each.name.startswith("team.")],
-            "ROBOTS": [each for each in found if each.name.startswith("team.")],
-        }
+        team = [each for each in found if each.name.startswith("team.")]
+        gains = [each for each in found if each not in team]
+        groups = {f"GAINS OF {law.label.upper()}": gains, "ROBOTS": team}
         with ui.scroll(f"parameters:{law.name}"):
             for title, group in groups.items():
                 if not ui.section(title, key=title.split()[0]):

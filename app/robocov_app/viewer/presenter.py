@@ -238,8 +238,7 @@ class Presenter:
         self.panel = not self.panel
 
     def save_map(self) -> None:
-        stem = Path(self.map_name).stem or "map"
-        target = free_name(self.folder, stem, ".json")
+        target = free_name(self.folder, Path(self.map_name).stem or "map", ".json")
         save_map(self.session.environment, target)
         self.map_name = str(target)
         self.say(f"map saved: {target}")

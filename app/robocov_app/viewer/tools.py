@@ -41,9 +41,7 @@ class Tool:
     there was something to give up.
     """
 
-    name: str = ""
-    title: str = ""
-    hint: str = ""
+    name = title = hint = ""
     painting = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:

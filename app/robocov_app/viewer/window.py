@@ -255,11 +255,9 @@ class Window(BaseWindow):
         at_rest = session.settled and session.live and not session.environment.moves
         if (session.playing and not at_rest) or self.film is not None:
             return None
-        return (
-            *(viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing),
-            *(self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale),
-            tour and (tour.state, tour.number, tour.progress),
-        )
+        told = viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing
+        drawn = self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale
+        return *told, *drawn, tour and (tour.state, tour.number, tour.progress)
 
     def _pass_time(self, seconds: float) -> None:
         viewer, session = self.viewer, self.viewer.session

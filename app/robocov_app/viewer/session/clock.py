@@ -5,8 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-# simulated seconds per second; infinite for as fast as it goes
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)  # simulated seconds per second
 LONGEST_FRAME = 0.1  # longest frame, s: what it took beyond is not made up for
 FRAME_BUDGET = 0.008  # seconds of a frame that go to the steps of the simulation, where people look on
 _PATIENT = 16.0  # speed of "as fast as it goes" where no time runs out
@@ -32,11 +31,7 @@ class Clock:
     _due: float = 0.0
 
     def advance(self, seconds: float, step: Callable[[], bool]) -> int:
-        """Make the steps that are due after so many seconds; return how many were made.
-
-        `step` makes one and says whether to go on. What does not fit into the budget is dropped: the run
-        becomes slower, the window does not.
-        """
+        """Make due steps until one says False; return how many. Those beyond the budget are dropped."""
         speed = _PATIENT if math.isinf(self.speed) and math.isinf(self.budget) else self.speed
         endless, began, made = math.isinf(speed), perf_counter(), 0
         due = self._due + (0.0 if endless else min(seconds, LONGEST_FRAME) * speed)

@@ -66,7 +66,7 @@ class Lockstep:
 
     def advance(self) -> list[Happening]:
         for pane in self.panes:
-            pane.decide()  # a controller that fails does so before any pane has moved on
+            _ = pane.simulation.snapshot  # a controller that fails does so before any pane has moved on
         for pane in self.panes:
             pane.step(self._pull(pane))
         self.step += 1

@@ -316,10 +316,9 @@ def _decision(seen: Observations, state: State) -> Decision:
         if memory is None:
             memory = controller.begin(state.setup.solid.region, state.setup.team)
         decision = controller.decide(seen, memory)
-        good = isinstance(decision, Decision) and all(
-            isinstance(rows, np.ndarray) and rows.shape == seen.positions.shape
-            for rows in (decision.forces, *(() if decision.goals is None else (decision.goals,)))
-        )
+        given = (decision.forces, decision.forces if decision.goals is None else decision.goals)
+        good = isinstance(decision, Decision) and all(isinstance(rows, np.ndarray) for rows in given)
+        good = good and all(rows.shape == seen.positions.shape for rows in given)
     except (Exception, SystemExit):  # a user's controller may do anything
         return nothing
     return decision if good and np.isfinite(decision.forces).all() else nothing
@@ -394,11 +393,9 @@ class Curve:
         self._value.insert(k, value)
 
     def outline(self, most: int) -> list[list[float]]:
-        stride = -(-len(self._time) // most)
-        return [
-            [round(time, 3) for time in self._time[::-stride][::-1]],
-            [float(f"{value:.5g}") for value in self._value[::-stride][::-1]],
-        ]
+        stride = -(-len(self) // most)
+        times, values = self._time[::-stride][::-1], self._value[::-stride][::-1]
+        return [[round(time, 3) for time in times], [float(f"{value:.5g}") for value in values]]
 
     def between(self, begin: float, end: float) -> "Curve":
         first = int(np.searchsorted(self._time, begin - 1e-6))

@@ -31,10 +31,9 @@ _DECIMALS = 3  # of what is painted, so that a map that is saved stays short
 def with_replaced(
     environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
 ) -> Environment:
-    """Return the map with obstacles in the place of `removed` ones from number `first` on.
+    """Return the map, as a file gives it, with obstacles in the place of `removed` ones from a number on.
 
-    It is as a file would give it, without starts that are covered. Raises MapError where it would break a
-    rule; the message is a sentence for people.
+    Starts that are covered go. Raises MapError where it would break a rule, in a sentence for people.
     """
     there, starts = environment.obstacles, dict(environment.starts)
     obstacles = (*there[:first], *added, *there[first + removed :])

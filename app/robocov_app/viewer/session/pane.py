@@ -10,7 +10,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.controllers import remembers
 from robocov.errors import StartError
-from robocov.observation import Decision, Snapshot
+from robocov.observation import Snapshot
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
 from robocov_app.render.scene import Scene, Sensed
@@ -57,10 +57,6 @@ class Pane:
     def row(self, number: int) -> int | None:
         """Return the row of a robot by its number; None where it does not work."""
         return self.numbers.index(number) if number in self.numbers else None
-
-    def decide(self) -> Decision:
-        """Let the controller decide on the present, as the next step will; ParameterError when it fails."""
-        return self.simulation.snapshot.decision
 
     def step(self, pushes: Array | None = None) -> None:
         if self._steps % SENSED_EVERY == 0:

@@ -22,8 +22,7 @@ from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 
-# bytes that the moments of records may take, beside their arrays; of longer ones old moments are thinned
-MOST_OF_RECORDS = 400_000_000
+MOST_OF_RECORDS = 400_000_000  # bytes of moments beside records' arrays; of longer ones old ones are thinned
 _OF_A_MOMENT = 1500  # about how many bytes a moment of one pane takes, beside those arrays
 
 

@@ -1,8 +1,7 @@
 """The session: panes in lockstep with their whole past, every way to touch them, and to take touches back.
 
-What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`;
-the past is looked at through kept moments. Whatever fails leaves everything as it was: a new state is built,
-then taken over.
+What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`,
+the past is kept moments. Whatever fails leaves all as it was: a new state is built, then taken over.
 """
 
 from collections.abc import Iterator
@@ -30,11 +29,9 @@ from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 
 MOST_GHOSTS = 8  # branches whose curves are shown
-# metres from which on a robot counts as pushed out of the way: who leans on something moves in any case
-PUSHED = 5e-3
+PUSHED = 5e-3  # metres from which on a robot counts as pushed: who leans on something moves in any case
 MOST_SENSED = 300  # moments of another branch from which it is found out anew what was sensed
-# seconds of simulation within which changes of a value are one touch, as of a slider that is dragged
-_SLIDE = 1.0
+_SLIDE = 1.0  # seconds of simulation within which changes of a value, as by a slider, are one touch
 _SLICE = 0.03  # seconds of a frame for making a branch again
 
 
@@ -94,8 +91,6 @@ class Session:
         self.serial += 1
         for pane in self.panes:
             pane.trail, _ = past.way_of(history, pane.number, len(history) - 1)
-
-    # what there is
 
     @property
     def scenario(self) -> Scenario:
@@ -217,8 +212,6 @@ class Session:
         values = {number: curve.at(time) for number, curve in curves.items()}
         return time, {number: value for number, value in values.items() if np.isfinite(value)}
 
-    # time
-
     def advance(self, seconds: float) -> int:
         if self._remaking is not None:
             self.remake(_SLICE)
@@ -286,8 +279,6 @@ class Session:
                 return False
         return True
 
-    # branches
-
     def follow(self, node: Node) -> None:
         """Let what was done on the way to a node be done again as time goes by; any other touch ends that."""
         self._script = self.document.path(node)
@@ -311,10 +302,7 @@ class Session:
         return True
 
     def enter(self, node: Node, step: int | None = None) -> None:
-        """Go to a step of a node, its end by default: to what was kept, and from there by simulating again.
-
-        Where that takes long it goes on with every `advance`; until then the present stays as it was.
-        """
+        """Go to a step of a node, its end by default; where simulating takes long, with every `advance`."""
         self.remake()
         self._remaking = self._remade(node, node.end if step is None else step)
         self.remake(np.inf if np.isinf(self.clock.budget) else 4 * _SLICE)
@@ -419,13 +407,8 @@ class Session:
                         found.append(Ghost(law.name, law.words, curve.time, curve.value, what, number))
         return found
 
-    # how it is touched
-
     def do(self, change: Touch, kind: str, words: str, gesture: object = None) -> None:
-        """Carry a change out from the moment looked at, as a touch of its own or a part of the present one.
-
-        Changes of the same `gesture`, not None, without anything else between, are one touch.
-        """
+        """Carry a change out from the moment looked at; changes of one `gesture`, not None, are one touch."""
         self.remake()
         self._script = []
         let_go = False

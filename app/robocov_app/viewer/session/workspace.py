@@ -166,14 +166,10 @@ class RunSaver:
 
 
 def own_controllers(document: Document) -> list[str]:
-    names: dict[str, None] = {}
-    for node in document.nodes:
-        for change in node.changes:
-            if isinstance(change, Restart):
-                names |= dict.fromkeys(law.name for law in change.scenario.laws)
-            elif isinstance(change, SetController):
-                names[change.law.name] = None
-    return [name for name in names if name not in CONTROLLERS]
+    changes = [change for node in document.nodes for change in node.changes]
+    laws = [law for each in changes if isinstance(each, Restart) for law in each.scenario.laws]
+    laws += [each.law for each in changes if isinstance(each, SetController)]
+    return [name for name in dict.fromkeys(law.name for law in laws) if name not in CONTROLLERS]
 
 
 def _made(folder: Path, stem: str) -> Path:
