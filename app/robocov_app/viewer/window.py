@@ -34,6 +34,13 @@ from robocov_app.viewer.session.workspace import RunSaver
 from robocov_app.viewer.status import HINT, facts, suggestion
 from robocov_app.viewer.tools import Brush
 
+_ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
+_PAN = 60  # pixels that a key pans
+_GOES_ON_WITH = {  # commands that do not leave the lesson
+    *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
+    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot", "tour"),
+}
+_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 _TAKES_ROBOTS = ("hand", "eraser", "failure")  # tools that take hold of a robot
 
 
@@ -179,15 +186,6 @@ class Pointer:
     def _place(self, at: tuple[int, int]) -> Point:
         """Return the place under a pixel, m, in the pane in which the button was pressed."""
         return self._canvas.to_world(at, min(self._held, len(self._canvas.layout.panes) - 1))
-
-
-_ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
-_PAN = 60  # pixels that a key pans
-_GOES_ON_WITH = {  # commands that do not leave the lesson
-    *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
-    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot", "tour"),
-}
-_HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
 
 
 class Window(BaseWindow):
