@@ -23,7 +23,7 @@ from robocov_app.report.tables import controllers_table
 from robocov_app.sweep.gains import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
-from robocov_app.viewer.session.scenario import ControllerChoice, branch_words, gain_words
+from robocov_app.viewer.session.scenario import ControllerChoice
 
 STUDY = """
 maps = ["room.json"]
@@ -166,8 +166,8 @@ def test_laws_of_the_window_say_words() -> None:
         ControllerChoice("rapf"),
         ControllerChoice("rapf", {"target": "median", "attraction_limit": None}),
     )
-    assert gain_words(before, after) == "attraction_limit = no limit, target = median"
-    assert branch_words(after) == "RAPF, target median, attraction_limit no limit"
+    assert after.words_since(before) == "attraction_limit = no limit, target = median"
+    assert after.words == "RAPF, target median, attraction_limit no limit"
     with pytest.raises(ParameterError, match="unknown word 'mediam'"):
         before.with_gain("target", "mediam")
 

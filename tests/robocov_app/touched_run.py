@@ -46,7 +46,7 @@ def all_told(session: Session) -> list[object]:
     """Return whatever can be told of a session, so that it can be compared."""
     told: list[object] = [session.scenario, session.hand, session.settled, session.playing, session.serial]
     told += [session.time, session.end, session.live, session.history.steps[:], session.history.thinned]
-    told += [list(map(id, session.history.since(0))), list(session.events), list(session.ghosts)]
+    told += [list(map(id, session.history.moments)), list(session.events), list(session.ghosts)]
     told += [session.head.number, session.head.parent is not None, session.head.redo is not None]
     for pane in session.panes:
         told += [pane.number, pane.setup, pane.time]

@@ -1,7 +1,9 @@
 """The canvas: one painted pane for each controller, one camera for all, and what tools show on top."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pygame
@@ -23,7 +25,7 @@ from robocov_app.render.theme import Theme, mix, robot_hues
 from robocov_app.toolkit.layout import Layout, inside
 from robocov_app.toolkit.overlay import tag
 from robocov_app.viewer.presenter import FADE, Presenter
-from robocov_app.viewer.session.curves import TIME, compared
+from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.tools import Preview
 
@@ -37,21 +39,17 @@ class ViewerCanvas:
     """Draws the panes of a session, and finds what is under the cursor."""
 
     def __init__(self, viewer: Presenter, theme: Theme) -> None:
-        self.viewer = viewer
-        self.theme = theme
+        self.viewer, self.theme = viewer, theme
         self._painters: list[Painter] = []
         self._scenes: list[Scene] = []
         self._limit = 1.0
         self._environment: Environment | None = None
-        self._strip: pygame.Surface | None = None
-        self._strip_key: object = None
+        self._strip: tuple[object, pygame.Surface] | None = None
         self._camera: Camera | None = None
         self._rows: tuple[object, int] = (None, 1)
-        self.hovered = -1, -1
-        """Pane and number of the robot under the cursor."""
+        self.hovered = -1, -1  # pane and number of the robot under the cursor
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Make the painters fit the layout and the theme."""
         self.layout, self.theme = layout, theme
         self._environment = self.viewer.session.environment
         several = len(layout.panes) > 1
@@ -66,31 +64,24 @@ class ViewerCanvas:
             self._painters.append(painter)
         self._strip = None
 
-    # cameras
-
     def fit(self) -> None:
-        """Show the whole map."""
         self._camera = None
         for painter in self._painters:
             painter.fit()
 
     def zoom(self, factor: float, at: tuple[float, float]) -> None:
-        """Magnify what is under a pixel of the window, in all panes."""
         pane = self.pane_at(at) or 0
         left, top, _, _ = self.layout.panes[pane]
         camera = self._painters[pane].camera
-        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
-        whole = max(high_x - low_x, high_y - low_y)
+        whole = np.ptp(np.reshape(self.viewer.session.environment.region.bounds, (2, 2)), axis=0).max()
         # neither a dot nor a single wall's paint
         factor = float(np.clip(camera.zoom * factor, 20.0 / whole, 2e4)) / camera.zoom
         self._look(camera.zoomed(factor, (at[0] - left, at[1] - top)))
 
     def pan(self, dx: float, dy: float) -> None:
-        """Move all cameras by so many pixels."""
         camera = self._painters[0].camera.panned(dx, dy)
-        low_x, low_y, high_x, high_y = self.viewer.session.environment.region.bounds
-        x = float(np.clip(camera.center[0], low_x, high_x))
-        y = float(np.clip(camera.center[1], low_y, high_y))
+        bounds = np.reshape(self.viewer.session.environment.region.bounds, (2, 2))
+        x, y = np.clip(camera.center, *bounds).tolist()
         self._look(replace(camera, center=(x, y)))
 
     def _look(self, camera: Camera) -> None:
@@ -98,51 +89,39 @@ class ViewerCanvas:
         for painter in self._painters:
             painter.camera = camera.within(painter.camera.view)
 
-    # what is where
-
     def pane_at(self, pixel: tuple[float, float]) -> int | None:
-        """Return the pane under a pixel of the window."""
         return next((pane for pane, box in enumerate(self.layout.panes) if inside(box, pixel)), None)
 
     def to_world(self, pixel: tuple[float, float], pane: int) -> Point:
-        """Return the place under a pixel of the window, m."""
         left, top, _, _ = self.layout.panes[pane]
         place = np.array([pixel[0] - left, pixel[1] - top])
         x, y = self._painters[pane].camera.to_world(place).tolist()
         return x, y
 
     def to_pixel(self, point: Point, pane: int = 0) -> tuple[float, float]:
-        """Return the pixel of the window where a place is."""
         left, top, _, _ = self.layout.panes[pane]
         x, y = self._painters[pane].camera.to_pixels(np.array(point)).tolist()
         return x + left, y + top
 
     def reach(self, pane: int) -> float:
-        """Return how many metres a finger is wide."""
         return _REACH * self.layout.scale / self._painters[pane].camera.zoom
 
     def robot_at(self, pixel: tuple[float, float], pane: int) -> int | None:
-        """Return the number of the robot that is drawn under a pixel, also of one that failed."""
         if pane >= len(self._scenes):
             return None
         scene = self._scenes[pane]
         canvas = self._canvas(pygame.Surface((1, 1)), pane, scene)
         point = np.array(self.to_world(pixel, pane))
-        near: list[tuple[float, int]] = []
-        if scene.snapshot is not None:
-            far = np.hypot(*(scene.snapshot.positions - point).T) * canvas.camera.zoom
-            radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
-            near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
+        far = np.hypot(*(scene.now.positions - point).T) * canvas.camera.zoom
+        radii = np.array(drawn_radii(canvas, scene)) + 3.0 * self.layout.scale
+        near = [(float(far[row]), scene.number(row)) for row in np.flatnonzero(far <= radii).tolist()]
         for number, place in scene.failed.items():
             away = float(np.hypot(*(np.array(place) - point))) * canvas.camera.zoom
             if away <= 9.0 * self.layout.scale:
                 near.append((away, number))
         return min(near, key=lambda each: each[0])[1] if near else None
 
-    # drawing
-
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw all panes."""
         session = self.viewer.session
         if session.environment is not self._environment:
             before, self._environment = self._environment, session.environment
@@ -151,93 +130,64 @@ class ViewerCanvas:
             if before is not None and before.region.bounds != session.environment.region.bounds:
                 self.fit()
         self._scenes = []
-        for k, (pane, box) in enumerate(zip(session.panes, self.layout.panes, strict=False)):
-            painter = self._painters[k]
-            painter.visible = set(self.viewer.shown)
-            painter.visible |= {"caption"} & {layer.name for layer in painter.layers}
-            scene = self._scene(pane, painter)
-            self._scenes.append(scene)
-            surface = screen.subsurface(pygame.Rect(box))
+        for pane, painter, box in zip(session.panes, self._painters, self.layout.panes, strict=False):
+            painter.visible = self.viewer.shown | ({"caption"} & {layer.name for layer in painter.layers})
+            scene, surface = self._scene(pane, painter), screen.subsurface(pygame.Rect(box))
             painter.draw(surface, scene)
-            self._draw_tool(surface, k, scene)
+            self._draw_tool(surface, len(self._scenes), scene)
+            self._scenes.append(scene)
         self._draw_frames(screen)
 
     def _scene(self, pane: Pane, painter: Painter) -> Scene:
         viewer, session = self.viewer, self.viewer.session
         setup, snapshot = session.setup(pane), session.snapshot(pane)
-        trail, times = session.trail(pane)
-        team = pane.simulation.team if session.live else setup.team
-        numbers, failed = setup.numbers, setup.failed
         known, field = viewer.costs.known.get(pane.number), None
         if known is not None and painter.needs_field:
-            field = known.field
-            self._scale_colours(known.field.largest)
+            field, largest = known.field, known.field.largest
+            # the scale of colours follows what is shown, without trembling
+            if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
+                self._limit = round_limit(1.1 * largest)
+        numbers, scans = setup.numbers, list[tuple[Array, Array]]()
         selected = numbers.index(viewer.selected) if viewer.selected in numbers else None
-        return Scene.of(
-            setup.environment,
-            team,
-            snapshot,
-            starts=pane.starts if len(pane.starts) == len(numbers) else None,
-            trail=trail if len(trail) else None,
-            trail_time=times,
-            trail_fade=FADE if viewer.fade else None,
-            label=setup.law.label,
-            cost=self._caption_cost(pane),
-            field=field,
-            field_limit=self._limit,
-            numbers=numbers,
-            failed=failed,
-            failed_radii={number: setup.limits.radius_of(number) for number in failed},
-            selected=selected,
-            scans=self._scans(pane, snapshot, team.sensing_range, selected) if "scan" in viewer.shown else (),
-            sensed=pane.sensed,
-            path=known.path if known is not None and viewer.cursor is not None else None,
-        )
+        if "scan" in viewer.shown:  # of the robot that is asked about, else of all unless they are many
+            scans = self._scans(
+                pane, setup, snapshot, range(len(numbers)) if selected is None else [selected]
+            )
+        path = known.path if known is not None and viewer.cursor is not None else None
+        look: dict[str, Any] = {"field": field, "field_limit": self._limit, "cost": self._caption_cost(pane)}
+        look |= {"selected": selected, "scans": scans, "sensed": pane.sensed, "path": path}
+        fade = FADE if viewer.fade else None
+        return pane.scene(setup, snapshot, session.trail(pane), trail_fade=fade, **look)
 
     def _caption_cost(self, pane: Pane) -> str:
-        """Return the numbers that the chart shows, with their time where that is not the present's."""
         session = self.viewer.session
-        time, distances = compared(session)
-        _, times = compared(session, TIME)
+        (time, distances), (_, times) = session.compared(), session.compared("time")
         if pane.number not in distances:
             return ""
         what = mean_label(session.setup(pane).environment)
         words = cost_label(what, distances[pane.number], times.get(pane.number))
         return f"{words} at {time:.1f} s" if session.time - time > _OLD else words
 
-    def _scale_colours(self, largest: float) -> None:
-        """Let the scale of colours follow what is shown, without trembling."""
-        if np.isfinite(largest) and not 0.55 * self._limit <= largest <= self._limit:
-            self._limit = round_limit(1.1 * largest)
-
     def _scans(
-        self, pane: Pane, snapshot: Snapshot, ranges: Array, selected: int | None
+        self, pane: Pane, setup: PaneSetup, snapshot: Snapshot, rows: Sequence[int]
     ) -> list[tuple[Array, Array]]:
-        """Return ray scans: of the robot that is asked about, else of all unless they are many."""
-        rows = [selected] if selected is not None else list(range(len(snapshot.positions)))
-        rays = min(RAYS, MOST_RAYS // len(rows))
-        if rays < 24:
+        if (rays := min(RAYS, MOST_RAYS // len(rows))) < 24:
             return []
-        scans = []
-        for row in rows:
-            reach = float(ranges[row]) if np.isfinite(ranges[row]) else FAR_SCAN
-            place = snapshot.positions[row]
-            scans.append((place, pane.simulation.sensor.scan(place, rays, reach)[1]))
-        return scans
+        ranges, places = setup.team.sensing_range, snapshot.positions
+        reach = np.where(np.isfinite(ranges), ranges, FAR_SCAN).tolist()
+        scan = pane.simulation.sensor.scan
+        return [(places[row], scan(places[row], rays, reach[row])[1]) for row in rows]
 
     def _canvas(self, surface: pygame.Surface, pane: int, scene: Scene) -> Canvas:
         camera, hues = self._painters[pane].camera, robot_hues(len(scene.team))
         return Canvas(surface, camera, self.theme, self.layout.scale, hues)
 
     def _draw_tool(self, surface: pygame.Surface, pane: int, scene: Scene) -> None:
-        """Draw what the tool is about to do, the hand's spring, and rings around robots."""
         canvas, ink = self._canvas(surface, pane, scene), self.theme.ink
         surface.set_clip(pygame.Rect([round(x) for x in canvas.camera.view]))
-        numbers = list(scene.numbers or ()) if scene.snapshot is not None else []
-        if self.viewer.session.hand is not None and self.viewer.session.hand[0] in numbers:
-            number, target = self.viewer.session.hand
-            assert scene.snapshot is not None
-            place = scene.snapshot.positions[numbers.index(number)]
+        numbers, positions = list(scene.numbers or ()), scene.now.positions
+        if (hand := self.viewer.session.hand) is not None and hand[0] in numbers:
+            place, target = positions[numbers.index(hand[0])], hand[1]
             begin, end = canvas.camera.to_pixels(np.array([place, target])).tolist()
             canvas.dashes(begin, end, ink, canvas.width(1.5), dash=3.0)
         asked = self.viewer.selected
@@ -248,12 +198,10 @@ class ViewerCanvas:
         if pane == self.hovered[0] and self.hovered[1] in numbers:  # it can be taken hold of
             row = numbers.index(self.hovered[1])
             if row != scene.selected:
-                assert scene.snapshot is not None
                 radius = drawn_radii(canvas, scene)[row] + 3.5 * canvas.scale
-                center = canvas.camera.to_pixels(scene.snapshot.positions[row]).tolist()
+                center = canvas.camera.to_pixels(positions[row]).tolist()
                 canvas.stamp(partial(sprites.ring, radius, ink, 1.2 * canvas.scale), center)
-        preview = self.viewer.tool.preview(self.viewer.session)
-        if preview is not None:
+        if (preview := self.viewer.tool.preview(self.viewer.session)) is not None:
             self._draw_preview(canvas, preview)
         surface.set_clip(None)
 
@@ -287,7 +235,6 @@ class ViewerCanvas:
             tag(surface, preview.words, at, self.theme, canvas.scale)
 
     def _draw_frames(self, screen: pygame.Surface) -> None:
-        """Draw what parts the panes, which of them is chosen, and the legend that they share."""
         if len(self._scenes) < 2:
             return
         scale, theme = self.layout.scale, self.theme
@@ -300,17 +247,16 @@ class ViewerCanvas:
         x, y, wide, high = self.layout.legend
         entries = self._legend_entries()
         key = (tuple(entry.key() for entry in entries), wide, theme.name, scale)
-        if self._strip is None or self._strip_key != key:
+        if self._strip is None or self._strip[0] != key:
             page = pygame.Surface((wide, max(high, 1)), 0, 32)
             page.fill(theme.background)
             camera, shown = self._painters[0].camera, frozenset(self.viewer.shown)
             canvas = Canvas(page, camera, theme, scale, robot_hues(1), shown)
             page.blit(legend_strip(entries, canvas), (0, 0))
-            self._strip, self._strip_key = page, key
-        screen.blit(self._strip, (x, y), pygame.Rect(0, 0, wide, high))
+            self._strip = key, page
+        screen.blit(self._strip[1], (x, y), pygame.Rect(0, 0, wide, high))
 
     def shared_rows(self) -> int:
-        """Return how many rows the shared legend has needed as long as the same is shown."""
         if len(self._scenes) < 2:
             return 0
         kept = self.layout.size, self.layout.scale, len(self.layout.panes), frozenset(self.viewer.shown)
@@ -322,6 +268,5 @@ class ViewerCanvas:
         return rows
 
     def _legend_entries(self) -> list[LegendEntry]:
-        """Return the shared legend: what any of the panes shows."""
         each = zip(self._painters, self._scenes, strict=False)  # a pane that was just added has no scene yet
         return united((painter.legend_entries(scene) for painter, scene in each), LegendEntry.key)

@@ -1,7 +1,8 @@
 """The plot of the cost against time, and the time line below it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pygame
@@ -16,17 +17,13 @@ from robocov_app.render.theme import Colour, Theme, mix
 from robocov_app.toolkit.layout import Box, Layout, inside
 from robocov_app.toolkit.overlay import flat_canvas, tag
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.curves import DISTANCE, TIME, Event, Plotted, chosen, compared
+from robocov_app.viewer.session.history import DISTANCE, TIME, Plotted
 from robocov_app.viewer.session.pane import Pane
 
-LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20
-"""Pixels at scale 1 round the plot."""
-
+LEFT, RIGHT, TOP, BOTTOM = 52, 70, 26, 20  # pixels at scale 1 round the plot
 SHORTEST = 10.0  # seconds that the axis shows at least
 REFRESHED = 0.1  # seconds after which growing curves are drawn anew
-
 _GRASP = 6.0  # pixels at scale 1 from a ghost curve within which a click enters its branch
-
 _GLYPHS = dict(
     zip(["obstacle", "robot", "failure", "law", "limits", "hand", "density"], "■+×◆◆●▲", strict=True)
 )
@@ -74,41 +71,35 @@ class Chart:
         self._wanted = DISTANCE
         self._other: Box | None = None
         self._ghosts: list[tuple[int, Array]] = []
-        self.hover: tuple[int, int] | None = None
-        """Cursor position in the window."""
+        self.hover: tuple[int, int] | None = None  # where the cursor is in the window
 
     def arrange(self, layout: Layout, theme: Theme) -> None:
-        """Take another layout and theme."""
         self.layout, self.theme = layout, theme
         self._page = None
 
-    # what is plotted
-
     @property
     def plotted(self) -> Plotted:
-        """The quantity that is plotted now."""
-        return chosen(self.viewer.session, self._wanted)
+        return self._wanted if self._timed else DISTANCE
+
+    @property
+    def _timed(self) -> bool:
+        return any(len(pane.curves["time"]) for pane in self.viewer.session.panes)
 
     def switch(self) -> str:
-        """Plot the other quantity, if there are two."""
         wanted = TIME if self.plotted is DISTANCE else DISTANCE
-        if wanted is TIME and chosen(self.viewer.session, TIME) is not TIME:
+        if wanted is TIME and not self._timed:
             return "all robots are equally fast: the mean time goes as the mean distance"
         self._wanted, self._page = wanted, None
         return f"plotted: {wanted.title[:1].lower()}{wanted.title[1:]}"
 
     def offers(self, at: tuple[int, int]) -> bool:
-        """Return whether the name of the other quantity is at a pixel of the window."""
         return self._other is not None and inside(self._other, at)
 
     def ghost_at(self, at: tuple[int, int]) -> int | None:
-        """Return the node of the document whose branch has a ghost curve at a pixel of the window."""
         at = at[0], at[1] - self.layout.chart[1]
         near = [(float(np.hypot(*(points - at).T).min()), node) for node, points in self._ghosts]
         best = min(near, default=(np.inf, 0))
         return best[1] if best[0] < _GRASP * self.layout.scale else None
-
-    # where time is
 
     @property
     def _span(self) -> tuple[float, float, float]:
@@ -124,28 +115,21 @@ class Chart:
         return left + LEFT * scale, left + width - beside, end
 
     def time_at(self, x: float) -> float:
-        """Return the time at a pixel's column, s, within the run."""
         left, right, end = self._span
         time = (x - left) / max(right - left, 1.0) * end
         return float(np.clip(time, 0.0, self.viewer.session.end))
 
-    def column(self, time: float) -> float:
-        """Return the pixel's column of a time."""
+    def column(self, time: Any) -> Any:
         left, right, end = self._span
         return left + (right - left) * time / end
 
-    # drawing
-
     def draw(self, screen: pygame.Surface) -> None:
-        """Draw both."""
         session, layout = self.viewer.session, self.layout
         curves = [pane.curves[self.plotted.name] for pane in session.panes]
         samples = [(len(curve), curve.last_time, curve.at(np.inf)) for curve in curves]
         panes = tuple(pane.number for pane in session.panes)
-        rest = (
-            *(panes, len(session.events), len(session.ghosts), self._span, self.plotted),
-            *(self.viewer.costs.state, None if session.live else session.time, session.serial),
-        )
+        told = panes, len(session.events), len(session.ghosts), self._span, self.plotted
+        rest = *told, self.viewer.costs.state, None if session.live else session.time, session.serial
         # curves grow sixty times a second, which nobody sees
         old = self.viewer.now - self._drawn_at >= REFRESHED
         if self._page is None or rest != self._key or (old and samples != self._samples):
@@ -159,19 +143,6 @@ class Chart:
         self._values(screen)
         self._cursor(screen)
         self._hovered(screen)
-
-    def _note(
-        self,
-        canvas: Canvas,
-        words: str,
-        at: tuple[float, float],
-        anchor: str = "left",
-        colour: Colour | None = None,
-        *,
-        bold: bool = False,
-    ) -> None:
-        colour = colour or self.theme.faint
-        canvas.text(words, at, anchor=anchor, colour=colour, bold=bold, size=self.theme.small_text)
 
     def _plot(self, canvas: Canvas) -> None:
         theme, scale, session, what = self.theme, self.layout.scale, self.viewer.session, self.plotted
@@ -193,23 +164,30 @@ class Chart:
         low, high, step = value_axis(float(some.min()), float(some.max()))
 
         def place(time: Array, value: Array) -> Array:
-            x = left + (right - left) * time / end
-            return np.column_stack([x, bottom - (bottom - top) * (value - low) / (high - low)])
+            return np.column_stack(
+                [self.column(time), bottom - (bottom - top) * (value - low) / (high - low)]
+            )
 
-        self._place = place
+        self._place, note = place, partial(canvas.text, size=theme.small_text, colour=theme.faint)
         for mark in np.arange(low, high, step):
             y = bottom - (bottom - top) * (mark - low) / (high - low)
             line = pygame.Rect(round(left), round(y), round(right - left), 1)
             canvas.surface.fill(mix(theme.panel, theme.ink, 0.12), line)
-            self._note(canvas, f"{mark:.6g}", (left - 7 * scale, y), "right")
+            note(f"{mark:.6g}", (left - 7 * scale, y), anchor="right")
         for mark in np.arange(0.0, end + 1e-9, max(round_length(end / 6.0), 1.0)):
-            x = left + (right - left) * mark / end
-            self._note(canvas, f"{mark:g} s", (x, height - 0.5 * BOTTOM * scale), "middle")
+            note(f"{mark:g} s", (self.column(mark), height - 0.5 * BOTTOM * scale), anchor="middle")
         for event in session.events:
-            x = round(left + (right - left) * event.time / end)
-            line = pygame.Rect(x, round(top), 1, round(bottom - top))
-            canvas.surface.fill(mix(theme.panel, theme.ink, 0.3), line)
-        self._event_words(canvas, list(session.events), left, right, end, top)
+            self._rule(canvas.surface, self.column(event.time), mix(theme.panel, theme.ink, 0.3), 0)
+        free = left
+        for event in session.events:  # in words where there is room
+            x, glyph = self.column(event.time), _GLYPHS.get(event.kind, "•")
+            words = f"{glyph} {event.text}"
+            wide = canvas.text_width(words, theme.small_text)
+            if x + wide > right:
+                words, wide = glyph, round(8 * scale)
+            if x >= free:
+                note(words, (x + 3 * scale, top + 6 * scale))
+                free = x + wide + 8 * scale
         self._ghosts = [(ghost.node, place(ghost.time, ghost.value)) for ghost in ghosts]
         for ghost, (_, points) in zip(ghosts, self._ghosts, strict=True):
             colour = mix(theme.panel, theme.controller(ghost.law), 0.45)
@@ -218,52 +196,33 @@ class Chart:
                     canvas.line(points[k].tolist(), points[k + 1].tolist(), colour)
             if len(points):
                 x = max(points[-1][0] - 4 * scale, left + canvas.text_width(ghost.words, theme.small_text))
-                self._note(canvas, ghost.words, (x, points[-1][1] - 9 * scale), "right", colour)
+                note(ghost.words, (x, points[-1][1] - 9 * scale), anchor="right", colour=colour)
+        colours = curve_colours(session.panes, theme)
         for pane in session.panes:
             curve = pane.curves[what.name]
             points = _thinned(place(curve.time, curve.value))
             if len(points) > 1:
                 ends = np.hstack([points[:-1], points[1:]])
-                canvas.segments(ends, curve_colour(self.viewer, theme, pane), canvas.width(1.8))
+                canvas.segments(ends, colours[pane.number], canvas.width(1.8))
 
     def _offer(self, canvas: Canvas, left: float) -> None:
         """Name the other quantity beside the title, where there are two: a click plots it."""
         self._other = None
-        if chosen(self.viewer.session, TIME) is DISTANCE:
+        if not self._timed:
             return
-        scale, words = self.layout.scale, f"{(DISTANCE if self.plotted is TIME else TIME).short} ›"
-        left += 16 * scale
-        self._note(canvas, words, (left, 0.5 * TOP * scale))
-        x, y, _, _ = self.layout.chart
-        wide = canvas.text_width(words, self.theme.small_text)
+        scale, size = self.layout.scale, self.theme.small_text
+        words, left = f"{(DISTANCE if self.plotted is TIME else TIME).short} ›", left + 16 * scale
+        canvas.text(words, (left, 0.5 * TOP * scale), colour=self.theme.faint, size=size)
+        (x, y, _, _), wide = self.layout.chart, canvas.text_width(words, size)
         self._other = round(x + left - 6 * scale), y, round(wide + 12 * scale), round(TOP * scale)
 
-    def _event_words(
-        self, canvas: Canvas, events: list[Event], left: float, right: float, end: float, top: float
-    ) -> None:
-        """Write what happened beside its line, where there is room."""
-        scale, free = self.layout.scale, left
-        for event in events:
-            x = left + (right - left) * event.time / end
-            words = f"{_GLYPHS.get(event.kind, '•')} {event.text}"
-            wide = canvas.text_width(words, self.theme.small_text)
-            if x < free or x + wide > right:
-                words, wide = _GLYPHS.get(event.kind, "•"), round(8 * scale)
-                if x < free:
-                    continue
-            self._note(canvas, words, (x + 3 * scale, top + 6 * scale))
-            free = x + wide + 8 * scale
-
     def _values(self, screen: pygame.Surface) -> None:
-        """Write each pane's value at the right, with the gap to the best; none over another.
-
-        They are those of the captions, which are newer than a page that is drawn ten times a second.
-        """
+        """Write the captions' values, newer than the page, at the right, with the gaps; none over another."""
         session, theme, scale = self.viewer.session, self.theme, self.layout.scale
         chart = screen.subsurface(pygame.Rect(self.layout.chart).clip(screen.get_rect()))
         canvas = flat_canvas(chart, theme, scale)
-        _, right, _ = self._span
-        time, known = compared(session, self.plotted)
+        (_, right, _), colours = self._span, curve_colours(session.panes, theme)
+        time, known = session.compared(self.plotted.name)
         if not known:
             return
         best = min(known.values())
@@ -280,11 +239,10 @@ class Chart:
                 room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
                 name = shortened(pane.law.label, canvas.text_size(theme.small_text), room, True)
                 words = f"{name}  {words}{gap}"
-            colour = curve_colour(self.viewer, theme, pane)
-            self._note(canvas, words, (right + 9 * scale, y), colour=colour, bold=True)
+            at, colour = (right + 9 * scale, y), colours[pane.number]
+            canvas.text(words, at, colour=colour, bold=True, size=theme.small_text)
 
     def _track(self, canvas: Canvas) -> None:
-        """Draw the time line."""
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         top = self.layout.chart[3]
@@ -293,25 +251,23 @@ class Chart:
         thick = max(4, round(5 * scale))
         box = pygame.Rect(round(left), round(middle - thick / 2), round(right - left), thick)
         pygame.draw.rect(canvas.surface, mix(theme.panel, theme.ink, 0.13), box, border_radius=thick)
-        self._note(canvas, "time", (12 * scale, middle))
+        canvas.text("time", (12 * scale, middle), colour=theme.faint, size=theme.small_text)
+        words, colour = ("live", theme.start) if session.live else ("past", theme.final)
         thinned = session.live and session.history.thinned
-        words = "live" if session.live else "past"
         if thinned:
             words = "live · past thinned"
             if right + 9 * scale + canvas.text_width(words, size=theme.small_text) > self.layout.track[2]:
                 words = "thinned"
-        colour = theme.start if session.live else theme.final
-        self._note(canvas, words, (right + 9 * scale, middle), colour=colour, bold=not thinned)
+        at = right + 9 * scale, middle
+        canvas.text(words, at, colour=colour, bold=not thinned, size=theme.small_text)
 
-    def _rule(self, screen: pygame.Surface, x: float, colour: Colour) -> None:
-        """Draw an upright line through the plot."""
-        _, top, _, height = self.layout.chart
-        scale = self.layout.scale
+    def _rule(self, screen: pygame.Surface, x: float, colour: Colour, top: int) -> None:
+        """Draw an upright line through the plot, which begins at a row of the surface."""
+        height, scale = self.layout.chart[3], self.layout.scale
         line = pygame.Rect(round(x), round(top + TOP * scale), 1, round(height - (TOP + BOTTOM) * scale))
         screen.fill(colour, line)
 
     def _cursor(self, screen: pygame.Surface) -> None:
-        """Draw how far the run has come, the handle on the time line, and the line through the plot."""
         theme, scale, session = self.theme, self.layout.scale, self.viewer.session
         canvas = flat_canvas(screen, theme, scale)
         middle = self.layout.track[1] + 0.5 * self.layout.track[3]
@@ -320,7 +276,7 @@ class Chart:
         bars = [(self.column(session.end), mix(theme.panel, theme.ink, 0.4))]
         if not session.live:
             bars.append((x, theme.final))
-            self._rule(screen, x, theme.final)
+            self._rule(screen, x, theme.final, self.layout.chart[1])
         for end, colour in bars:
             bar = pygame.Rect(begin, round(middle - thick / 2), max(round(end) - begin, thick), thick)
             pygame.draw.rect(screen, colour, bar, border_radius=thick)
@@ -332,7 +288,6 @@ class Chart:
         canvas.stamp(handle, (x, middle))
 
     def _hovered(self, screen: pygame.Surface) -> None:
-        """Tell what was at the time under the cursor: an event near it, or the values."""
         over, theme, scale, session = self.hover, self.theme, self.layout.scale, self.viewer.session
         left, right, _ = self._span
         if over is None or not left <= over[0] <= right:
@@ -349,22 +304,19 @@ class Chart:
             known = [f"{name} {value:.3f} {what.unit}" for name, value in values if np.isfinite(value)]
             words = "   ".join([f"{time:.1f} s", *known])
         x = round(self.column(time))
-        self._rule(screen, x, mix(theme.panel, theme.ink, 0.35))
+        self._rule(screen, x, mix(theme.panel, theme.ink, 0.35), self.layout.chart[1])
         room = right - flat_canvas(screen, theme, scale).text_width(words)
         at = min(x + 12 * scale, room), self.layout.chart[1] + (TOP + 16) * scale
         tag(screen, words, at, theme, scale)
 
 
-def curve_colour(viewer: Presenter, theme: Theme, pane: Pane) -> Colour:
-    """Return the colour of a pane's curve: its controller's, another one where that is taken."""
-    taken: list[Colour] = []
-    for other in viewer.session.panes:
-        own = theme.controllers.get(other.law.name)
-        free = [colour for colour in theme.others if colour not in taken]
-        taken.append(own if own is not None and own not in taken else free[0])
-        if other is pane:
-            break
-    return taken[-1]
+def curve_colours(panes: Iterable[Pane], theme: Theme) -> dict[int, Colour]:
+    """Return the colours of curves by pane: the controller's, or another one where that is taken."""
+    taken: dict[int, Colour] = {}
+    for pane in panes:
+        wanted = [theme.controllers.get(pane.law.name), *theme.others]
+        taken[pane.number] = next(each for each in wanted if each and each not in taken.values())
+    return taken
 
 
 def spread(wanted: Array, gap: float, limit: float) -> list[float]:

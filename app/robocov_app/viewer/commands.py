@@ -1,10 +1,10 @@
 """The list of the viewer's commands: keys, buttons, tool tips, help and palette all read it."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from robocov.errors import ParameterError
 from robocov_app.toolkit.command import Command, Takes
@@ -13,12 +13,11 @@ from robocov_app.viewer.session.clock import SPEEDS, speed_words
 from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.tools import Tool
 
+# headings of the help, in their order
 GROUPS = ("Run", "Time", "Compare", "Touch", "Tools", "View", "Keep", "Help", "Show")
-"""Headings of the help, in their order."""
-
 _LAYER_KEYS = {
     **{
-        f"{modifier}{key}": name
+        name: f"{modifier}{key}"
         for modifier, names in {
             "": "cells centroids trajectories velocities force_attraction force_repulsion_robots "
             "force_repulsion_obstacle force_viscosity force_resultant links",
@@ -28,12 +27,10 @@ _LAYER_KEYS = {
         }.items()
         for key, name in zip("1234567890", names.split(), strict=True)
     },
-    "alt+d": "density",
+    "density": "alt+d",
 }
-
 _TOOLS = {"v": "hand", "p": "polygon", "w": "wall", "c": "circle", "g": "brush", "x": "eraser"}
 _TOOL_KEYS = {name: key for key, name in {**_TOOLS, "a": "robot", "d": "failure", "m": "ruler"}.items()}
-
 REPEATS = True
 
 
@@ -48,28 +45,23 @@ class Row(NamedTuple):
     takes: Takes | None = None
 
 
-def grouped(group: str, *rows: Row) -> list[Command]:
-    """Return the commands of a group."""
+def grouped(rows: dict[str, Iterable[Row]]) -> list[Command]:
+    """Return commands from their rows by group."""
     return [
         Command(name, title, group, run, tuple(filter(None, keys.split(", "))), repeats=repeats, takes=takes)
-        for name, title, run, keys, repeats, takes in rows
+        for group, each in rows.items()
+        for name, title, run, keys, repeats, takes in each
     ]
 
 
 def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     """Return the commands that need no window; `titles` are the layers', by their names."""
 
-    def robot_numbers() -> list[str]:
-        return [str(number) for number in viewer.numbers]
-
-    def speeds() -> list[str]:
-        return [speed_words(speed).rstrip("×") for speed in SPEEDS]
-
     def files() -> list[str]:
         return sorted(str(path) for path in viewer.folder.glob(f"*{SUFFIX}"))
 
     def branches() -> list[str]:
-        return [str(k + 1) for k in range(len(viewer.session.branches))]
+        return [str(k + 1) for k in range(len(viewer.session.document.branches()))]
 
     def save(name: object) -> None:
         viewer.save_session(Path(str(name)) if name else None)
@@ -80,33 +72,32 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
     def next_seed() -> None:
         viewer.restart(seed=viewer.session.scenario.seed + 1)
 
-    def begin_at(start: str) -> None:
-        viewer.restart(start=start)
-
     def look_on(seconds: float) -> None:
         viewer.look_at(viewer.session.time + seconds)
 
-    def finish() -> str | None:
-        return viewer.tool.finish(viewer.session)
+    def more(robots: int) -> None:
+        viewer.restart(robots=len(viewer.numbers) + robots)
 
-    more, fewer = partial(viewer.change_robots, 1), partial(viewer.change_robots, -1)
-    fail, start = viewer.fail_or_revive, Takes("start", options=viewer.starts)
+    def enter(branch: str) -> None:
+        viewer.session.enter(viewer.session.document.branch(branch).node)
 
-    def taking(name: str, title: str, run: Callable[[Any], object], takes: Takes) -> Row:
-        return Row(name, title, run, takes=takes)
+    start = Takes("start", options=viewer.starts)
+    law = Takes("controller", options=lambda: viewer.laws)
+    ask_next, speeds = viewer.ask_next, [speed_words(each).rstrip("×") for each in SPEEDS]
 
     def tool_row(tool: Tool) -> Row:
         run = partial(viewer.take_tool, tool.name)
         return Row(f"tool:{tool.name}", f"{tool.title}: {tool.hint}", run, _TOOL_KEYS[tool.name])
 
-    def layer_row(name: str) -> Row:
-        return Row(f"layer:{name}", titles[name], partial(viewer.switch_layer, name), keys.get(name, ""))
+    def switch(layer: str) -> None:
+        viewer.shown ^= {layer}
 
-    keys = {name: key for key, name in _LAYER_KEYS.items()}
-    layers = [*(name for name in keys if name in titles), *(name for name in titles if name not in keys)]
-    return [
-        *grouped(
-            "Run",
+    def layer_row(name: str) -> Row:
+        return Row(f"layer:{name}", titles[name], partial(switch, name), _LAYER_KEYS.get(name, ""))
+
+    layers = dict.fromkeys([*(name for name in _LAYER_KEYS if name in titles), *titles])
+    groups: dict[str, Iterable[Row]] = {
+        "Run": [
             Row("pause", "Play or pause", viewer.pause, "space"),
             Row("step", "Single step", lambda: viewer.session.step(), ".", REPEATS),
             Row("restart", "Restart", viewer.restart, "r"),
@@ -115,18 +106,17 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("faster", "Faster", lambda: viewer.change_speed(1), "=, +", REPEATS),
             Row("seed:next", "Other starting positions (next seed)", next_seed, "n"),
             Row("start:next", "Next start of the map", viewer.next_start, "shift+n"),
-            Row("more", "One robot more, from the start", more, "shift+=, shift++", REPEATS),
-            Row("fewer", "One robot fewer, from the start", fewer, "shift+-", REPEATS),
+            Row("more", "One robot more, from the start", partial(more, 1), "shift+=, shift++", REPEATS),
+            Row("fewer", "One robot fewer, from the start", partial(more, -1), "shift+-", REPEATS),
             Row("map:next", "Next map", lambda: viewer.next_map(1), "page down"),
             Row("map:previous", "Previous map", lambda: viewer.next_map(-1), "page up"),
-            taking("robots", "Number of robots", lambda n: viewer.restart(robots=n), _whole("robots")),
-            taking("seed", "Seed", lambda n: viewer.restart(seed=n), _whole("seed")),
-            taking("start", "Start of the map", begin_at, start),
-            taking("map", "Open a map", viewer.open_map, Takes("map or file", options=viewer.maps)),
-            taking("speed", "Speed", viewer.set_speed, Takes("factor", _speed, speeds)),
-        ),
-        *grouped(
-            "Time",
+            Row("robots", "Number of robots", lambda n: viewer.restart(robots=n), takes=_whole("robots")),
+            Row("seed", "Seed", lambda n: viewer.restart(seed=n), takes=_whole("seed")),
+            Row("start", "Start of the map", lambda name: viewer.restart(start=name), takes=start),
+            Row("map", "Open a map", viewer.open_map, takes=Takes("map or file", options=viewer.maps)),
+            Row("speed", "Speed", viewer.set_speed, takes=Takes("factor", _speed, lambda: speeds)),
+        ],
+        "Time": [
             Row("back", "Back by a moment", lambda: viewer.look_by(-1), "left", REPEATS),
             Row("forward", "On by a moment", lambda: viewer.look_by(1), "right", REPEATS),
             Row("back:second", "Back by a second", lambda: look_on(-1.0), "shift+left", REPEATS),
@@ -136,59 +126,51 @@ def viewer_commands(viewer: Presenter, titles: dict[str, str]) -> list[Command]:
             Row("branch:here", "Go on from the moment shown", viewer.branch, "b"),
             Row("branch:previous", "Branch before", lambda: viewer.enter_branch(-1), "alt+left"),
             Row("branch:next", "Next branch", lambda: viewer.enter_branch(1), "alt+right"),
-            taking("time", "Go to a time", viewer.look_at, Takes("seconds", partial(_positive, "time"))),
-            taking("branch", "Enter a branch", viewer.enter_named_branch, Takes("branch", options=branches)),
-        ),
-        *grouped(
-            "Compare",
+            Row("time", "Go to a time", viewer.look_at, takes=Takes("seconds", partial(_positive, "time"))),
+            Row("branch", "Enter a branch", enter, takes=Takes("branch", options=branches)),
+        ],
+        "Compare": [
             Row("law", "Next controller in this pane", viewer.next_law, "o"),
             Row("pane:add", "Compare with one more controller", viewer.add_pane, "k"),
             Row(
                 "pane:remove", "Remove this pane", lambda: viewer.session.remove_pane(viewer.pane), "shift+k"
             ),
             Row("pane:next", "Next pane", viewer.next_pane, "`"),
-            taking(
-                "controller", "Controller", viewer.use_law, Takes("controller", options=lambda: viewer.laws)
-            ),
-        ),
-        *grouped(
-            "Touch",
+            Row("controller", "Controller", viewer.use_law, takes=law),
+        ],
+        "Touch": [
             Row("undo", "Undo", viewer.undo, "ctrl+z", REPEATS),
             Row("redo", "Redo", viewer.redo, "ctrl+y, ctrl+shift+z", REPEATS),
-            Row("robot:next", "Ask the next robot", lambda: viewer.ask_next(1), "tab", REPEATS),
-            Row(
-                "robot:previous", "Ask the previous robot", lambda: viewer.ask_next(-1), "shift+tab", REPEATS
-            ),
-            Row("robot:fail", "Fail or revive the robot asked", fail, "shift+d"),
+            Row("robot:next", "Ask the next robot", partial(ask_next, 1), "tab", REPEATS),
+            Row("robot:previous", "Ask the previous robot", partial(ask_next, -1), "shift+tab", REPEATS),
+            Row("robot:fail", "Fail or revive the robot asked", viewer.fail_or_revive, "shift+d"),
             Row("robot:remove", "Take the robot that is asked out", viewer.remove_robot, "delete"),
-            Row("finish", "Finish what is being drawn", finish, "return, enter"),
+            Row("finish", "Finish what is being drawn", viewer.finish, "return, enter"),
             Row("cancel", "Give up; close", viewer.cancel, "escape"),
             Row("wider", "Wider walls; a larger brush", lambda: viewer.widen(1.25), "]", REPEATS),
             Row("narrower", "Narrower walls; a smaller brush", lambda: viewer.widen(0.8), "[", REPEATS),
-            taking("robot", "Ask a robot", viewer.ask, _whole("robot", robot_numbers)),
-        ),
-        *grouped(
-            "View",
+            Row("robot", "Ask a robot", viewer.ask, takes=_whole("robot", lambda: map(str, viewer.numbers))),
+        ],
+        "View": [
             Row("theme", "Light or dark", viewer.switch_theme, "t"),
             Row("fade", "Trajectories fade", viewer.switch_fade, "shift+t"),
             Row("suggestions", "Suggestions when settled", viewer.switch_suggestions, "shift+h"),
             Row("panel", "Hide or show the panel", viewer.switch_panel, "h"),
-        ),
-        *grouped(
-            "Keep",
+        ],
+        "Keep": [
             Row("save:session", "Save the session", viewer.save_session, "ctrl+s"),
             Row("recover", "Recover a session", viewer.recover, "ctrl+shift+o"),
             Row("save:map", "Save the map", viewer.save_map, "ctrl+shift+s"),
-            taking("open", "Open a session", open_session, Takes("file", options=files)),
-            taking("save", "Save the session as", save, Takes("file")),
-        ),
-        *grouped("Tools", *map(tool_row, viewer.tools.values())),
-        *grouped("Show", *map(layer_row, layers)),
-    ]
+            Row("open", "Open a session", open_session, takes=Takes("file", options=files)),
+            Row("save", "Save the session as", save, takes=Takes("file")),
+        ],
+        "Tools": map(tool_row, viewer.tools.values()),
+        "Show": map(layer_row, layers),
+    }
+    return grouped(groups)
 
 
 def parameter_commands(viewer: Presenter) -> Iterator[Command]:
-    """Return a command for each gain of the chosen controller and each limit of the team: ``k_rep 0.5``."""
     for each in viewer.parameters():
         run = partial(viewer.set_parameter, each.name)
         words = tuple(getattr(each, "offered", ()))
@@ -199,30 +181,25 @@ def parameter_commands(viewer: Presenter) -> Iterator[Command]:
             yield Command(each.name, f"Set {each.label}", "Run", run, takes=takes, hidden=True)
 
 
-def _whole(word: str, options: object = None) -> Takes:
+def _whole(word: str, options: Callable[[], Iterable[str]] = tuple) -> Takes:
     def read(text: str) -> int:
         try:
             return int(text)
         except ValueError:
             raise ParameterError(f"{word}: {text!r}, but a whole number was wanted") from None
 
-    return Takes("whole number", read, options if callable(options) else tuple)
+    return Takes("whole number", read, options)
 
 
 def _speed(text: str) -> float:
-    if text in ("max", "inf"):
-        return math.inf
-    value = _positive("speed", text)
-    if not 0.01 <= value <= 1000.0:
-        raise ParameterError(f"speed: {text!r}, but a positive number was wanted")
-    return value
+    return math.inf if text in ("max", "inf") else _positive("speed", text, 0.01, 1000.0)
 
 
-def _positive(word: str, text: str) -> float:
+def _positive(word: str, text: str, low: float = 0.0, high: float = 1e300) -> float:
     try:
         value = float(text.rstrip("×x"))
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value >= 0.0):
+    if not low <= value <= high:
         raise ParameterError(f"{word}: {text!r}, but a positive number was wanted")
     return value

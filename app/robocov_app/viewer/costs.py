@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,55 +17,44 @@ from robocov_app.render.distance_field import Field, FieldLattice
 from robocov_app.toolkit.worker import DirectWorker, LatestWorker, Line, Wire, Worker
 
 _PAUSE = 0.05  # seconds between two words on how far a map is
-
+_Sites: TypeAlias = tuple[Sites, Array, Array | None]  # with corners and weights: what all results share
 _INDICES = ("owner", "corner", "last_corner")
 
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """The newest that is known of a pane's cost.
-
-    `path`: way-points from the cursor to its nearest robot, empty where none can come. `lattice` returns the
-    sites as a field wants them. `travel_time`, s: mean time until the first robot is at a place.
-    """
+    """The newest that is known of a pane's cost."""
 
     time: float
     result: CoverageResult
-    path: Array | None
-    lattice: Callable[[], FieldLattice]
-    travel_time: float | None = None
+    path: Array | None  # way-points from the cursor to its nearest robot, empty where none can come
+    lattice: Callable[[], FieldLattice]  # returns the sites as a field wants them
+    travel_time: float | None = None  # s, mean time until the first robot is at a place
 
     @cached_property
     def field(self) -> Field:
-        """The distances as layers want them; made only where one is shown."""
         return Field(self.lattice(), self.result)
 
 
 class Costs:
-    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it.
-
-    `known`: by pane, of the map as it is. `state`: how far a new map is, or why there is no cost. `lattice`:
-    sites along a side.
-    """
+    """Costs for a window, computed in another process, or `direct` where pictures must not depend on it."""
 
     def __init__(self, lattice: int = LATTICE, *, direct: bool = False) -> None:
-        self.known: dict[int, Known] = {}
-        self.state = ""
-        self.lattice = lattice
-        self._worker: Worker[Known | _Sites] = (
-            DirectWorker(CostService(), _CostWire())
-            if direct
-            else LatestWorker("robocov_app.viewer.costs:CostService", "computes the cost", _CostWire)
-        )
+        self.known: dict[int, Known] = {}  # by pane, of the map as it is
+        self.state = ""  # how far a new map is, or why there is no cost
+        self.lattice = lattice  # sites along a side
+        self._worker: Worker[Known | _Sites] = DirectWorker(CostService(), _CostWire())
+        if not direct:
+            self._worker = LatestWorker(
+                "robocov_app.viewer.costs:CostService", "computes the cost", _CostWire
+            )
         self._map: CostQuestion | None = None
-        self._number = 0
-        self._ready = False
-        self._waiting: dict[int, CostQuestion] = {}
         self._asked: CostQuestion | None = None
-        self._pane: int | None = None
+        self._number, self._ready = 0, False
+        self._waiting: dict[int, CostQuestion] = {}
+        self._pane: int | None = None  # of what is asked; None for a map, or where nobody wants it any more
 
     def environment(self, environment: Environment) -> None:
-        """Take another map from now on."""
         self._number += 1
         self._map = CostQuestion(self._number, environment, self.lattice)
         self.known, self._waiting = {}, {}
@@ -79,17 +68,13 @@ class Costs:
     def ask(
         self, pane: int, time: float, at: Array, point: Array | None = None, speeds: Array | None = None
     ) -> None:
-        """Ask for the cost of (n, 2) m positions, a path from a point and, with (n,) m/s, the mean time.
-
-        What was asked about the pane before and is not yet on its way is forgotten.
-        """
+        """Ask for the cost at (n, 2) m, a path from a point and, with (n,) m/s, the mean time."""
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
             asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
             self._waiting[pane] = asked
 
     def poll(self) -> list[tuple[int, Known]]:
-        """Return what has been answered since the last call, by pane."""
         answers, worker = [], self._worker
         while self._asked is not None or self._ask_next():
             answer = worker.poll()
@@ -112,7 +97,6 @@ class Costs:
         return answers
 
     def close(self) -> None:
-        """End what works for it."""
         self.forget()
         self._worker.close()
 
@@ -143,14 +127,6 @@ class CostQuestion:
     speeds: Array | None = None
 
 
-class _Sites(NamedTuple):
-    """Shared part of all results on a map."""
-
-    sites: Sites
-    corners: Array
-    weights: Array | None
-
-
 class _Answer(NamedTuple):
     """Answer on its way: sites only where they are others than before."""
 
@@ -178,7 +154,7 @@ class _CostWire(Wire):
 
     def decode(self, answer: _Answer) -> Known | _Sites:
         if answer.sites is not None:
-            self._sites, sites = answer.sites, answer.sites.sites
+            self._sites, sites = answer.sites, answer.sites[0]
             self._lattice = cache(lambda: FieldLattice(sites))
         assert self._sites is not None and self._lattice is not None
         if answer.result is None:
@@ -201,7 +177,6 @@ class CostService:
         self._told: CoverageCost | None = None
 
     def __call__(self, questions: list[CostQuestion], line: Line) -> _Answer:
-        """Answer the last question."""
         maps = [question for question in questions if question.environment is not None]
         if maps:
             self._prepare(maps[-1], line)
@@ -211,7 +186,7 @@ class CostService:
         answer = _Answer(None)
         if question.positions is not None:
             answer, cost = _evaluated(momentary, question), momentary.at(question.time)
-        sites = None if cost is self._told else _Sites(cost.sites, cost.corners, cost.weights)
+        sites = None if cost is self._told else (cost.sites, cost.corners, cost.weights)
         self._told = cost
         return answer._replace(sites=sites)
 
@@ -255,12 +230,6 @@ def _evaluated(momentary: MomentaryCost, question: CostQuestion) -> _Answer:
             path = momentary.at(now).path(positions[momentary.counted(now, positions)], question.point)
     # half as long on the way
     indices = {name: getattr(result, name).astype(np.int32) for name in _INDICES}
-    nothing = np.empty((0, 2))
-    same: dict[str, Any] = {
-        "points": nothing,
-        "corners": nothing,
-        "weights": None,
-        "environment": None,
-        "sites": None,
-    }
+    same: dict[str, Any] = dict.fromkeys(["weights", "environment", "sites"])
+    same |= dict.fromkeys(["points", "corners"], np.empty((0, 2)))
     return _Answer(None, now, replace(result, **indices, **same), path, travel_time)

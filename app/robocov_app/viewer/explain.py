@@ -21,9 +21,7 @@ from robocov_app.viewer.presenter import Presenter
 SLOW = 0.05  # m/s; who is slower seems to be at rest
 FAR = 0.3  # m; who rests farther from its goal has not arrived
 NOTHING = 5e-4  # N; what is less is written as 0 N, and has no arrow
-REST = "law"
-"""Kind of the line for what the terms of a controller leave of its force."""
-
+REST = "law"  # kind of the line for what the terms of a controller leave of its force
 _SWAY = 0.02  # m; who goes to and fro by less seems to stand
 _HUGE = 1e100  # what is not below is no number to reckon with
 _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
@@ -31,14 +29,11 @@ _WAYS = ("east", "north-east", "north", "north-west", "west", "south-west", "sou
 
 @dataclass(frozen=True)
 class Line:
-    """One thing that is said about a robot; with a `vector`, N, of a force for a small arrow.
-
-    `kind`: the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force.
-    """
+    """One thing that is said about a robot."""
 
     text: str
-    vector: tuple[float, float] | None = None
-    kind: str = ""
+    vector: tuple[float, float] | None = None  # N, of a force, for a small arrow
+    kind: str = ""  # the force term, `REST`, ``viscosity`` or ``resultant``; empty for what is no force
 
 
 @dataclass(frozen=True)
@@ -54,16 +49,15 @@ class Report:
 
 
 def report_on(viewer: Presenter, number: int) -> Report:
-    """Return what the inspector says of a robot of the chosen pane."""
     session, pane = viewer.session, viewer.pane
     setup = session.setup(pane)
     if number in setup.failed:
         x, y = setup.failed[number]
         verdict = f"failed: it stands at ({x:.2f}, {y:.2f}) m, and the others see it as an obstacle"
         return Report(f"Robot {number}", verdict, ())
-    snapshot, team, names = session.snapshot(pane), setup.team, setup.numbers
-    recent, solid = session.recent(pane, number), setup.solid
-    return explain(snapshot, team, solid, names.index(number), names=names, recent=recent)
+    names, recent = setup.numbers, session.recent(pane, number)
+    robot = session.snapshot(pane), setup.team, setup.solid, names.index(number)
+    return explain(*robot, names=names, recent=recent)
 
 
 def explain(
@@ -75,19 +69,11 @@ def explain(
     names: Sequence[int] | None = None,
     recent: Array | None = None,
 ) -> Report:
-    """Return why a robot moves, or why it does not.
+    """Return why a robot, by its row, moves, or why it does not.
 
-    Parameters
-    ----------
-    environment : Environment
-        The robot does not know it, but who asks does.
-    robot : int
-        Row of the robot.
-    names : n numbers, or None
-        What people call the robots; by default 1, 2, ...
-    recent : (k, 2) m or None
-        Where the robot was during the last `metrics.SETTLED_WINDOW` seconds, oldest first. Without it
-        the speed alone says whether the robot is at rest.
+    The robot does not know the environment, but who asks does. `names`: what people call the robots, by
+    default 1, 2, ... `recent`, (k, 2) m: where the robot was during the last `SETTLED_WINDOW` seconds, oldest
+    first; without it the speed alone says whether the robot is at rest.
     """
     case = _Case(snapshot, team, environment, robot, range(1, len(team) + 1) if names is None else names)
     motion = _motion(case, recent)
@@ -120,7 +106,7 @@ class _Thing:
 class _Case:
     """All that is said about one robot, before it is put in words; SI units.
 
-    `forces` has the terms and, as `REST`, what they leave of the force; `broken` when that is no number.
+    `forces` has the terms and, as `REST`, what they leave of the force; none where that is no number.
     `solid` is what the robot senses or else touches, `others` whom it hears, the nearest first.
     """
 
@@ -137,14 +123,13 @@ class _Case:
         point = _row(snapshot.seen.obstacle_points, robot)
         self.sensing = point is not None
         self.solid = _solid(environment, here, point, self.radius)
-        others = []
+        self.others = []
         for j in snapshot.seen.neighbours.of(robot).tolist():
             offset = (_row(snapshot.positions, j) or 0j) - here
-            others.append(
-                _Thing(f"robot {names[j]}", offset, abs(offset) - self.radius - float(team.radius[j]))
-            )
-        self.others = sorted(others, key=lambda other: abs(other.offset))
-        self.forces, self.broken = _terms(snapshot.decision, robot)
+            gap = abs(offset) - self.radius - float(team.radius[j])
+            self.others.append(_Thing(f"robot {names[j]}", offset, gap))
+        self.others.sort(key=lambda other: abs(other.offset))
+        self.forces = _terms(snapshot.decision, robot)
         self.drag = -self.viscosity * self.velocity
         self.resultant = sum(self.forces.values(), self.drag)
         # whether that is too little to move a robot visibly from rest
@@ -157,24 +142,21 @@ class _Case:
         self.stuck = self.aim is not None and abs(self.aim.offset) > FAR and self.aim.hidden != ""
 
 
-def _terms(decision: Decision, robot: int) -> tuple[dict[str, complex], bool]:
-    """Return the forces by cause, N, and whether their sum is no number."""
-    total = _row(decision.forces, robot)
-    if total is None:
-        return {}, True
+def _terms(decision: Decision, robot: int) -> dict[str, complex]:
+    """Return the forces by cause, N; none where their sum is no number."""
+    if (total := _row(decision.forces, robot)) is None:
+        return {}
     rows = {name: _row(term, robot) for name, term in decision.terms.items()}
     taken = {"", REST, "viscosity", "resultant"}  # names that mean something else here
     terms = {name: row for name, row in rows.items() if row is not None and name not in taken}
     rest = total - sum(terms.values())
     if not terms or abs(rest) > 1e-6 + 1e-9 * max(map(abs, (total, *terms.values()))):
         terms[REST] = rest
-    return terms, False
+    return terms
 
 
 def _aim(decision: Decision, environment: Environment, here: complex, robot: int) -> _Thing | None:
-    """Return where the robot is drawn to, and what of the map is in between."""
-    goal = _row(decision.goals, robot)
-    if goal is None:
+    if (goal := _row(decision.goals, robot)) is None:
         return None
     centroid = decision.cells is not None and goal == _row(decision.cells.centroid, robot)
     point = shapely.Point(goal.real, goal.imag)
@@ -191,7 +173,6 @@ def _aim(decision: Decision, environment: Environment, here: complex, robot: int
 
 
 def _solid(environment: Environment, here: complex, point: complex | None, radius: float) -> _Thing | None:
-    """Return what an obstacle point belongs to; without a point, what the robot touches."""
     if point is None:
         line = shapely.shortest_line(shapely.Point(here.real, here.imag), environment.free.boundary)
         if line is None or line.length > radius + TOUCHING:
@@ -216,7 +197,6 @@ def _row(values: object, row: int) -> complex | None:
 
 
 def _along(vector: complex, way: complex) -> float:
-    """Return the cosine of the angle between two vectors; 0 where one has no direction."""
     size = abs(vector) * abs(way)
     return (vector * way.conjugate()).real / size if size > 0.0 else 0.0
 
@@ -242,11 +222,7 @@ def _motion(case: _Case, recent: Array | None) -> str:
     return "moving" if ahead and abs(net) > 0.25 * speed**2 / case.strength else "trembling"
 
 
-# in words
-
-
 def _compass(vector: complex) -> str:
-    """Return the nearest of eight directions, x to the east and y to the north; empty for no direction."""
     return _WAYS[round(math.atan2(vector.imag, vector.real) / (math.pi / 4)) % 8] if vector else ""
 
 
@@ -305,7 +281,6 @@ def _verdict(case: _Case, motion: str) -> str:
 
 
 def _forces(case: _Case) -> list[Line]:
-    """Return each force with what causes it, and their sum."""
     parts = [(_cause(case, kind, vector), vector, kind) for kind, vector in case.forces.items()]
     if case.viscosity > 0.0:
         slowed = f"held back {_force(abs(case.drag))}" if abs(case.drag) >= NOTHING else "not held back"
@@ -316,7 +291,6 @@ def _forces(case: _Case) -> list[Line]:
 
 
 def _cause(case: _Case, kind: str, vector: complex) -> str:
-    """Return a force with its size and what causes it."""
     aim, none, away = case.aim, abs(vector) < NOTHING, False
     size, way = _force(abs(vector)), _compass(vector)
     if kind == "attraction" and aim:
@@ -326,9 +300,8 @@ def _cause(case: _Case, kind: str, vector: complex) -> str:
         return f"{'not pulled to' if none else how} {aim.name}, {aim.away}"
     cause = "the rest of its law" if kind == REST and len(case.forces) > 1 else _plain(kind)
     if kind == "repulsion_robots" and case.others and not none:
-        nearest = [
-            thing for thing in case.others[:2] if abs(thing.offset) <= 1.5 * abs(case.others[0].offset)
-        ]
+        far = 1.5 * abs(case.others[0].offset)
+        nearest = [thing for thing in case.others[:2] if abs(thing.offset) <= far]
         cause = " and ".join(thing.there for thing in nearest)
         cause += f" ({_robots(len(case.others))} in range)"
         away = len(nearest) == 1 and _along(vector, nearest[0].offset) < -0.9
@@ -338,7 +311,6 @@ def _cause(case: _Case, kind: str, vector: complex) -> str:
 
 
 def _called(case: _Case, kind: str) -> str:
-    """Return what a force is called where its cause was told before, with its size."""
     name = _plain(kind)
     if kind == "attraction" and case.aim:
         name = f"the pull to {case.aim.name}"
@@ -358,8 +330,7 @@ def _robots(count: int) -> str:
 
 
 def _reasons(case: _Case, motion: str) -> list[str]:
-    """Return which limits act and, for a robot that gets nowhere, which forces hold each other."""
-    texts = ["its law gives no force that is a number"] if case.broken else []
+    texts = ["its law gives no force that is a number"] if not case.forces else []
     wanted, speed, top = abs(case.resultant) / case.mass, abs(case.velocity), case.max_speed
     if wanted > 1.001 * case.strength:
         texts.append(f"limited: {_number(case.strength)} m/s² instead of {_number(wanted)} m/s²")
@@ -381,7 +352,6 @@ def _reasons(case: _Case, motion: str) -> list[str]:
 
 
 def _surroundings(case: _Case) -> list[str]:
-    """Return what the robot hears, senses and touches."""
     solid, others = case.solid, case.others
     texts = [f"touches {thing.beside}" for thing in case.touched]
     if case.aim and "attraction" not in case.forces:
@@ -389,8 +359,7 @@ def _surroundings(case: _Case) -> list[str]:
     if solid and case.sensing and solid not in case.touched:
         texts.append(f"{_length(solid.gap)} clear of {solid.beside}")
     if not case.sensing:
-        texts.append(
-            "senses nothing" + (f" within {_length(case.reach)}" if 0.0 < case.reach < _HUGE else "")
-        )
+        within = f" within {_length(case.reach)}" if 0.0 < case.reach < _HUGE else ""
+        texts.append(f"senses nothing{within}")
     hears = f"{_robots(len(others))}, the nearest is {others[0].there}" if others else "no other robot"
     return [*texts, f"hears {hears}"]

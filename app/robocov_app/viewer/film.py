@@ -1,55 +1,39 @@
 """A film of the window while it is used: written beside it, and readable even if the window is killed."""
 
-from __future__ import annotations
-
 import queue
 import subprocess
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pygame
 
 from robocov.errors import OutputError
-from robocov_app.runs.recording import film_command
+from robocov_app.runs.recording import Frame, film_command
 
-if TYPE_CHECKING:
-    from robocov_app.runs.recording import Frame
-
-FPS = 30
-"""Frames of a film per second."""
-
-_WAITING = 45
-"""Frames that may wait to be written; what comes when there are more is left out."""
+FPS = 30  # frames of a film per second
+_WAITING = 45  # frames that may wait to be written; what comes when there are more is left out
 
 
 class Film:
     """Writes frames to an MP4 film.
 
     The encoder is a process of its own, which ends the film properly when its input ends, however that comes
-    about. `path`: not there yet. `size`, (width, height) px: of the film; frames of other sizes are fitted
-    in. `patient`: wait for the encoder instead of leaving frames out. Raises OutputError when there is no
-    encoder, or the folder cannot be made.
+    about. Frames of other sizes than `size`, px, are fitted in; `patient`: none is left out. Raises
+    OutputError when there is no encoder, the folder cannot be made, or `path` is there already.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], *, patient: bool = False) -> None:
-        self.path = path
-        self.frames = 0
-        self.left_out = 0
+        self.path, self._patient = path, patient
+        self.frames = self.left_out = 0
         self._size = size[0] // 2 * 2, size[1] // 2 * 2
-        self._patient = patient
-        self._due = 0.0
+        self._due, nothing = 0.0, subprocess.DEVNULL
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             command = film_command(path, self._size, FPS, streamed=True)
             path.open("xb").close()  # a new file, and through no link
             self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,
+                command, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True
             )
         except OSError as error:
             raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
@@ -58,7 +42,6 @@ class Film:
         self._thread.start()
 
     def add(self, screen: pygame.Surface, seconds: float) -> None:
-        """Take what is on the screen for as many frames as are due after so many seconds."""
         self._due += seconds * FPS
         count = int(self._due + 1e-6)
         self._due -= count
@@ -66,18 +49,13 @@ class Film:
             return
         data = self._fitted(screen)
         for _ in range(min(count, FPS)):
-            if self._patient:
-                self._queue.put(data)
-            else:
-                try:
-                    self._queue.put_nowait(data)
-                except queue.Full:
-                    self.left_out += 1
-                    continue
-            self.frames += 1
+            try:
+                self._queue.put(data, block=self._patient)
+                self.frames += 1
+            except queue.Full:
+                self.left_out += 1
 
     def close(self) -> None:
-        """End the film; wait until it is written. Raises OutputError when the encoder failed."""
         self._queue.put(None)
         self._thread.join()
         if self._process.wait() != 0:
@@ -85,16 +63,14 @@ class Film:
 
     def _fitted(self, screen: pygame.Surface) -> bytes:
         """Return the pixels in the film's size, on black where the shape is another."""
-        if screen.get_size() != self._size:
-            width, height = screen.get_size()
-            if (width // 2 * 2, height // 2 * 2) == self._size:
-                screen = screen.subsurface(pygame.Rect(0, 0, *self._size))
-            else:
-                part = min(self._size[0] / width, self._size[1] / height)
-                small = pygame.transform.smoothscale(screen, (int(width * part), int(height * part)))
-                page = pygame.Surface(self._size, 0, 32)
-                page.blit(small, small.get_rect(center=page.get_rect().center))
-                screen = page
+        width, height = screen.get_size()
+        if (width // 2 * 2, height // 2 * 2) == self._size:
+            screen = screen.subsurface(pygame.Rect(0, 0, *self._size))
+        else:
+            part = min(self._size[0] / width, self._size[1] / height)
+            small = pygame.transform.smoothscale(screen, (int(width * part), int(height * part)))
+            screen = pygame.Surface(self._size, 0, 32)
+            screen.blit(small, small.get_rect(center=screen.get_rect().center))
         return pygame.image.tobytes(screen, "RGB")
 
     def _write(self) -> None:
@@ -104,12 +80,10 @@ class Film:
                 self._process.stdin.write(data)
             self._process.stdin.close()
         except OSError:
-            # the encoder is gone: let nobody wait
-            while self._queue.get() is not None:
+            while self._queue.get() is not None:  # the encoder is gone: let nobody wait
                 pass
 
 
 def pixels(screen: pygame.Surface) -> Frame:
-    """Return what is on the screen, (height, width, 3) RGB."""
     width, height = screen.get_size()
     return np.frombuffer(pygame.image.tobytes(screen, "RGB"), dtype=np.uint8).reshape(height, width, 3)

@@ -5,22 +5,21 @@ A record has one map, one controller and one team. So a story with touches has a
 which ``robocov run`` or ``robocov compare`` would write.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pygame
 
 from robocov.controllers import remembers
-from robocov.environment import CircleObstacle, Environment
+from robocov.environment import CircleObstacle
 from robocov.errors import InputError, one_line
+from robocov.files.result_folder import ResultFolder
 from robocov.metrics import CostHistory, summarise
 from robocov.record import Record, Recorder
 from robocov_app.render.density import cost_label, mean_label
@@ -31,64 +30,50 @@ from robocov_app.render.theme import Theme
 from robocov_app.runs.artifacts import begin_comparison, save_comparison, save_pictures
 from robocov_app.runs.cost import built_cost
 from robocov_app.runs.film import FILM_HOLD, FILMS, pane_layout, write_moving
+from robocov_app.runs.options import FilmOptions, RunOptions
+from robocov_app.runs.recording import Frame
 from robocov_app.runs.run import Run, cost_table, evaluated, save_numbers
 from robocov_app.runs.saved import folder_names, wreck_name
+from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.output import write_csv, write_json
+from robocov_app.viewer.film import pixels
 from robocov_app.viewer.session.changes import Place
 from robocov_app.viewer.session.document import Document, Node, replayed
 from robocov_app.viewer.session.history import PaneSetup
 from robocov_app.viewer.session.map_edits import with_obstacle
+from robocov_app.viewer.session.pane import Pane
 
-if TYPE_CHECKING:
-    from robocov.files.result_folder import ResultFolder
-    from robocov_app.runs.options import FilmOptions, RunOptions
-    from robocov_app.runs.recording import Frame
-    from robocov_app.terminal.interruption import Interruption
-    from robocov_app.viewer.session.pane import Pane
-
+History: TypeAlias = tuple[float, str, CostHistory]  # when a part began, s, a controller's name, its cost
 
 STORY = "story.json"
-
-STRIP = 30
-"""Height of a film's strip with what was done, px at scale 1."""
+STRIP = 30  # height of a film's strip with what was done, px at scale 1
 
 
 @dataclass(eq=False)
 class Part:
-    """A stretch of a story with the same map, team and controllers in all panes.
-
-    `begin`: step. `touched`: steps between which a robot was moved by hand. `scenes`: of its beginning, and
-    at the end of the story of that, one for each pane: what a legend explains.
-    """
+    """A stretch of a story with the same map, team and controllers in all panes."""
 
     node: Node
-    begin: int
+    begin: int  # step
     setups: dict[int, PaneSetup]
     recorders: dict[int, Recorder]
-    touched: list[list[int]] = field(default_factory=list)
-    scenes: list[Scene] = field(default_factory=list)
+    scenes: list[Scene]  # of its beginning, and of the story's end, one for each pane: what a legend explains
+    touched: list[list[int]] = field(
+        default_factory=list
+    )  # between which steps which robot was moved by hand
     ends: int = 0
-
-    @property
-    def words(self) -> str:
-        """First words of the caption."""
-        return self.node.words
 
 
 def parts_of(document: Document, node: Node, end: int) -> list[Part]:
-    """Return the parts of a branch, with records of all their steps."""
     parts: list[Part] = []
-    dt = 0.0
     for run, here in replayed(document, node, end):
-        dt = run.scenario.dt
         setups = {pane.number: pane.setup for pane in run.panes}
         if not parts or parts[-1].setups != setups:
             if parts and parts[-1].node is here and here.scenario is None:
                 parts.pop()  # the touch is still going on
-            parts.append(
-                Part(here, run.step, setups, {pane.number: _recorder(pane, dt) for pane in run.panes})
-            )
-            parts[-1].scenes += [_scene(pane, [], "") for pane in run.panes]
+            recorders = {number: _recorder(setup, run.scenario.dt) for number, setup in setups.items()}
+            scenes = [_scene(pane, [], "") for pane in run.panes]
+            parts.append(Part(here, run.step, setups, recorders, scenes))
         part = parts[-1]
         part.ends = run.step
         for pane in run.panes:
@@ -107,33 +92,23 @@ def parts_of(document: Document, node: Node, end: int) -> list[Part]:
 
 def records_of_part(part: Part, root: Node) -> list[Record]:
     """Return the records of a part, one for each pane, of a branch that began at a node; time begins at 0."""
-    scenario, found = root.scenario, []
-    assert scenario is not None
-    dt = scenario.dt
+    scenario, found = root.begun, []
     for number, recorder in part.recorders.items():
-        record, setup = recorder.record(), part.setups[number]
-        record = replace(record, time=np.arange(len(record), dtype=float) * dt)
-        origin: dict[str, Any] = {}
+        record, origin = recorder.record(), dict[str, Any]()
         if part.begin == 0 and part.node is root and scenario.given is None:
             origin = {"start": scenario.start_name, "seed": scenario.seed}
-        found.append(replace(record, session=_session_of(part, setup, record, dt), **origin))
+        session = _session_of(part, part.setups[number], record, scenario.dt)
+        time = np.arange(len(record), dtype=float) * scenario.dt
+        found.append(replace(record, time=time, session=session, **origin))
     return found
 
 
-def _recorder(pane: Pane, dt: float) -> Recorder:
-    setup = pane.setup
-    return Recorder(
-        with_wrecks(setup), setup.team, setup.law.made(), dt, name=setup.law.name, conditions=setup.conditions
-    )
-
-
-def with_wrecks(setup: PaneSetup) -> Environment:
-    """Return the map with the robots that failed as obstacles with names."""
-    environment = setup.environment
+def _recorder(setup: PaneSetup, dt: float) -> Recorder:
+    environment, law = setup.environment, setup.law
     for number, place in setup.failed.items():
         wreck = CircleObstacle(place, setup.limits.radius_of(number), wreck_name(number))
         environment = with_obstacle(environment, wreck)
-    return environment
+    return Recorder(environment, setup.team, law.made(), dt, name=law.name, conditions=setup.conditions)
 
 
 def _session_of(part: Part, setup: PaneSetup, record: Record, dt: float) -> dict[str, Any]:
@@ -163,13 +138,8 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
         content = json.loads((folder / STORY).read_bytes())
         if content["format"] != "robocov-story":
             return [(folder, "")]
-        return [
-            (
-                folder / one_line(part["folder"]),
-                f"{part['from_s']:.1f} to {part['to_s']:.1f} s, {part['words']}",
-            )
-            for part in content["parts"]
-        ]
+        told = "{from_s:.1f} to {to_s:.1f} s, {words}"
+        return [(folder / one_line(part["folder"]), told.format(**part)) for part in content["parts"]]
     except OSError:  # no story; if it cannot be read either, who reads it says why
         return [(folder, "")]
     except (ValueError, LookupError, TypeError) as error:
@@ -179,15 +149,12 @@ def story_folders(folder: Path) -> list[tuple[Path, str]]:
 def save_story(
     document: Document, node: Node, end: int, result: ResultFolder, options: RunOptions, stop: Interruption
 ) -> dict[str, Any]:
-    """Write a branch into a folder: numbers and pictures of its parts, all costs, a film."""
     root = document.path(node)[0]
-    assert root.scenario is not None
-    parts, dt = parts_of(document, node, end), root.scenario.dt
-    several = len(parts) > 1
-    histories: list[tuple[float, str, CostHistory]] = []
+    parts, dt = parts_of(document, node, end), root.begun.dt
+    several, histories = len(parts) > 1, list[History]()
     told, rows = [], []
     for k, part in enumerate(parts, 1):
-        folder = f"{k:02d}-{_file_name(part.words)}" if several else ""
+        folder = f"{k:02d}-{_file_name(part.node.words)}" if several else ""
         records = records_of_part(part, root)
         names = folder_names([record.controller for record in records])
         runs: dict[str, Run] = {}
@@ -205,26 +172,22 @@ def save_story(
             runs[name] = Run(record, history, summarise(record, history))
             save_numbers(runs[name], place, options.lattice)
             histories.append((part.begin * dt, name, runs[name].history))
-            rows.append(
-                {"part": k, "controller": name, "mean_distance_m": runs[name].summary["mean_distance_m"]}
-            )
+            mean = runs[name].summary["mean_distance_m"]
+            rows.append({"part": k, "controller": name, "mean_distance_m": mean})
         if len(records) > 1:
             save_comparison(runs, costs[0], result.new / folder, options)
         else:
             save_pictures([runs[names[0]]], costs[0], result.new / folder, options)
-        told.append(
-            {"folder": folder, "from_s": part.begin * dt, "to_s": part.ends * dt, "words": part.words}
-        )
+        times = {"from_s": part.begin * dt, "to_s": part.ends * dt}
+        told.append({"folder": folder, **times, "words": part.node.words})
         result.keep()
     if several:
         content = {"format": "robocov-story", "version": 1, "parts": told}
         write_json(result.new / STORY, content)
         header = "controller," + cost_table(histories[0][2])[0]
-        lines = (
-            (name, begin + row[0], *row[1:])
-            for begin, name, history in histories
-            for row in cost_table(history)[1]
-        )
+        lines: list[tuple[object, ...]] = []
+        for begin, name, history in histories:
+            lines += [(name, begin + row[0], *row[1:]) for row in cost_table(history)[1]]
         write_csv(result.new / "cost.csv", header, lines)
     look = options.film
     if look.video or look.frames:
@@ -236,12 +199,7 @@ def save_story(
 
 
 def story_frames(
-    document: Document,
-    node: Node,
-    end: int,
-    parts: list[Part],
-    histories: list[tuple[float, str, CostHistory]],
-    film: FilmOptions,
+    document: Document, node: Node, end: int, parts: list[Part], histories: list[History], film: FilmOptions
 ) -> Iterator[Frame]:
     """Draw a branch from its beginning: trajectories go on through all touches, each named below at its time.
 
@@ -250,7 +208,7 @@ def story_frames(
     theme, painters = film.colour_theme, dict[int, Painter]()
     widest = max(parts, key=lambda part: len(part.setups))
     root = document.path(node)[0]
-    count, dt = len(widest.setups), root.scenario.dt if root.scenario is not None else 0.0
+    count, dt = len(widest.setups), root.begun.dt
     layers = partial(standard_layers if count == 1 else pane_layers, film.colours)
     width, height = film.film_size()
     strip = round(STRIP * scale_for((width, height)))
@@ -258,14 +216,12 @@ def story_frames(
     if count > 1:
         scenes = [scene for part in parts for scene in part.scenes]
         layout = pane_layout(records_of_part(widest, root), film, (width, height - strip), legend_of=scenes)
-    due, frame = 0.0, None
+    due = 0.0
     for run, here in replayed(document, node, end):
-        last = here is node and run.step >= end
-        if run.time + 1e-9 < due and not last:
+        if run.time + 1e-9 < due and not (here is node and run.step >= end):
             continue
         due += film.film_speed / film.fps
-        panes = []
-        names = folder_names([pane.law.name for pane in run.panes])
+        panes, names = [], folder_names([pane.law.name for pane in run.panes])
         for pane, name in zip(run.panes, names, strict=True):
             environment, painter = run.scenario.environment, painters.get(pane.number)
             if painter is None or painter.environment.boundary != environment.boundary:
@@ -278,45 +234,26 @@ def story_frames(
         page = panes[0] if layout is None else layout.page(panes, theme)
         frame = np.concatenate([page, _caption(words, (width, strip), theme)])
         yield frame
-    if frame is not None:
-        for _ in range(round(FILM_HOLD * film.fps)):
-            yield frame
+    for _ in range(round(FILM_HOLD * film.fps)):
+        yield frame
 
 
 def _caption(words: str, size: tuple[int, int], theme: Theme) -> Frame:
-    """Return the strip below a film: what was done last, and when."""
     strip = pygame.Surface(size, 0, 32)
     strip.fill(theme.panel)
     text = round(0.5 * size[1])
     picture = label(shortened(words, text, size[0] - 2 * text, True), text, theme.ink, True)
     strip.blit(picture, picture.get_rect(midleft=(text, size[1] // 2)))
-    return np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8).reshape(size[1], size[0], 3)
+    return pixels(strip)
 
 
-def _scene(pane: Pane, histories: list[tuple[float, str, CostHistory]], name: str) -> Any:
-    """Return what a frame shows of a pane."""
-    setup, snapshot = pane.setup, pane.simulation.snapshot
-    known = [
-        (begin + time, value)
-        for begin, of, history in histories
-        if of == name and begin <= pane.time + 1e-9
-        for time, value in zip(history.time.tolist(), history.mean_distance.tolist(), strict=True)
-    ]
-    values = [value for time, value in known if time <= pane.time + 1e-9]
-    cost = cost_label(mean_label(setup.environment), values[-1], None) if values else ""
-    trail, times = pane.trail.until(pane.time)
-    scene = Scene.of(
-        setup.environment,
-        setup.team,
-        snapshot,
-        starts=pane.starts if len(pane.starts) == len(setup.numbers) else None,
-        trail=trail if len(trail) else None,
-        trail_time=times,
-        label=setup.law.label,
-        cost=cost,
-    )
-    radii = {number: setup.limits.radius_of(number) for number in setup.failed}
-    return replace(scene, numbers=setup.numbers, failed=setup.failed, failed_radii=radii)
+def _scene(pane: Pane, histories: list[History], name: str) -> Scene:
+    known: list[float] = []
+    for begin, of, history in histories:
+        if of == name:
+            known += history.mean_distance[begin + history.time <= pane.time + 1e-9].tolist()
+    cost = cost_label(mean_label(pane.setup.environment), known[-1], None) if known else ""
+    return pane.scene(pane.setup, pane.simulation.snapshot, pane.trail.until(pane.time), cost=cost)
 
 
 def _file_name(words: str) -> str:

@@ -1,14 +1,16 @@
 """Opening the window: with a display or without, from the command line's options."""
 
-from __future__ import annotations
-
 import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from robocov.cost import LATTICE
+from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.autosave import autosave_folder
 from robocov_app.toolkit.layout import SMALLEST
 from robocov_app.toolkit.settings import changed_settings, loaded, save_settings, settings_file
@@ -16,50 +18,52 @@ from robocov_app.toolkit.window import display, fitting, screen_scale
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET
-from robocov_app.viewer.session.workspace import recoverable
-from robocov_app.viewer.settings import Settings
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov_app.viewer.session.session import Session
-    from robocov_app.viewer.window import Window
+from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.workspace import offer, recoverable
+from robocov_app.viewer.window import Window
 
 NO_DISPLAY = (
     "no display: the window needs one (over ssh, try ssh -X); --out DIR with --frames N "
     "(of a saved run, with --video) renders without, and robocov run needs none"
 )
+HEADLESS_FPS = 30  # frames per second of what is rendered without a display
 
-HEADLESS_FPS = 30
-"""Frames per second of what is rendered without a display."""
+
+class Settings(BaseModel):
+    """Appearance of the window, not what happens in it, kept in the user's folder for settings."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    theme: Literal["light", "dark"] = "light"
+    scale: float | None = Field(default=None, ge=0.5, le=4.0)
+    width: int = Field(default=1280, ge=900, le=7680)
+    height: int = Field(default=720, ge=600, le=4320)
+    shown: tuple[str, ...] | None = None
+    tab: str = "parameters"
+    fade: bool = False
+    suggests: bool = True
+    recent: tuple[str, ...] = ()
 
 
 @dataclass
 class Launcher:
-    """Launch settings of a window.
-
-    `folder`: where things are saved. `theme`, `size`, `scale`: None for what was used last. `also`,
-    `without`: names of layers. `headless`: draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever
-    that takes. `served`: draw without a display, but live; nothing is remembered. `laws`: names of
-    controllers to choose from beside the built-in ones.
-    """
+    """Launch settings of a window."""
 
     session: Session
     map_name: str
-    folder: Path
-    theme: str | None = None
+    folder: Path  # where things are saved
+    theme: str | None = None  # this and the next two: None for what was used last
     size: tuple[int, int] | None = None
     scale: float | None = None
-    also: frozenset[str] = frozenset()
+    also: frozenset[str] = frozenset()  # names of layers
     without: frozenset[str] = frozenset()
-    headless: bool = False
-    served: bool = False
-    laws: tuple[str, ...] = ()
+    headless: bool = False  # draw without a display, in steps of 1 / `HEADLESS_FPS`, whatever that takes
+    served: bool = False  # draw without a display, but live; nothing is remembered
+    laws: tuple[str, ...] = ()  # names of controllers to choose from beside the built-in ones
     lattice: int = LATTICE
     file: Path | None = None
     offers_lesson: bool = False
-    _only_now: frozenset[str] = field(default=frozenset(), init=False)
-    _not_now: frozenset[str] = field(default=frozenset(), init=False)
+    _usual: set[str] = field(default_factory=set, init=False)  # layers that are shown without these options
 
     @contextmanager
     def window(self) -> Iterator[Window]:
@@ -72,7 +76,7 @@ class Launcher:
                 window = self._opened(settings)
                 window.viewer.say(trouble)
                 if not self._alone and (left := recoverable(autosave_folder())):
-                    window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
+                    window.viewer.say(f"{offer(left[0])}: Ctrl K, “recover” opens it")
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)
@@ -97,15 +101,11 @@ class Launcher:
         return self.headless or self.served
 
     def _opened(self, settings: Settings) -> Window:
-        from robocov_app.render.picture import standard_layers
-        from robocov_app.viewer.window import Window
-
         layers = standard_layers()
-        shown = {layer.name for layer in layers if layer.default}
+        self._usual = {layer.name for layer in layers if layer.default}
         if settings.shown is not None:
-            shown = {layer.name for layer in layers} & set(settings.shown)
-        self._only_now, self._not_now = self.also - shown, self.without & shown
-        shown = (shown | self.also) - self.without
+            self._usual = {layer.name for layer in layers} & set(settings.shown)
+        shown = (self._usual | self.also) - self.without
         scale = self.scale or settings.scale or (1.0 if self._alone else screen_scale())
         size = self.size or (settings.width, settings.height)
         if self.size is None and self.scale is not None:  # text of that size needs a window of that size
@@ -135,12 +135,8 @@ class Launcher:
     def _settings_of(self, window: Window, before: Settings) -> Settings:
         """Return how a window looks, but for layers that options showed or hid."""
         viewer, (width, height) = window.viewer, window.windowed or window.screen.get_size()
-        changes = {
-            **{name: getattr(viewer, name) for name in ("theme", "fade", "suggests")},
-            "recent": tuple(viewer.recent),
-            "shown": tuple(sorted((viewer.shown - self._only_now) | self._not_now)),
-            "tab": window.panel.tab,
-            "width": min(max(width, 900), 7680),
-            "height": min(max(height, 600), 4320),
-        }
-        return before.model_copy(update=changes)
+        look = {name: getattr(viewer, name) for name in ("theme", "fade", "suggests")}
+        shown = viewer.shown - (self.also - self._usual) | (self.without & self._usual)
+        kept = {"recent": tuple(viewer.recent), "shown": tuple(sorted(shown)), "tab": window.panel.tab}
+        size = {"width": min(max(width, 900), 7680), "height": min(max(height, 600), 4320)}
+        return before.model_copy(update=look | kept | size)

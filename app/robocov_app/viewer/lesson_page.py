@@ -1,54 +1,38 @@
 """The lesson over the window: its page in the place of the panel, or its caption."""
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pygame
 
 from robocov_app.render import sprites
 from robocov_app.render.fonts import label, shortened
-from robocov_app.render.theme import mix
+from robocov_app.render.theme import Theme, mix
+from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
-
-if TYPE_CHECKING:
-    from robocov_app.render.theme import Theme
-    from robocov_app.toolkit.layout import Layout
-    from robocov_app.viewer.lessons import LessonPlayer
+from robocov_app.viewer.lessons import LessonPlayer
 
 
-def draw_caption(
-    screen: pygame.Surface, layout: Layout, theme: Theme, title: str, text: str, progress: float
-) -> None:
-    """Show a chapter of the tour: its title and its two sentences, over the lower arena."""
-    scale = layout.scale
+def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
+    scale, title = layout.scale, f"{tour.number + 1}  {tour.chapter.title}"
     left, top, width, height = layout.arena
     size, bold = round(14 * scale), round(15.5 * scale)
     wide = min(width - 40 * scale, 800 * scale)
-    lines = wrapped(text, size, wide - 44 * scale)
+    lines = wrapped(" ".join([tour.chapter.text, *tour.asks]), size, wide - 44 * scale)
     high = (44 + 20 * len(lines)) * scale
     box = pygame.Rect(0, 0, round(wide), round(high))
     box.midbottom = round(left + width / 2), round(top + height - 44 * scale)
     card(screen, box, theme, scale)
-    screen.blit(
-        label(title, bold, theme.final, True), (box.left + round(22 * scale), box.top + round(11 * scale))
-    )
+    x, thick = box.left + round(22 * scale), max(2, round(2 * scale))
+    screen.blit(label(title, bold, theme.final, True), (x, box.top + round(11 * scale)))
     for k, line in enumerate(lines):
-        screen.blit(
-            label(line, size, theme.ink),
-            (box.left + round(22 * scale), box.top + round((35 + 20 * k) * scale)),
-        )
-    bar = pygame.Rect(
-        box.left + 8, box.bottom - max(3, round(3 * scale)), box.width - 16, max(2, round(2 * scale))
-    )
+        screen.blit(label(line, size, theme.ink), (x, box.top + round((35 + 20 * k) * scale)))
+    bar = pygame.Rect(box.left + 8, box.bottom - max(3, round(3 * scale)), box.width - 16, thick)
     screen.fill(mix(theme.panel, theme.ink, 0.15), bar)
-    bar.width = round(bar.width * min(max(progress, 0.0), 1.0))
+    bar.width = round(bar.width * tour.progress)
     screen.fill(theme.final, bar)
 
 
 def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
-    """Show a lesson in place of the panel: what its chapter says and asks, and which chapters there are."""
     scale = layout.scale
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))
@@ -61,7 +45,7 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
         screen.blit(label(line, bold, theme.final, True), (round(x), round(y)))
         y += 25 * scale
     y += 6 * scale
-    for line in wrapped(tour.text, size, wide):
+    for line in wrapped(tour.chapter.text, size, wide):
         screen.blit(label(line, size, theme.ink), (round(x), round(y)))
         y += 21 * scale
     y += 8 * scale
@@ -70,19 +54,19 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
             screen.blit(label(line, size, theme.final), (round(x), round(y)))
             y += 21 * scale
     row = 23 * scale
-    y = max(y + 24 * scale, top + height - 62 * scale - row * len(tour.chapters))
-    small = round(12 * scale)
-    for k, title in enumerate(tour.chapters):
+    chapters, small = tour.lesson.chapters, round(12 * scale)
+    y = max(y + 24 * scale, top + height - 62 * scale - row * len(chapters))
+    for k, chapter in enumerate(chapters):
         now = k == tour.number
         colour = theme.ink if now else theme.faint
         fill = theme.final if k <= tour.number else mix(theme.panel, theme.ink, 0.25)
         canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (x + 4 * scale, y + 8 * scale))
-        words = shortened(title, small, wide - 18 * scale, now)
+        words = shortened(chapter.title, small, wide - 18 * scale, now)
         screen.blit(label(words, small, colour, now), (round(x + 16 * scale), round(y)))
         y += row
     bar = pygame.Rect(round(x), round(top + height - 46 * scale), round(wide), max(3, round(3 * scale)))
     pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
-    bar.width = max(round(bar.width * min(max(tour.progress, 0.0), 1.0)), bar.height)
+    bar.width = max(round(bar.width * tour.progress), bar.height)
     pygame.draw.rect(screen, theme.final, bar, border_radius=bar.height)
     hint = label("← → chapters · Space · F2 just play · Esc ends", round(11 * scale), theme.faint)
     screen.blit(hint, (round(x), round(top + height - 32 * scale)))

@@ -4,19 +4,17 @@ A chapter does again what was done on the way to a touch of the session. It may 
 and hand a task over afterwards. It ends by conditions of the simulation, however slow the machine is.
 """
 
-from __future__ import annotations
-
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from robocov.errors import MapError, Mistake
+from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.file import (
     ChapterModel,
     ConditionModel,
-    LessonModel,
     SavedSession,
     load_session,
     session_of,
@@ -24,31 +22,18 @@ from robocov_app.viewer.session.file import (
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.session.workspace import Workspace
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+FIRST = "lesson-1.robocov"  # the lesson that comes with robocov
+READING = 4.0  # seconds on the wall after a chapter's end, and for an answer where nobody answers
+LONGEST_TASK = 600.0  # seconds of simulation after which `check` gives a task up
 
-    from robocov_app.viewer.presenter import Presenter
-
-FIRST = "lesson-1.robocov"
-"""The lesson that comes with robocov."""
-
-READING = 4.0
-"""Seconds on the wall after a chapter's end until the next, and for an answer where nobody answers."""
-
-LONGEST_TASK = 600.0
-"""Seconds of simulation after which `check` gives a task up."""
-
-PLAIN = frozenset(
-    {
-        *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
-        *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
-    }
-)
-"""Layers that every chapter shows."""
+# layers that every chapter shows
+PLAIN = {
+    *("cells", "grid", "obstacles", "boundary", "trajectories", "starts", "robots", "failed"),
+    *("selection", "colour_bar", "legend", "scale_bar", "status", "caption"),
+}
 
 
 def first_lesson() -> SavedSession:
-    """Return the lesson that comes with robocov."""
     text = files("robocov_app.viewer").joinpath("assets", FIRST).read_text(encoding="utf-8")
     return session_of(json.loads(text), FIRST)
 
@@ -62,7 +47,6 @@ def load_lesson(path: Path) -> SavedSession:
 
 
 def holds(condition: ConditionModel, session: Session) -> bool:
-    """Return whether what is waited for is so."""
     pane = session.panes[0]
     if condition.step is not None and session.step_now >= condition.step:
         return True
@@ -70,65 +54,42 @@ def holds(condition: ConditionModel, session: Session) -> bool:
         return True
     if condition.mean_distance_below is not None and len(pane.curve):
         return bool(pane.curve.value[-1] < condition.mean_distance_below)
-    row = None if condition.robot is None else pane.row(condition.robot)
-    if row is None:
+    if condition.robot is None or (row := pane.row(condition.robot)) is None:
         return False
-    x, y = (float(each) for each in pane.simulation.positions[row])
+    place, inside, outside = pane.simulation.positions[row], condition.inside, condition.outside
 
     def within(box: list[float]) -> bool:
-        return box[0] <= x <= box[2] and box[1] <= y <= box[3]
+        return bool((box[:2] <= place).all() and (place <= box[2:]).all())
 
-    return (condition.inside is not None and within(condition.inside)) or (
-        condition.outside is not None and not within(condition.outside)
-    )
+    return (inside is not None and within(inside)) or (outside is not None and not within(outside))
 
 
 class LessonPlayer:
-    """Plays the chapters of a lesson, and then gives the session from before back.
-
-    `number`: which chapter is played, from 0. `state`: ``asks``, ``plays``, ``task``, ``ended`` or ``left``.
-    `answer`: what was answered, from 1. `alone`: nobody is there to answer or to do tasks, as in a film.
-    """
+    """Plays the chapters of a lesson, and then gives the session from before back."""
 
     def __init__(
-        self,
-        viewer: Presenter,
-        fit: Callable[[], None],
-        saved: SavedSession | None = None,
-        *,
-        alone: bool = False,
+        self, viewer: Presenter, fit: Callable[[], None], saved: SavedSession, *, alone: bool = False
     ) -> None:
-        saved = saved or first_lesson()
         assert saved.lesson is not None
-        self.lesson: LessonModel = saved.lesson
-        self._viewer, self._fit, self.alone = viewer, fit, alone
+        self.lesson = saved.lesson
+        self._viewer, self._fit = viewer, fit
+        self.alone = alone  # nobody is there to answer or to do tasks, as in a film
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
         self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
-        self.number, self.state, self.done = 0, "plays", False
-        self.answer: int | None = None
+        self.number, self.done = 0, False
+        self.state = "plays"  # or asks, task, ended, left
+        self.answer: int | None = None  # from 1
         self._waited = 0.0
         self._begin(0)
 
     @property
     def chapter(self) -> ChapterModel:
-        """The chapter that is played."""
         return self.lesson.chapters[self.number]
 
     @property
-    def title(self) -> str:
-        """Its title with its number."""
-        return f"{self.number + 1}  {self.chapter.title}"
-
-    @property
-    def text(self) -> str:
-        """Text of the chapter."""
-        return self.chapter.text
-
-    @property
     def asks(self) -> list[str]:
-        """Question or task of now, line by line."""
         chapter = self.chapter
         if self.state == "left":
             return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
@@ -143,13 +104,7 @@ class LessonPlayer:
         return [line for line in lines if line]
 
     @property
-    def chapters(self) -> tuple[str, ...]:
-        """The titles of all chapters."""
-        return tuple(chapter.title for chapter in self.lesson.chapters)
-
-    @property
     def seconds(self) -> float:
-        """Longest duration of the lesson where nobody answers, s on the wall."""
         return sum(
             (each.until.step or 0) / 60 / each.speed + READING * (2 if each.question else 1) + 0.5
             for each in self.lesson.chapters
@@ -157,13 +112,11 @@ class LessonPlayer:
 
     @property
     def progress(self) -> float:
-        """Part of the lesson that is over, 0 to 1, by chapters."""
         end = self.chapter.until.step
         part = min(self.session.step_now / end, 1.0) if end else 0.5
         return (self.number + (1.0 if self.state == "ended" else part)) / len(self.lesson.chapters)
 
     def advance(self, seconds: float) -> None:
-        """Take note that so many seconds have passed on the wall."""
         if self.done or self.state == "left":
             return
         session, chapter = self.session, self.chapter
@@ -183,7 +136,6 @@ class LessonPlayer:
             self.skip(1)
 
     def reply(self, answer: int) -> None:
-        """Answer the question; the chapter goes on."""
         question = self.chapter.question
         if self.state == "asks" and question is not None and 1 <= answer <= len(question.answers):
             self.answer = answer
@@ -191,23 +143,22 @@ class LessonPlayer:
             self.session.playing = True
 
     def skip(self, by: int) -> None:
-        """Go to the next chapter, or back to one before; after the last the lesson ends."""
         if self.number + by >= len(self.lesson.chapters):
             self.end()
         else:
             self._begin(max(self.number + by, 0))
 
     def leave(self) -> None:
-        """Let whoever watches play with what is there."""
         if self.state != "task":
             self._turn("left")
 
-    def come_back(self) -> None:
-        """Begin the chapter that was left again."""
-        self._begin(self.number)
+    def leave_or_come_back(self) -> None:
+        if self.state == "left":
+            self._begin(self.number)
+        else:
+            self.leave()
 
     def end(self) -> None:
-        """End; the session from before is there again."""
         viewer = self._viewer
         self._workspace.close()
         viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before
@@ -222,10 +173,7 @@ class LessonPlayer:
     def _begin(self, number: int) -> None:
         self.number, self.answer = number, None
         chapter, viewer, session = self.chapter, self._viewer, self.session
-        target = session.document.nodes[chapter.touch]
-        session.enter(session.document.path(target)[0], 0)
-        session.remake()
-        session.follow(target)
+        _set_out(session, chapter)
         session.playing, session.stop_when_settled = chapter.question is None, False
         session.clock.speed = chapter.speed
         viewer.workspace = self._workspace
@@ -233,10 +181,18 @@ class LessonPlayer:
         viewer.map_name = session.environment.name
         viewer.tool, viewer.active = viewer.hand, 0
         viewer.hand.selected = chapter.robot
-        viewer.shown = set(PLAIN | frozenset(chapter.show))
+        viewer.shown = PLAIN | set(chapter.show)
         viewer.message = ""
         self._fit()
         self._turn("asks" if chapter.question is not None else "plays")
+
+
+def _set_out(session: Session, chapter: ChapterModel) -> None:
+    """Go to the beginning of a chapter's branch; what was done on its way will be done again."""
+    target = session.document.nodes[chapter.touch]
+    session.enter(session.document.path(target)[0], 0)
+    session.remake()
+    session.follow(target)
 
 
 def _begun(saved: SavedSession) -> Session:
@@ -244,17 +200,12 @@ def _begun(saved: SavedSession) -> Session:
 
 
 def checked(saved: SavedSession) -> list[tuple[str, float, bool]]:
-    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter.
-
-    Raises what touches that cannot be raise.
-    """
+    """Play a lesson without a window: title, simulated seconds, and whether it ended, of each chapter."""
     assert saved.lesson is not None
     session = _begun(saved)
     found = []
     for chapter in saved.lesson.chapters:
-        target = session.document.nodes[chapter.touch]
-        session.enter(session.document.path(target)[0], 0)
-        session.follow(target)
+        _set_out(session, chapter)
         while not (ended := holds(chapter.until, session)) and session.end < LONGEST_TASK:
             session.step()
         found.append((chapter.title, session.end, ended))

@@ -1,8 +1,10 @@
 """The panel at the right: what is chosen often stays in sight, the rest is on pages."""
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import chain, zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +22,8 @@ from robocov_app.viewer.session.scenario import MOST_PANES
 
 TABS = ("parameters", "show", "robot", "keep")
 
+# layers without a check box: a picture without them is no use; they have keys all the same
 NOT_OFFERED = frozenset({"obstacles", "boundary", "robots", "failed", "selection", "caption"})
-"""Layers without a check box: a picture without them is no use; they have keys all the same."""
-
 _KEPT = (
     (("Screenshot", "screenshot"), ("Record film", "film")),
     (("Save session", "save:session"), ("Recover…", "recover")),
@@ -32,9 +33,7 @@ _KEPT = (
     (("Keys", "help"), ("Commands…", "palette")),
     (("Lesson", "tour"), ("Full screen", "fullscreen")),
 )
-
 _ASKED_AGAIN = 0.25  # seconds between two looks at what there is while the simulation goes on
-
 _NOBODY = "Click a robot, or press Tab: it tells why it moves, and why it does not."
 
 
@@ -50,13 +49,11 @@ class Panel(SidePanel):
         self._age = 0.0
 
     def show_tab(self, name: str) -> None:
-        """Turn to a page."""
         if name in TABS:
             self.tab = name
             self.viewer.version += 1
 
     def update(self, seconds: float) -> None:
-        """Let time pass: the page is drawn anew when something that it shows is different."""
         self._age += seconds
         if self.covered and self.ui.busy:
             self.ui.stop_typing()
@@ -65,8 +62,6 @@ class Panel(SidePanel):
         old = self._age >= _ASKED_AGAIN and session.playing and not session.settled
         if shows != self._drawn or old:
             self._drawn, self._age, self.ui.stale = shows, 0.0, True
-
-    # the page
 
     def _page(self, ui: Ui) -> None:
         ui.inset(12, 8, 12)
@@ -79,8 +74,8 @@ class Panel(SidePanel):
         pages = {"parameters": self._parameters, "show": self._show, "robot": self._robot, "keep": self._keep}
         pages[self.tab](ui)
 
-    def _does(self, ui: Ui, text: str, action: str, *, chosen: bool = False, small: bool = False) -> None:
-        if ui.button(text, key=action, tip=self._commands[action].tip, chosen=chosen, small=small):
+    def _does(self, ui: Ui, text: str, action: str, **look: Any) -> None:
+        if ui.button(text, key=action, tip=self._commands[action].tip, **look):
             self._do(action)
 
     def _environment(self, ui: Ui) -> None:
@@ -91,12 +86,12 @@ class Panel(SidePanel):
         ui.row(172, 0, height=28, below=5)
         now = files.get(viewer.map_name, viewer.map_name)
         if (name := ui.dropdown("map", list(names), now)) is not None:
-            viewer.attempt(lambda: viewer.open_map(names[name]))
+            viewer.attempt(partial(viewer.open_map, names[name]))
         if (start := ui.dropdown("start", viewer.starts(), session.scenario.start_name)) is not None:
             viewer.attempt(lambda: viewer.restart(start=start))
         ui.row(49, 44, 24, 24, 8, 36, 60, 26, gap=3.5, below=8)
         ui.label("Robots")
-        if (robots := ui.text_entry("robots", str(viewer.robots))) is not None:
+        if (robots := ui.text_entry("robots", str(len(viewer.numbers)))) is not None:
             viewer.attempt(lambda: self._commands.typed(f"robots {robots}"))
         self._does(ui, "−", "fewer")
         self._does(ui, "+", "more")
@@ -113,15 +108,12 @@ class Panel(SidePanel):
         names = {label: name for name, label in labels.items()}
         count = len(laws)
         ui.header("CONTROLLER" if count == 1 else "CONTROLLERS, SIDE BY SIDE")
-        if count == 1:
-            ui.row(0, 0, height=28, below=4)
-        elif count == 2:  # three in a row, for which the third is small
-            ui.row(0, 24, 3, 0, 24, 3, 28, height=28, gap=2, below=4)
-        else:
-            ui.row(0, 24, 3, 0, 24, height=28, gap=2, below=4)
+        # of two there are three in a row, for which the third is small
+        widths = {1: (0, 0), 2: (0, 24, 3, 0, 24, 3, 28)}.get(count, (0, 24, 3, 0, 24))
+        ui.row(*widths, height=28, gap=2 if count > 1 else 6, below=4)
         for k, law in enumerate(laws):
             if (label := ui.dropdown(f"law:{k}", list(names), labels[law.name])) is not None:
-                viewer.attempt(lambda k=k, label=label: viewer.set_law(k, names[label]))  # type: ignore[misc]
+                viewer.attempt(partial(viewer.set_law, k, names[label]))
             if count > 1:
                 if ui.button("×", key=f"close:{k}", tip="Remove this pane", small=True):
                     viewer.active = k
@@ -154,16 +146,12 @@ class Panel(SidePanel):
             self._does(ui, tool.title, f"tool:{tool.name}", chosen=self.viewer.tool is tool, small=True)
         ui.space(6)
 
-    # pages
-
     def _parameters(self, ui: Ui) -> None:
-        """Show sliders, fields and resets of the chosen controller's gains and of the team's limits."""
         found = self.viewer.parameters()
         law = self.viewer.session.setup(self.viewer.pane).law
-        groups = {
-            f"GAINS OF {law.label.upper()}": [each for each in found if not each.name.startswith("team.")],
-            "ROBOTS": [each for each in found if each.name.startswith("team.")],
-        }
+        team = [each for each in found if each.name.startswith("team.")]
+        gains = [each for each in found if each not in team]
+        groups = {f"GAINS OF {law.label.upper()}": gains, "ROBOTS": team}
         with ui.scroll(f"parameters:{law.name}"):
             for title, group in groups.items():
                 if not ui.section(title, key=title.split()[0]):
@@ -192,7 +180,6 @@ class Panel(SidePanel):
         self._reset(ui, each, usual)
 
     def _words(self, ui: Ui, each: Pick) -> None:
-        """Show buttons side by side, one for each word; where they do not fit, a list."""
         count = len(each.offered)
         width = (ui.wide - 103 - 25 - 3 * (count - 1)) / count
         fits = all(shortened(word, round(SMALL), width - 6) == word for word in each.offered)
@@ -211,7 +198,6 @@ class Panel(SidePanel):
             self._set(each.name, each.default)
 
     def _show(self, ui: Ui) -> None:
-        """Show check boxes of the layers."""
         viewer = self.viewer
         names = [name for name in self.titles if name not in NOT_OFFERED]
         rows = -(-len(names) // 2)
@@ -232,24 +218,20 @@ class Panel(SidePanel):
             self._does(ui, "Whole map", "fit")
 
     def _robot(self, ui: Ui) -> None:
-        """Show what the inspector says, and what can be done to its robot."""
         why = "" if self.viewer.selected is not None else "no robot is chosen: click one first, or press Tab"
         ui.row(0, 0, 0, 0, below=8)
         self._does(ui, "◀", "robot:previous")
         self._does(ui, "▶", "robot:next")
         failed = self.viewer.selected in self.viewer.session.setup(self.viewer.pane).failed
-        for text, action in (("Revive" if failed else "Fail", "robot:fail"), ("Remove", "robot:remove")):
-            if ui.button(text, key=action, tip=self._commands[action].tip, why=why):
-                self._do(action)
-        report = self.report
+        self._does(ui, "Revive" if failed else "Fail", "robot:fail", why=why)
+        self._does(ui, "Remove", "robot:remove", why=why)
         with ui.scroll(f"robot:{self.viewer.selected}"):
-            if report is None:
+            if self.report is None:
                 ui.words(_NOBODY, colour=ui.theme.faint)
-                return
-            show_report(ui, report)
+            else:
+                show_report(ui, self.report)
 
     def _keep(self, ui: Ui) -> None:
-        """Show buttons for what is saved, and for help."""
         ui.row(0, 0, height=28, below=5)
         for text, action in (each for row in _KEPT for each in row):
             filming = action == "film" and self.viewer.filming
@@ -257,7 +239,6 @@ class Panel(SidePanel):
 
 
 def show_report(ui: Ui, report: Report) -> None:
-    """Show what the inspector says of a robot, forces with their arrows."""
     ui.words(report.title, size=14, bold=True)
     ui.space(3)
     ui.words(report.verdict, size=12.5, bold=True, colour=ui.theme.final)
@@ -271,7 +252,6 @@ def show_report(ui: Ui, report: Report) -> None:
 
 
 def _arrow(ui: Ui, line: Line, largest: float) -> None:
-    """Draw the arrow of a force at the left of the line to come."""
     assert line.vector is not None
     size = float(np.hypot(*line.vector))
     if ui.surface is None or size < NOTHING:

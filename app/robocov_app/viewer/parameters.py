@@ -1,6 +1,7 @@
 """Parameters of the panel's sliders and words: gains of a controller, limits of the team. Knows no pygame."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from robocov.controllers.gains import Option
@@ -8,15 +9,12 @@ from robocov.errors import ParameterError, shown
 from robocov.robots import KINEMATICS, TRACK_PER_RADIUS, UNITS
 from robocov_app.viewer.session.scenario import ControllerChoice, TeamSpec
 
-SPAN = 30.0
-"""A slider reaches from so many times less than the default to so many times more."""
-
+SPAN = 30.0  # a slider reaches from so many times less than the default to so many times more
 _END = 0.985  # from here on a slider says "no limit" where there may be none
-
 _KINEMATIC = "kinematic limit, the same for every controller"
 _SENSES = "how far the range sensor sees obstacles, from the robot's centre"
 _KINDS = "a point moves in any direction, a unicycle has two driven wheels and has to turn"
-_LIMITS = {
+_LIMITS = {  # label, meaning and ends of the slider of each limit
     "max_speed": ("largest speed", _KINEMATIC, (0.1, 10.0)),
     "max_acceleration": ("acceleration", _KINEMATIC, (0.1, 20.0)),
     "viscosity": ("viscosity ν", "ν of (28): what slows robots down", (0.1, 20.0)),
@@ -24,24 +22,19 @@ _LIMITS = {
     "communication_range": ("communication", "how far robots hear each other", (0.5, 50.0)),
     "radius": ("radius", "radius of a robot", (0.02, 1.0)),
 }
-"""Label, meaning and ends of the slider of each limit."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One slider.
+    """One slider; where there may be no limit, None is none."""
 
-    `name`: a gain, or ``team.`` and a limit. `value`, `default`: None for no limit. `low`, `high`: where the
-    slider ends; typed values may go further. `optional`: whether there may be no limit.
-    """
-
-    name: str
+    name: str  # a gain, or ``team.`` and a limit
     label: str
     unit: str
     meaning: str
     value: float | None
     default: float | None
-    low: float
+    low: float  # here the slider ends; typed values may go further
     high: float
     optional: bool
 
@@ -58,7 +51,6 @@ class Parameter:
         return min(max(part, 0.0), _END if self.optional else 1.0)
 
     def at(self, place: float) -> float | None:
-        """Return the value of a place of the slider, to three digits, never beyond its ends."""
         if self.optional and place > _END:
             return None
         linear, low = self.low <= 0.0, self.low
@@ -66,7 +58,6 @@ class Parameter:
         return min(max(float(f"{value:.3g}"), self.low), self.high)
 
     def words(self) -> str:
-        """Return the value as people type it."""
         return "none" if self.value is None or math.isinf(self.value) else f"{self.value:.4g}"
 
     def read(self, text: str) -> float | None:
@@ -93,7 +84,6 @@ class Pick:
     offered: tuple[str, ...]
 
     def words(self) -> str:
-        """Return the value as people type it."""
         return self.value
 
     def read(self, text: str) -> str:
@@ -107,45 +97,37 @@ class Pick:
         return (exact or begun)[0]
 
 
-def gain_parameters(law: ControllerChoice) -> list[Parameter | Pick]:
-    """Return a slider for each gain of a controller that is a number, and the words of each other."""
-    found: list[Parameter | Pick] = []
+def gain_parameters(law: ControllerChoice) -> Iterator[Parameter | Pick]:
+    """Yield a slider for each gain of a controller that is a number, and the words of each other."""
     for name, gain in law.known.items():
         value = law.value(name)
         if isinstance(gain, Option):
             word = value if isinstance(value, str) else gain.default
-            found.append(Pick(name, name, gain.meaning, word, gain.default, gain.words))
+            yield Pick(name, name, gain.meaning, word, gain.default, gain.words)
             continue
         number = None if isinstance(value, str) else value
         usual = min(max(gain.default if gain.default else 1.0, gain.low), gain.high)
         if usual > 0 and gain.low >= 0:
             low, high = max(usual / SPAN, gain.low), min(usual * SPAN, gain.high)
-            low = low if low > 0 else usual / SPAN
         else:
             low, high = max(gain.low, -SPAN * abs(usual)), min(gain.high, SPAN * abs(usual))
-        found.append(
-            Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
-        )
-    return found
+        yield Parameter(name, name, gain.unit, gain.meaning, number, gain.default, low, high, gain.optional)
 
 
-def limit_parameters(limits: TeamSpec) -> list[Parameter | Pick]:
-    """Return a slider for each limit of the team, and its kinematics; what is set, is set for all robots."""
-    found: list[Parameter | Pick] = []
+def limit_parameters(limits: TeamSpec) -> Iterator[Parameter | Pick]:
+    """Yield a slider for each limit of the team, and its kinematics; what is set, is set for all robots."""
     usual, kind = TeamSpec(), KINEMATICS[limits.track_width > 0.0]
-    for name, (label, meaning, (low, high)) in _LIMITS.items():
+    for name, (label, meaning, ends) in _LIMITS.items():
         if name in limits.different:
             label, meaning = f"{label} ≠", f"{meaning}; robots differ in it until it is set here"
-        value, default = (_finite(getattr(each, name)) for each in (limits, usual))
+        values = getattr(limits, name), getattr(usual, name)
+        value, default = (None if math.isinf(each) else each for each in values)
         ranged = name.endswith("_range")
-        found.append(
-            Parameter(f"team.{name}", label, UNITS[name], meaning, value, default, low, high, optional=ranged)
-        )
-    return [*found, Pick("team.kinematics", "kinematics", _KINDS, kind, KINEMATICS[0], KINEMATICS)]
+        yield Parameter(f"team.{name}", label, UNITS[name], meaning, value, default, *ends, optional=ranged)
+    yield Pick("team.kinematics", "kinematics", _KINDS, kind, KINEMATICS[0], KINEMATICS)
 
 
 def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSpec:
-    """Return the limits with another value of one; `name` may begin with ``team.``."""
     name = name.removeprefix("team.")
     if name == "kinematics":
         name, value = "track_width", TRACK_PER_RADIUS * limits.radius if value == KINEMATICS[1] else 0.0
@@ -153,7 +135,3 @@ def with_limit(limits: TeamSpec, name: str, value: float | str | None) -> TeamSp
     # set for all: what robots had of their own is gone
     different = {each: values for each, values in limits.different.items() if each != name}
     return replace(limits, **{name: number}, different=different)
-
-
-def _finite(value: float) -> float | None:
-    return None if math.isinf(value) else value

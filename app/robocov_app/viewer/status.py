@@ -5,8 +5,7 @@ from robocov_app.viewer.session.clock import speed_words
 
 HINT = "Space pause · F1 keys"
 _SLOW = 30.0  # frames per second
-
-_OFFERED = (
+_OFFERED = (  # kinds of touches of the document, and the words for each
     ("obstacle", "draw a wall in a doorway (W)"),
     ("hand", "drag a robot"),
     ("failure", "let one fail (D)"),
@@ -15,9 +14,6 @@ _OFFERED = (
     ("density", "paint where it matters (G)"),
     ("robot", "let one more join (A)"),
 )
-"""Kinds of touches of the document, and the words for each."""
-
-_AT_ONCE = 3
 
 
 def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) -> list[str]:
@@ -41,7 +37,6 @@ def facts(viewer: Presenter, frames: float, steps: float, filmed: float | None) 
 
 
 def cursor_words(viewer: Presenter) -> str:
-    """Return where the cursor is, and what the place adds to the cost."""
     if viewer.cursor is None:
         return ""
     x, y = viewer.cursor
@@ -65,11 +60,10 @@ def cursor_words(viewer: Presenter) -> str:
 
 
 def suggestion(viewer: Presenter) -> str:
-    """Return what this session has not tried yet, if the present is shown and has settled; else nothing."""
     session = viewer.session
     if not (viewer.suggests and session.settled and session.live) or session.hand is not None:
         return ""
     tried = {node.kind for node in session.document.nodes}
     tried |= {"pane"} if len(session.panes) > 1 else set()
-    new = [words for kind, words in _OFFERED if kind not in tried][:_AT_ONCE]
+    new = [words for kind, words in _OFFERED if kind not in tried][:3]
     return f"The team has settled. Try:\n{' · '.join(new)}" if new else ""

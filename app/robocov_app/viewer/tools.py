@@ -17,7 +17,6 @@ from robocov_app.viewer.session.session import Session
 
 SNAPS_WITHIN = 0.6  # part of a finger's width within which corners and walls draw what is drawn
 WALL_WIDTH = 0.1  # of drawn walls, m
-
 _SPACING = 0.25  # radii from one dab of the brush to the next
 _PAUSE = 0.08  # seconds between two times that the robots get to know of what is being painted
 _RING = 48  # corners of the circle that shows the brush's size
@@ -42,9 +41,8 @@ class Tool:
     there was something to give up.
     """
 
-    name: str = ""
-    title: str = ""
-    hint: str = ""
+    name = title = hint = ""
+    painting = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         return None
@@ -64,6 +62,9 @@ class Tool:
     def preview(self, session: Session) -> Preview | None:
         return None
 
+    def widen(self, session: Session, factor: float) -> str:
+        return ""
+
 
 def edited(session: Session, environment: Environment, words: str) -> str:
     """Put a new map in place; return what to tell. StartError when there is no room for a robot any more."""
@@ -82,31 +83,25 @@ def edited(session: Session, environment: Environment, words: str) -> str:
 class Hand(Tool):
     """Drags and throws robots, and moves obstacles; `selected` is the robot that is asked about."""
 
-    name = "hand"
-    title = "Hand"
+    name, title = "hand", "Hand"
     hint = "drag a robot or an obstacle; click a robot to ask it; drag the floor to pan"
     selected: int | None = None
     robot: int | None = None
     obstacle: int | None = None
     _from: Point = (0.0, 0.0)
     _at: Point = (0.0, 0.0)
-    _taken: Obstacle | None = None
+    _taken: tuple[Obstacle, ...] = ()
     _drags: bool = False
 
     def press(self, session: Session, point: Point, reach: float, number: int | None) -> str | None:
         self._from, self._at, self._drags = point, point, False
-        self.robot, self.obstacle = number, None
-        if number is not None:
-            self.selected = number
-            return None
-        self.obstacle = map_edits.obstacle_at(session.environment, point)
-        if self.obstacle is not None:
-            self._taken = session.environment.obstacles[self.obstacle]
+        self.robot, self._taken = number, session.environment.obstacles
+        self.obstacle = None if number is not None else map_edits.obstacle_at(session.environment, point)
+        self.selected = self.selected if number is None else number
         return None
 
     @property
     def holds(self) -> bool:
-        """Whether it holds something; if not, dragging pans."""
         return self.robot is not None or self.obstacle is not None
 
     def move(self, session: Session, point: Point) -> None:
@@ -114,20 +109,20 @@ class Hand(Tool):
         # a click is no pull
         self._drags = self._drags or dist(self._from, point) > 0.02
         # meanwhile it may have been taken out
-        there = {*session.numbers, *session.setup(session.panes[0]).failed}
-        if self.robot is not None and self._drags and self.robot in there:
+        if self.robot is not None and self._drags and self.robot in session.setup(session.panes[0]).there:
             session.grab(self.robot, point)
 
     def release(self, session: Session, point: Point) -> str | None:
         self._at = point
-        robot, obstacle = self.robot, self._dragged(session)
+        robot, dragged = self.robot, self._dragged(session)
         self.robot = self.obstacle = None
         if robot is not None:
             session.release()
-        elif obstacle is not None:
-            words = f"{map_edits.words_for(session.environment.obstacles[obstacle])} moved"
-            return edited(session, map_edits.with_moved(session.environment, obstacle, *self._by()), words)
-        return None
+        if dragged is None:
+            return None
+        k, moved = dragged
+        words = f"{map_edits.words_for(moved)} moved"
+        return edited(session, map_edits.with_replaced(session.environment, k, 1, [moved]), words)
 
     def cancel(self, session: Session) -> bool:
         something = self.holds or self.selected is not None
@@ -139,29 +134,24 @@ class Hand(Tool):
         return something
 
     def preview(self, session: Session) -> Preview | None:
-        obstacle = self._dragged(session)
-        if obstacle is None:
+        if (dragged := self._dragged(session)) is None:
             return None
-        shape = map_edits.moved(session.environment.obstacles[obstacle], *self._by())
-        return Preview((self._from, self._at), False, shape, f"{dist(self._from, self._at):.2f} m")
+        return Preview((self._from, self._at), False, dragged[1], f"{dist(self._from, self._at):.2f} m")
 
-    def _dragged(self, session: Session) -> int | None:
-        """Return the number of the obstacle that is dragged somewhere; meanwhile there may be another map."""
-        there = session.environment.obstacles
-        if self.obstacle is None or self.obstacle >= len(there) or there[self.obstacle] != self._taken:
+    def _dragged(self, session: Session) -> tuple[int, Obstacle] | None:
+        """Return the obstacle that is dragged somewhere: its number, and how it would be there."""
+        there, k, (dx, dy) = session.environment.obstacles, self.obstacle, np.subtract(self._at, self._from)
+        # meanwhile there may be another map
+        if k is None or there[k : k + 1] != self._taken[k : k + 1] or np.hypot(dx, dy) < 1e-3:
             return None
-        return self.obstacle if dist(self._from, self._at) >= 1e-3 else None
-
-    def _by(self) -> tuple[float, float]:
-        return self._at[0] - self._from[0], self._at[1] - self._from[1]
+        return k, map_edits.moved(there[k], float(dx), float(dy))
 
 
 @dataclass
 class Polygon(Tool):
     """Draws a polygon, corner by corner."""
 
-    name = "polygon"
-    title = "Polygon"
+    name, title = "polygon", "Polygon"
     hint = "click the corners; Enter, a double click or a click on the first corner closes it"
     outline: Outline = field(default_factory=lambda: Outline(least=3, closes=True), repr=False)
     _reach: float = 0.0
@@ -190,13 +180,9 @@ class Polygon(Tool):
         return self.outline.cancel()
 
     def preview(self, session: Session) -> Preview | None:
-        if not self.outline.points:
-            return None
         points = (*self.outline.points, self.outline.at)
-        return self._previewed(points, f"{dist(*points[-2:]):.2f} m")
-
-    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
-        return Preview(points, len(points) > 2, None, words)
+        words = f"{dist(*points[-2:]):.2f} m" if len(points) > 1 else ""
+        return Preview(points, len(points) > 2, None, words) if words else None
 
     def _snapped(self, session: Session, point: Point) -> Point:
         return map_edits.snapped(session.environment, point, SNAPS_WITHIN * self._reach)
@@ -209,22 +195,23 @@ class Polygon(Tool):
 class Wall(Polygon):
     """Draws a wall, point by point."""
 
-    name = "wall"
-    title = "Wall"
+    name, title = "wall", "Wall"
     hint = "drag, or click its points, Enter or a double click ends it; [ and ] change its width"
     outline: Outline = field(default_factory=lambda: Outline(drags=True), repr=False)
     width: float = WALL_WIDTH
     _same = 0.3
 
-    def widen(self, factor: float) -> None:
-        """Draw wider walls, or narrower ones."""
+    def widen(self, session: Session, factor: float) -> str:
         self.width = float(np.clip(round(self.width * factor, 3), 0.02, 5.0))
+        return f"walls are {self.width:g} m wide"
 
-    def _previewed(self, points: tuple[Point, ...], words: str) -> Preview:
-        wall = None
+    def preview(self, session: Session) -> Preview | None:
+        if (drawn := super().preview(session)) is None:
+            return None
+        wall, words = None, f"{drawn.words}, {self.width:g} m wide"
         with suppress(RobocovError):
-            wall = self._made(list(points))
-        return Preview(points, False, wall, f"{words}, {self.width:g} m wide")
+            wall = self._made(list(drawn.line))
+        return Preview(drawn.line, False, wall, words)
 
     def _made(self, corners: list[Point]) -> Obstacle:
         return map_edits.wall_of(corners, self.width)
@@ -234,8 +221,7 @@ class Wall(Polygon):
 class Ruler(Tool):
     """Measures."""
 
-    name = "ruler"
-    title = "Ruler"
+    name, title = "ruler", "Ruler"
     hint = "drag from one place to another"
     _from: Point | None = None
     _at: Point = (0.0, 0.0)
@@ -259,31 +245,31 @@ class Ruler(Tool):
         return had
 
     def preview(self, session: Session) -> Preview | None:
-        return None if self._from is None else self._measured(self._from)
-
-    def _measured(self, begin: Point) -> Preview:
-        dx, dy = self._at[0] - begin[0], self._at[1] - begin[1]
+        if self._from is None:
+            return None
+        dx, dy = np.subtract(self._at, self._from)
         words = f"{np.hypot(dx, dy):.2f} m  (Δx {dx:.2f}, Δy {dy:.2f})"
-        return Preview((begin, self._at), False, None, words)
+        return Preview((self._from, self._at), False, None, words)
 
 
 @dataclass
 class Circle(Ruler):
     """Draws a round pillar from its middle."""
 
-    name = "circle"
-    title = "Circle"
+    name, title = "circle", "Circle"
     hint = "drag from the middle to the rim"
 
     def release(self, session: Session, point: Point) -> str | None:
         middle, self._from = self._from, None
-        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), self.name)
+        return None if middle is None else _drawn(session, map_edits.circle_of(middle, point), "circle")
 
-    def _measured(self, begin: Point) -> Preview:
-        circle = None
+    def preview(self, session: Session) -> Preview | None:
+        if self._from is None:
+            return None
+        circle, line = None, (self._from, self._at)
         with suppress(RobocovError):
-            circle = map_edits.circle_of(begin, self._at)
-        return Preview((begin, self._at), False, circle, f"radius {dist(begin, self._at):.2f} m")
+            circle = map_edits.circle_of(*line)
+        return Preview(line, False, circle, f"radius {dist(*line):.2f} m")
 
 
 def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
@@ -292,19 +278,14 @@ def _drawn(session: Session, obstacle: Obstacle, name: str) -> str:
 
 @dataclass
 class Brush(Tool):
-    """Paints the density: the left button raises it, the right one lowers it.
+    """Paints the density: the left button raises it, the right one lowers it."""
 
-    `radius`: None until it is first needed: then a tenth of the map. `lowers`: what a press does. `painting`:
-    whether a stroke has begun and not yet ended.
-    """
-
-    name = "brush"
-    title = "Brush"
+    name, title = "brush", "Brush"
     hint = "paint where more is needed; the right button takes away; the wheel, [ and ] change the size"
-    radius: float | None = None
-    lowers: bool = False
+    radius: float | None = None  # m, None until it is first needed: then a tenth of the map
+    lowers: bool = False  # what a press does
     clock: Callable[[], float] = field(default=perf_counter, repr=False)
-    painting: bool = False
+    painting: bool = False  # whether a stroke has begun and not yet ended
     _dabs: list[Point] = field(default_factory=list, repr=False)
     _stroke: int = 0
     _boundary: Ring = ()
@@ -312,13 +293,11 @@ class Brush(Tool):
     _shown: float = -1e9
 
     def size(self, session: Session) -> float:
-        """Return the radius, m."""
         if self.radius is None:
             self.radius = float(f"{0.1 * session.environment.region.diameter:.2g}")
         return self.radius
 
     def widen(self, session: Session, factor: float) -> str:
-        """Take a larger brush, or a smaller one; return what to tell."""
         whole = session.environment.region.diameter
         self.radius = float(f"{np.clip(self.size(session) * factor, whole / 200, whole / 2):.3g}")
         return f"the brush has a radius of {self.radius:g} m"
@@ -351,9 +330,9 @@ class Brush(Tool):
     def release(self, session: Session, point: Point) -> str | None:
         if self.painting:
             self.move(session, point)
-        painting, self.painting = self.painting, False
-        if not painting:
+        if not self.painting:
             return None
+        self.painting = False
         if self._dabs:
             self._show(session)
         return "density lowered" if self.lowers else "density raised"
@@ -375,7 +354,6 @@ class Brush(Tool):
         return Preview(outline, False, None, f"φ {value:.2g}", marks=False)
 
     def _show(self, session: Session) -> None:
-        """Let the robots know of it."""
         dabs, self._dabs = tuple(self._dabs), []
         session.paint(dabs, self.size(session), lowers=self.lowers, stroke=self._stroke)
         self._shown = self.clock()
@@ -383,7 +361,7 @@ class Brush(Tool):
 
 @dataclass
 class Click(Tool):
-    """Does something at a place, or to the robot there; returns what to tell."""
+    """Does something at a place, or to the robot there."""
 
     name: str
     title: str
@@ -402,7 +380,7 @@ def _erase(session: Session, point: Point, reach: float, number: int | None) -> 
     if index is None:
         return None
     words = f"{map_edits.words_for(session.environment.obstacles[index])} deleted"
-    return edited(session, map_edits.without_obstacle(session.environment, index), words)
+    return edited(session, map_edits.with_replaced(session.environment, index, 1), words)
 
 
 def _add(session: Session, point: Point, reach: float, number: int | None) -> str:
@@ -410,17 +388,10 @@ def _add(session: Session, point: Point, reach: float, number: int | None) -> st
 
 
 def _fail(session: Session, point: Point, reach: float, number: int | None) -> str | None:
-    if number is None:
-        return None
-    if number in session.setup(session.panes[0]).failed:
-        session.revive_robot(number)
-        return f"robot {number} works again"
-    session.fail_robot(number)
-    return f"robot {number} failed"
+    return None if number is None else session.fail_or_revive(number)
 
 
 def toolbox() -> dict[str, Tool]:
-    """Return one of each tool by name, in the order in which they are shown."""
     fails = "click a robot to let it fail; click it again to revive it"
     tools: list[Tool] = [
         *(Hand(), Polygon(), Wall(), Circle(), Brush()),

@@ -1,19 +1,22 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Callable
+from collections.abc import Iterable
+from functools import partial
+from math import dist
 from pathlib import Path
 
 import numpy as np
 import pygame
 
+from robocov.environment import Point
 from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
-from robocov_app.toolkit.input import OF_THE_MOUSE
-from robocov_app.toolkit.layout import laid_out
+from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, show_cursor, wheel_notches
+from robocov_app.toolkit.layout import inside, laid_out
 from robocov_app.toolkit.overlay import draw_message, draw_status
 from robocov_app.toolkit.window import FPS, BaseWindow
 from robocov_app.viewer.canvas import ViewerCanvas
@@ -23,33 +26,170 @@ from robocov_app.viewer.explain import report_on
 from robocov_app.viewer.film import FPS as FILM_FPS
 from robocov_app.viewer.film import Film
 from robocov_app.viewer.lesson_page import draw_caption, draw_tour
-from robocov_app.viewer.lessons import LessonPlayer, load_lesson
+from robocov_app.viewer.lessons import LessonPlayer, first_lesson, load_lesson
 from robocov_app.viewer.panel import TABS, Panel
-from robocov_app.viewer.pointer import Pointer
 from robocov_app.viewer.presenter import Presenter, plain
-from robocov_app.viewer.saving import RunSaver
-from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
+from robocov_app.viewer.session.workspace import RunSaver
 from robocov_app.viewer.status import HINT, facts, suggestion
+from robocov_app.viewer.tools import Brush
 
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
 _PAN = 60  # pixels that a key pans
-
-_GOES_ON_WITH = {
+_GOES_ON_WITH = {  # commands that do not leave the lesson
     *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
-    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot"),
+    *("slower", "faster", "fit", "zoom:in", "zoom:out", "plot", "tour"),
 }
-"""Commands that do not leave the lesson."""
-
 _HINT = "Wheel: zoom at the cursor · drag the floor or the right button: pan · F1 or Esc closes"
+_TAKES_ROBOTS = ("hand", "eraser", "failure")  # tools that take hold of a robot
+
+
+class Pointer:
+    """Turns events of the mouse into what panel, canvas, chart and tools do: the panel comes first."""
+
+    def __init__(self, window: "Window") -> None:
+        self._viewer, self._canvas, self._chart = window.viewer, window.canvas, window.chart
+        self._panel, self._interrupt = window.panel, window.leave_lesson
+        self.at = (0, 0)
+        self._drag = ""
+        self._held = self._button = 0
+        self._pressed_at = (0, 0)
+        self._last_click = -1.0, (0, 0)
+        self._shape = -1
+
+    def take(self, event: pygame.event.Event, now: float) -> None:
+        if event.type != pygame.MOUSEWHEEL:
+            self.at = event.pos
+        taken = not self._drag and self._panel.take(event)
+        if event.type == pygame.MOUSEMOTION:
+            self._moved(event)
+        elif event.type == pygame.MOUSEBUTTONUP:
+            self._released(event)
+        elif taken:
+            self._viewer.cursor = None
+        elif event.type == pygame.MOUSEBUTTONDOWN:
+            self._panel.ui.stop_typing()
+            self._pressed(event, now)
+        elif self._canvas.pane_at(self.at) is not None:
+            factor = WHEEL ** wheel_notches(event)
+            if isinstance(self._viewer.tool, Brush):
+                self._viewer.widen(factor)
+            else:
+                self._canvas.zoom(factor, self.at)
+
+    def show(self) -> None:
+        """Let the cursor, and a ring around the robot under it, tell what a press would do."""
+        viewer, canvas, layout = self._viewer, self._canvas, self._canvas.layout
+        pane = canvas.pane_at(self.at) if viewer.cursor is not None else None
+        if pane is not None:  # the cameras may have moved below it
+            viewer.cursor, viewer.cursor_pane = canvas.to_world(self.at, pane), pane
+        number = None
+        if pane is not None and viewer.tool.name in _TAKES_ROBOTS:
+            number = canvas.robot_at(self.at, pane)
+        canvas.hovered = (-1, -1) if pane is None or number is None else (pane, number)
+        if inside(layout.panel, self.at):
+            self._shape = -1  # the panel has set its own
+            return
+        shape = pygame.SYSTEM_CURSOR_ARROW
+        if number is not None:
+            shape = pygame.SYSTEM_CURSOR_HAND
+        elif pane is not None and viewer.tool is not viewer.hand:
+            shape = pygame.SYSTEM_CURSOR_CROSSHAIR
+        elif inside(layout.track, self.at) or inside(layout.chart, self.at):
+            offered = self._chart.offers(self.at)
+            shape = pygame.SYSTEM_CURSOR_HAND if offered else pygame.SYSTEM_CURSOR_SIZEWE
+        if shape != self._shape:
+            self._shape = shape
+            show_cursor(shape)
+
+    def leave(self) -> None:
+        self._viewer.cursor = None
+        self._chart.hover = None
+
+    def _pressed(self, event: pygame.event.Event, now: float) -> None:
+        viewer, layout = self._viewer, self._canvas.layout
+        if self._drag:  # a second button while the first is held
+            return
+        pane = self._canvas.pane_at(event.pos)
+        self._pressed_at, self._button = event.pos, event.button
+        if inside(layout.track, event.pos) or inside(layout.chart, event.pos):
+            if event.button == 1:
+                self._press_chart(event.pos)
+            return
+        if pane is None or event.button not in (1, 2, 3):
+            return
+        brush = viewer.tool if isinstance(viewer.tool, Brush) else None
+        if event.button != 1 and not (brush and event.button == 3):
+            self._drag = "pan"
+            return
+        if brush:
+            brush.lowers = event.button == 3
+        self._interrupt()
+        pane = min(pane, len(viewer.session.panes) - 1)
+        if viewer.active != pane:
+            viewer.active = pane
+            viewer.version += 1
+        then, where = self._last_click
+        double = now - then < DOUBLE and dist(where, event.pos) < SLIP
+        self._last_click = now, event.pos
+        if double and viewer.tool.name in ("polygon", "wall"):
+            viewer.attempt(viewer.finish)
+            return
+        point = self._canvas.to_world(event.pos, pane)
+        number, reach = self._canvas.robot_at(event.pos, pane), self._canvas.reach(pane)
+        viewer.attempt(lambda: viewer.tool.press(viewer.session, point, reach, number))
+        if viewer.tool is viewer.hand and number is not None:
+            self._panel.show_tab("robot")
+        self._drag = "pan" if viewer.tool is viewer.hand and not viewer.hand.holds else "tool"
+        self._held = pane
+
+    def _press_chart(self, at: tuple[int, int]) -> None:
+        viewer, chart = self._viewer, self._chart
+        if chart.offers(at):
+            viewer.attempt(chart.switch)
+        elif (ghost := chart.ghost_at(at)) is not None:
+            viewer.attempt(lambda: viewer.enter(ghost))
+        else:
+            self._interrupt()
+            self._drag = "time"
+            viewer.attempt(lambda: viewer.look_at(chart.time_at(at[0])))
+
+    def _moved(self, event: pygame.event.Event) -> None:
+        viewer = self._viewer
+        pane, viewer.cursor = self._canvas.pane_at(event.pos), None
+        if pane is not None and not inside(self._canvas.layout.panel, event.pos):
+            viewer.cursor, viewer.cursor_pane = self._canvas.to_world(event.pos, pane), pane
+        self._chart.hover = event.pos if not self._drag else None
+        if self._drag == "time":
+            viewer.attempt(lambda: viewer.look_at(self._chart.time_at(event.pos[0])))
+        elif self._drag == "pan":
+            self._canvas.pan(*event.rel)
+        elif self._drag == "tool":
+            viewer.attempt(lambda: viewer.tool.move(viewer.session, self._place(event.pos)))
+        elif viewer.cursor is not None:
+            viewer.tool.move(viewer.session, viewer.cursor)
+
+    def _released(self, event: pygame.event.Event) -> None:
+        viewer, drag = self._viewer, self._drag
+        if event.button != self._button:  # another one than the one that is held
+            return
+        self._drag = ""
+        clicked = dist(event.pos, self._pressed_at) < SLIP
+        if drag == "tool":
+            viewer.attempt(lambda: viewer.tool.release(viewer.session, self._place(event.pos)))
+        elif drag == "pan" and clicked and event.button == 3:
+            viewer.attempt(viewer.finish)
+        elif drag == "pan" and clicked and event.button == 1 and viewer.tool is viewer.hand:
+            viewer.hand.selected = None
+            viewer.version += 1
+
+    def _place(self, at: tuple[int, int]) -> Point:
+        """Return the place under a pixel, m, in the pane in which the button was pressed."""
+        return self._canvas.to_world(at, min(self._held, len(self._canvas.layout.panes) - 1))
 
 
 class Window(BaseWindow):
-    """Shows a session and lets it be touched.
-
-    `scale`: of text and lines. `patient`: nobody watches: films wait for their encoder instead of leaving
-    frames out. `screen`: of a window that is there already.
-    """
+    """Shows a session and lets it be touched."""
 
     hint = HINT
 
@@ -57,10 +197,10 @@ class Window(BaseWindow):
         self,
         viewer: Presenter,
         size: tuple[int, int],
-        scale: float,
+        scale: float,  # of text and lines
         *,
-        patient: bool = False,
-        screen: pygame.Surface | None = None,
+        patient: bool = False,  # nobody watches: films wait for their encoder instead of leaving frames out
+        screen: pygame.Surface | None = None,  # of a window that is there already
     ) -> None:
         super().__init__(size, screen)
         self.viewer, self.scale = viewer, scale
@@ -76,7 +216,7 @@ class Window(BaseWindow):
         listed = [*viewer_commands(viewer, self.titles), *self._own_commands()]
         self.commands = Commands(listed, viewer.attempt, lambda: parameter_commands(viewer))
         self.panel = Panel(viewer, self.titles, self.commands, self.do)
-        self.pointer = Pointer(viewer, self.canvas, self.chart, self.panel, self._leave_lesson)
+        self.pointer = Pointer(self)
         self._patient = patient
         self._arranged: tuple[object, ...] | None = None
         self._reported: tuple[object, float] = None, 0.0
@@ -85,10 +225,7 @@ class Window(BaseWindow):
         self._arrange()
         self.draw()
 
-    # frames
-
     def close(self) -> None:
-        """End what is going on beside the window."""
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
         self.viewer.costs.close()
@@ -100,14 +237,13 @@ class Window(BaseWindow):
         viewer.version += 1
 
     def update(self, seconds: float) -> None:
-        """Let so many seconds pass, for the simulation, its cost and the panel."""
         self._now += seconds
         self._unfilmed += seconds
         self._pass_time(seconds)
         self._ask_costs()
         self._arrange()
         self._inspect()
-        self.panel.covered = self._lesson_shown
+        self.panel.covered = self._lesson is not None
         self.panel.update(seconds)
         self.pointer.show()
 
@@ -117,11 +253,9 @@ class Window(BaseWindow):
         at_rest = session.settled and session.live and not session.environment.moves
         if (session.playing and not at_rest) or self.film is not None:
             return None
-        return (
-            *(viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing),
-            *(self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale),
-            tour and (tour.state, tour.number, tour.progress),
-        )
+        told = viewer.version, viewer.message, viewer.trouble, session.time, session.serial, session.playing
+        drawn = self._answers, viewer.costs.state, self._arranged, self.panel.ui.stale
+        return *told, *drawn, tour and (tour.state, tour.number, tour.progress)
 
     def _pass_time(self, seconds: float) -> None:
         viewer, session = self.viewer, self.viewer.session
@@ -153,7 +287,6 @@ class Window(BaseWindow):
         viewer.look_at_map()
 
     def _ask_costs(self) -> None:
-        """Ask for the cost of what is shown, and note the answers that tell of the present."""
         viewer, session = self.viewer, self.viewer.session
         if session.serial != self._serial:
             self._serial = session.serial
@@ -162,8 +295,8 @@ class Window(BaseWindow):
         for pane in session.panes:
             positions, known = session.positions(pane), viewer.costs.known.get(pane.number)
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
-            if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
-                viewer.costs.ask(pane.number, session.time, positions, point, speeds_of(session, pane))
+            if known is None or not (fresh and np.array_equal(known.result.positions, positions)):
+                viewer.costs.ask(pane.number, session.time, positions, point, session.setup(pane).speeds)
         for number, known in viewer.costs.poll():
             self._answers += 1
             for pane in session.panes:
@@ -173,7 +306,6 @@ class Window(BaseWindow):
                         pane.curves["time"].add(known.time, known.travel_time)
 
     def _arrange(self) -> None:
-        """Lay the window out anew when its size, look or number of panes is another."""
         viewer, session = self.viewer, self.viewer.session
         size = self.screen.get_size()
         panes = len(session.panes)
@@ -194,7 +326,6 @@ class Window(BaseWindow):
             self.panel.arrange(layout, theme)
 
     def draw(self) -> None:
-        """Draw everything, and show it."""
         layout, theme, viewer = self.layout, self.theme, self.viewer
         if len(layout.panes) > 1:
             self.screen.fill(theme.background, pygame.Rect(layout.arena))
@@ -203,19 +334,14 @@ class Window(BaseWindow):
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
         draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
-        if layout.panel[2] and self.tour is not None and self._lesson_shown:
-            draw_tour(self.screen, layout, theme, self.tour)
+        if (lesson := self._lesson) is not None:
+            (draw_tour if layout.panel[2] else draw_caption)(self.screen, layout, theme, lesson)
         elif layout.panel[2]:
             self.panel.draw(self.screen)
-        if self.tour is not None and self._lesson_shown and not layout.panel[2]:
-            words = " ".join([self.tour.text, *self.tour.asks])
-            draw_caption(self.screen, layout, theme, self.tour.title, words, self.tour.progress)
-        said = viewer.message
-        if not said and not self._patient and not self._lesson_shown:
+        said, trouble = viewer.message, bool(viewer.message) and viewer.trouble
+        if not said and not self._patient and lesson is None:
             said = suggestion(viewer)
-        draw_message(
-            self.screen, said, layout.arena, theme, layout.scale, bool(viewer.message) and viewer.trouble
-        )
+        draw_message(self.screen, said, layout.arena, theme, layout.scale, trouble)
         if self.help:
             draw_keys(self.screen, theme, layout.scale, self.commands.listed, GROUPS, _HINT)
         self.dialogs.draw(self.screen, theme, layout.scale)
@@ -225,7 +351,6 @@ class Window(BaseWindow):
         self._unfilmed = 0.0
 
     def _inspect(self) -> None:
-        """Let the inspector explain the robot that is asked, a few times a second while that is in sight."""
         number, panel, session = self.viewer.selected, self.panel, self.viewer.session
         if number is None or panel.tab != "robot" or panel.hidden:
             panel.report = None
@@ -235,17 +360,14 @@ class Window(BaseWindow):
             self._reported = shown, self._now
             panel.report = report_on(self.viewer, number)
 
-    # doing
-
     def do(self, name: str) -> None:
-        """Do the action of this name."""
-        if self.tour is not None and self.tour.state != "left" and name in ("back", "forward"):
-            self.tour.skip(1 if name == "forward" else -1)
+        if self._lesson is not None and name in ("back", "forward"):
+            self._lesson.skip(1 if name == "forward" else -1)
             return
         if name == "cancel" and self._end_tour():
             return
-        if name not in _GOES_ON_WITH and name != "tour":
-            self._leave_lesson()
+        if name not in _GOES_ON_WITH:
+            self.leave_lesson()
         if name == "cancel" and self.help:
             self.help = False
             return
@@ -255,42 +377,35 @@ class Window(BaseWindow):
             self.panel.show_tab("robot")
 
     def _own_commands(self) -> list[Command]:
-        def panned(x: int, y: int) -> Callable[[], None]:
-            return lambda: self.canvas.pan(_PAN * x, _PAN * y)
-
-        def zoomed(factor: float) -> Callable[[], None]:
-            return lambda: self.canvas.zoom(factor, self._middle())
-
-        return [
-            *grouped(
-                "View",
+        pan, zoom = self.canvas.pan, self._zoom
+        groups: dict[str, Iterable[Row]] = {
+            "View": [
                 Row("fit", "Show the whole map", self.canvas.fit, "f"),
-                Row("zoom:in", "Zoom in", zoomed(1.25), "ctrl+=, ctrl++", REPEATS),
-                Row("zoom:out", "Zoom out", zoomed(0.8), "ctrl+-", REPEATS),
-                Row("pan:left", "Pan left", panned(1, 0), "ctrl+left", REPEATS),
-                Row("pan:right", "Pan right", panned(-1, 0), "ctrl+right", REPEATS),
-                Row("pan:up", "Pan up", panned(0, 1), "ctrl+up", REPEATS),
-                Row("pan:down", "Pan down", panned(0, -1), "ctrl+down", REPEATS),
+                Row("zoom:in", "Zoom in", partial(zoom, 1.25), "ctrl+=, ctrl++", REPEATS),
+                Row("zoom:out", "Zoom out", partial(zoom, 0.8), "ctrl+-", REPEATS),
+                Row("pan:left", "Pan left", partial(pan, _PAN, 0), "ctrl+left", REPEATS),
+                Row("pan:right", "Pan right", partial(pan, -_PAN, 0), "ctrl+right", REPEATS),
+                Row("pan:up", "Pan up", partial(pan, 0, _PAN), "ctrl+up", REPEATS),
+                Row("pan:down", "Pan down", partial(pan, 0, -_PAN), "ctrl+down", REPEATS),
                 Row("plot", "Plot mean distance or mean time", self.chart.switch, "y"),
                 Row("tab", "Next page of the panel", self._next_tab, "ctrl+tab"),
                 Row("fullscreen", "Full screen", self.toggle_fullscreen, "f11"),
-            ),
-            *grouped(
-                "Keep",
+            ],
+            "Keep": [
                 Row("screenshot", "Screenshot", lambda: self.save_screenshot(self.viewer.folder), "f12"),
                 Row("film", "Record a film, or end it", self.toggle_film, "f9"),
                 Row("save:run", "Save the run", self._save_run, "ctrl+e"),
                 Row("open:file", "Open a session or a map", self._open_file, "ctrl+o"),
-            ),
-            *grouped(
-                "Help",
+            ],
+            "Help": [
                 Row("help", "Keys", self._toggle_help, "f1, shift+/"),
                 Row("palette", "Commands by name", self._open_palette, "ctrl+k, /"),
                 Row("tour", "The lesson, or just play", self._start_tour, "f2"),
                 Row("quit", "Quit", self._quit, "ctrl+q"),
-            ),
-            *grouped("Time", Row("branches", "List of branches", self._list_branches, "ctrl+b")),
-        ]
+            ],
+            "Time": [Row("branches", "List of branches", self._list_branches, "ctrl+b")],
+        }
+        return grouped(groups)
 
     def _end_tour(self) -> bool:
         if self.tour is None:
@@ -300,11 +415,10 @@ class Window(BaseWindow):
         self.viewer.say("the lesson has ended; what was before it is there again")
         return True
 
-    def _middle(self) -> tuple[float, float]:
-        if self.canvas.pane_at(self.pointer.at) is not None:
-            return self.pointer.at
+    def _zoom(self, factor: float) -> None:
         left, top, width, height = self.layout.panes[0]
-        return left + width / 2, top + height / 2
+        over = self.canvas.pane_at(self.pointer.at) is not None
+        self.canvas.zoom(factor, self.pointer.at if over else (left + width / 2, top + height / 2))
 
     def _next_tab(self) -> None:
         self.panel.show_tab(TABS[(TABS.index(self.panel.tab) + 1) % len(TABS)])
@@ -331,7 +445,7 @@ class Window(BaseWindow):
 
         def lines() -> list[Option]:
             found = []
-            for k, each in enumerate(session.branches, 1):
+            for k, each in enumerate(session.document.branches(), 1):
                 text = f"{k}  {each.words}" + ("  (here)" if each.node is session.head else "")
                 found.append(Option(text, each.told(session.scenario.dt), value=each.node.number))
             return found
@@ -339,7 +453,6 @@ class Window(BaseWindow):
         self.dialogs.ask(list_choice("Branches", lines, lambda option: viewer.enter(int(str(option.value)))))
 
     def offer_lesson(self) -> None:
-        """Ask who is here for the first time whether to begin with the lesson; until then the team waits."""
         session = self.viewer.session
         playing, session.playing = session.playing, False
 
@@ -365,26 +478,21 @@ class Window(BaseWindow):
 
     def _start_tour(self) -> None:
         if self.tour is None:
-            self.tour = LessonPlayer(self.viewer, self.canvas.fit, alone=self._patient)
-        elif self.tour.state == "left":
-            self.tour.come_back()
+            self.start_lesson()
         else:
-            self.tour.leave()
+            self.tour.leave_or_come_back()
 
-    def start_lesson(self, path: Path) -> None:
-        """Play a lesson of a file; MapError as `load_lesson`."""
-        self.tour = LessonPlayer(self.viewer, self.canvas.fit, load_lesson(path), alone=self._patient)
+    def start_lesson(self, path: Path | None = None) -> None:
+        """Play a lesson of a file, or the first; MapError as `load_lesson`."""
+        lesson = first_lesson() if path is None else load_lesson(path)
+        self.tour = LessonPlayer(self.viewer, self.canvas.fit, lesson, alone=self._patient)
 
     @property
-    def _lesson_shown(self) -> bool:
-        """Whether a lesson has the place of the panel."""
-        return self.tour is not None and self.tour.state != "left"
+    def _lesson(self) -> LessonPlayer | None:
+        """The lesson, where it has the place of the panel."""
+        return self.tour if self.tour is not None and self.tour.state != "left" else None
 
-    def _asked(self) -> bool:
-        return self.tour is not None and self.tour.state == "asks"
-
-    def _leave_lesson(self) -> None:
-        """Let whoever touches something play; the lesson waits."""
+    def leave_lesson(self) -> None:
         if self.tour is not None:
             self.tour.leave()
 
@@ -392,7 +500,6 @@ class Window(BaseWindow):
         return self.keeper.save(self.viewer.session, self.viewer.folder, self.viewer.map_name)
 
     def toggle_film(self) -> str:
-        """Begin to record what is in the window, or end it."""
         if self.film is None:
             target = free_name(self.viewer.folder, "robocov", ".mp4")
             self.film = Film(target, self.screen.get_size(), patient=self._patient)
@@ -404,10 +511,7 @@ class Window(BaseWindow):
         left_out = f", {film.left_out} frames left out" if film.left_out else ""
         return f"film saved: {film.path} ({film.frames / FILM_FPS:.1f} s{left_out})"
 
-    # events
-
     def take(self, event: pygame.event.Event) -> None:
-        """Take one event."""
         if event.type == pygame.KEYUP:
             self.commands.release(event)
         elif event.type == pygame.WINDOWFOCUSLOST:
@@ -419,11 +523,14 @@ class Window(BaseWindow):
         elif event.type == pygame.DROPFILE:
             path = Path(event.file)
             self.viewer.attempt(lambda: self.viewer.open_file(path))
-        elif event.type == pygame.KEYDOWN and self._asked() and event.unicode in "1234" and event.unicode:
-            assert self.tour is not None
-            self.tour.reply(int(event.unicode))
         elif event.type == pygame.KEYDOWN:
-            self._press(event)
+            if self.tour is not None and self.tour.state == "asks" and event.unicode in tuple("1234"):
+                self.tour.reply(int(event.unicode))
+            elif not self.panel.take(event):  # a key is for a field first, else for a command
+                if (command := self.commands.of_key(event)) is not None:
+                    self.do(command.name)
+                # the key's letter is still to come, and not meant for the palette
+                self.dialogs.swallow(event.unicode)
         elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
         elif event.type in OF_THE_MOUSE:
@@ -432,13 +539,3 @@ class Window(BaseWindow):
             self.pointer.leave()
         else:
             self.panel.take(event)
-
-    def _press(self, event: pygame.event.Event) -> None:
-        """Take a key: for a field first, else for a command."""
-        if self.panel.take(event):
-            return
-        command = self.commands.of_key(event)
-        if command is not None:
-            self.do(command.name)
-        # the key's letter is still to come, and not meant for the palette
-        self.dialogs.swallow(event.unicode)

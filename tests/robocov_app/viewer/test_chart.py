@@ -12,9 +12,8 @@ from driven_window import Driver, opened
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robocov_app.viewer.chart import curve_colour, spread, time_axis, value_axis
+from robocov_app.viewer.chart import curve_colours, spread, time_axis, value_axis
 from robocov_app.viewer.film import pixels
-from robocov_app.viewer.session.curves import compared
 from robocov_app.viewer.session.scenario import ControllerChoice
 
 
@@ -71,7 +70,7 @@ def test_curves_are_drawn_in_the_colours_of_their_controllers(driver: Driver) ->
     left, top, width, height = window.layout.chart
     picture = pixels(window.screen)[top : top + height, left : left + width].astype(int)
     for pane in driver.session.panes:
-        colour = np.array(curve_colour(driver.viewer, window.theme, pane))
+        colour = np.array(curve_colours(driver.session.panes, window.theme)[pane.number])
         assert (np.abs(picture - colour).max(axis=2) < 12).sum() > 20, pane.law.name
 
 
@@ -83,7 +82,7 @@ def test_the_same_controller_twice_has_two_colours(tmp_path: Path) -> None:
         ControllerChoice("rpf"),
         ControllerChoice("rpf"),
     ) as driver:
-        colours = {curve_colour(driver.viewer, driver.window.theme, pane) for pane in driver.session.panes}
+        colours = set(curve_colours(driver.session.panes, driver.window.theme).values())
         assert len(colours) == 4
 
 
@@ -109,7 +108,7 @@ def test_values_are_compared_at_a_time_that_all_curves_know(driver: Driver) -> N
     values = {pane.number: pane.curve.value[-1] for pane in (first, second)}
     second.curve.add(last + 0.01, 99.0)
     driver.session._run.step += 60
-    time, known = compared(driver.session)
+    time, known = driver.session.compared()
     assert time == last
     assert known == pytest.approx(values)
 

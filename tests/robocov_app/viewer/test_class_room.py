@@ -58,7 +58,7 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
         driver.key("k")  # compare: all begin anew
         play(driver)
         compared = state(driver.session)
-        assert [len(driver.session.branches), len(driver.session.panes)] == [2, 2]
+        assert [len(driver.session.document.branches()), len(driver.session.panes)] == [2, 2]
         undone = 0
         while driver.session.head.parent is not None:
             driver.key("ctrl+z")
@@ -83,7 +83,7 @@ def test_the_same_numbers_come_out_everywhere(tmp_path: Path, capsys: pytest.Cap
     (found,) = recoverable(left)
     again, _ = recovered(found, (), left)
     assert_same(state(again.session), last)
-    branch = next(each for each in again.session.branches if each.words == "robot 2 failed")
+    branch = next(each for each in again.session.document.branches() if each.words == "robot 2 failed")
     again.session.enter(branch.node)
     assert_same(state(again.session), failed)
     again.close()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from touched_run import LLOYD, RAPF, RPF, begun, stepped
 
-from robocov_app.viewer.session import decision_replay as module
-from robocov_app.viewer.session.decision_replay import DecisionReplay
+from robocov_app.viewer.session import history as module
+from robocov_app.viewer.session.history import replayed_snapshot
 from robocov_app.viewer.session.scenario import ControllerChoice
 
 MINE = """
@@ -59,9 +59,8 @@ def test_the_past_is_explained_as_it_was(law):
     for _ in range(20):
         seen.append(pane.simulation.snapshot)
         session.step()
-    past = DecisionReplay()
     for k in (13, 2, 19, 0):
-        told = past.snapshot(session.history[k].states[0], session.history.time(k))
+        told = replayed_snapshot(session.history[k].states[0], session.history.time(k))
         assert told.time == pytest.approx(seen[k].time)
         for name in ("positions", "velocities", "obstacle_points"):
             np.testing.assert_array_equal(getattr(told.seen, name), getattr(seen[k].seen, name))
@@ -71,20 +70,18 @@ def test_the_past_is_explained_as_it_was(law):
 
 def test_a_controller_may_remember_what_it_did(file):
     session = stepped(begun(ControllerChoice(f"{file}:Counting")), 10)
-    past = DecisionReplay()
     for k in (3, 8):
         for _ in range(3):
-            told = past.snapshot(session.history[k].states[0], session.history.time(k))
+            told = replayed_snapshot(session.history[k].states[0], session.history.time(k))
             assert told.decision.forces[0, 0] == k + 1.0
 
 
 @pytest.mark.parametrize("way", range(5))
 def test_a_controller_that_fails_decided_nothing(file, way):
     session = stepped(begun(ControllerChoice(f"{file}:Late", {"way": float(way)})), 3)
-    past = DecisionReplay()
     state = session.history[2].states[0]
-    assert past.snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
-    told = past.snapshot(state, 1.0)
+    assert replayed_snapshot(state, 0.0).decision.forces.tolist() == np.ones((3, 2)).tolist()
+    told = replayed_snapshot(state, 1.0)
     assert told.decision.forces.tolist() == np.zeros((3, 2)).tolist()
     assert told.decision.goals is None
     np.testing.assert_array_equal(told.positions, state.positions)
@@ -95,10 +92,10 @@ def test_panes_do_not_take_turns_in_preparing_the_map(monkeypatch):
     made = []
     real = module.RangeSensor
     monkeypatch.setattr(module, "RangeSensor", lambda pieces, movers=(): made.append(1) or real(pieces))
-    module._sensor_in.cache_clear()
+    module.sensor_in.cache_clear()
     session.look_at(0.0)
     for _ in range(5):
         for pane in session.panes:
             session.snapshot(pane)
     assert len(made) == 1
-    module._sensor_in.cache_clear()
+    module.sensor_in.cache_clear()

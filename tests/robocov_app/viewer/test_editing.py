@@ -24,9 +24,8 @@ from robocov_app.viewer.session.map_edits import (
     obstacle_at,
     polygon_of,
     wall_of,
-    with_moved,
     with_obstacle,
-    without_obstacle,
+    with_replaced,
     words_for,
 )
 
@@ -45,20 +44,20 @@ def test_one_more_one_less():
     more = with_obstacle(YARD, circle)
     assert more.obstacles == (BLOCK, PILLAR, WALL, circle)
     assert YARD.obstacles == (BLOCK, PILLAR, WALL)
-    assert without_obstacle(more, 3) == YARD
-    assert without_obstacle(YARD, 1).obstacles == (BLOCK, WALL)
+    assert with_replaced(more, 3, 1) == YARD
+    assert with_replaced(YARD, 1, 1).obstacles == (BLOCK, WALL)
     assert (more.name, more.boundary, more.starts) == (YARD.name, YARD.boundary, YARD.starts)
 
 
 @given(st.integers(0, 2), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_an_obstacle_moves_and_comes_back(index, dx, dy):
-    there = with_moved(YARD, index, dx, dy)
+    there = with_replaced(YARD, index, 1, [moved(YARD.obstacles[index], dx, dy)])
     assert [k for k in range(3) if k != index and there.obstacles[k] != YARD.obstacles[k]] == []
     was, now = YARD.obstacles[index].polygon, there.obstacles[index].polygon
     assert now.area == pytest.approx(was.area, rel=1e-3)
     assert now.centroid.x - was.centroid.x == pytest.approx(dx, abs=1e-4)
     assert now.centroid.y - was.centroid.y == pytest.approx(dy, abs=1e-4)
-    back = with_moved(there, index, -dx, -dy)
+    back = with_replaced(there, index, 1, [moved(there.obstacles[index], -dx, -dy)])
     assert back.obstacles[index].polygon.equals_exact(was, 1e-3)
 
 

@@ -17,9 +17,8 @@ from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
 from robocov_app.viewer import launch as opening
-from robocov_app.viewer.launch import Launcher
+from robocov_app.viewer.launch import Launcher, Settings
 from robocov_app.viewer.session.scenario import ControllerChoice
-from robocov_app.viewer.settings import Settings
 from robocov_app.viewer.status import cursor_words, facts, suggestion
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))

@@ -16,10 +16,10 @@ from robocov.record import Record
 from robocov_app.cli import main
 from robocov_app.runs.options import FilmOptions
 from robocov_app.viewer.headless import parts_of, story_frames
-from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.file import load_session, save_session
 from robocov_app.viewer.session.map_edits import with_obstacle
 from robocov_app.viewer.session.session import Session
+from robocov_app.viewer.session.workspace import RunSaver
 
 SMALL = ["--lattice", "16", "--size", "320x240"]
 
@@ -174,7 +174,7 @@ def test_a_run_is_saved_by_another_process_and_nothing_else_stays(
     words = saver.save(played(), tmp_path)
     assert words == f"saving the run: {tmp_path / 'hall-comparison-1'}/" and saver.poll() == []
     saver.finish()
-    (said,) = saver.poll()
-    assert said.words.startswith("run saved: ") and not said.trouble
+    ((words, trouble),) = saver.poll()
+    assert words.startswith("run saved: ") and not trouble
     assert (tmp_path / "hall-comparison-1" / "session.robocov").is_file()
     assert not list(aside.iterdir())

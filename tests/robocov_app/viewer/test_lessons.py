@@ -66,7 +66,7 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         driver.window._patient = False
         driver.window.start_lesson(short(tmp_path))
         lesson, viewer = driver.window.tour, driver.viewer
-        assert lesson is not None and lesson.title == "1  Failure" and viewer.session is not before
+        assert lesson is not None and lesson.chapter.title == "Failure" and viewer.session is not before
         driver.frames(6)
         assert viewer.session.numbers == (1, 2, 3)
         driver.frames(30)

@@ -86,7 +86,7 @@ def test_it_steps_as_the_simulation_does():
     assert pane.time == pytest.approx(0.5)
     assert pane.trail.time[-1] == pytest.approx(0.5)
     assert len(pane.trail) == 16
-    np.testing.assert_array_equal(pane.decide().forces, twin.snapshot.decision.forces)
+    np.testing.assert_array_equal(pane.simulation.snapshot.decision.forces, twin.snapshot.decision.forces)
 
 
 def test_what_is_sensed_is_noted_now_and_then():

@@ -10,7 +10,7 @@ from driven_window import opened
 
 from robocov.cost import CoverageCost
 from robocov.robots import Team
-from robocov_app.viewer.session.curves import DISTANCE, TIME, chosen, compared, speeds_of
+from robocov_app.viewer.session.history import DISTANCE, TIME
 from robocov_app.viewer.session.scenario import TeamSpec
 
 MIXED = TeamSpec.of(Team.joined([Team.homogeneous(2, max_speed=1.0), Team.homogeneous(1, max_speed=0.25)]))
@@ -19,20 +19,19 @@ MIXED = TeamSpec.of(Team.joined([Team.homogeneous(2, max_speed=1.0), Team.homoge
 def test_where_robots_differ_in_speed_there_is_a_curve_of_the_mean_time(tmp_path: Path) -> None:
     with opened(tmp_path, limits=MIXED) as driver:
         session, pane = driver.session, driver.session.panes[0]
-        np.testing.assert_array_equal(speeds_of(session, pane), [1.0, 1.0, 0.25])
+        np.testing.assert_array_equal(session.setup(pane).speeds, [1.0, 1.0, 0.25])
         session.playing = True
         driver.frames(20)
         session.playing = False
         driver.frames(2)
-        assert chosen(session, TIME) is TIME
         places = session.positions(pane)
         expected = CoverageCost(session.environment, 16)(places, np.array([1.0, 1.0, 0.25])).mean_time
         assert pane.curves["time"].value[-1] == expected
-        assert compared(session, TIME) == (session.time, {pane.number: pytest.approx(expected)})
+        assert session.compared("time") == (session.time, {pane.number: pytest.approx(expected)})
         # who has failed does not come, but who is left is still told of
         session.fail_robot(3)
         driver.frames(2)
-        assert speeds_of(session, pane).tolist() == [1.0, 1.0]
+        assert session.setup(pane).speeds.tolist() == [1.0, 1.0]
         assert pane.curves["time"].value[-1] == pytest.approx(pane.curve.value[-1])
 
 
@@ -71,7 +70,7 @@ def test_what_is_left_stays_as_ghosts_of_both(tmp_path: Path) -> None:
 def test_where_all_are_equally_fast_there_is_no_choice(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.frames(3)
-        assert speeds_of(driver.session, driver.session.panes[0]) is None
+        assert driver.session.setup(driver.session.panes[0]).speeds is None
         driver.key("y")
         assert driver.window.chart.plotted is DISTANCE
         assert "equally fast" in driver.viewer.message

@@ -17,8 +17,6 @@ from robocov_app.viewer.session.scenario import (
     ControllerChoice,
     Scenario,
     TeamSpec,
-    branch_words,
-    gain_words,
 )
 
 MINE = """
@@ -73,17 +71,16 @@ class TestLaw:
 
     def test_what_differs_in_words(self):
         stiff = ControllerChoice("rapf", {"k_rep": 0.123456})
-        assert gain_words(RAPF, stiff) == "k_rep = 0.123"
-        assert gain_words(stiff, stiff.with_gain("k_att", 2.0)) == "k_att = 2"
-        assert gain_words(stiff, stiff) == ""
-        assert branch_words(RAPF) == "RAPF"
-        assert branch_words(stiff) == "RAPF, k_rep 0.123"
+        assert stiff.words_since(RAPF) == "k_rep = 0.123"
+        assert stiff.with_gain("k_att", 2.0).words_since(stiff) == "k_att = 2"
+        assert stiff.words_since(stiff) == ""
+        assert RAPF.words == "RAPF"
+        assert stiff.words == "RAPF, k_rep 0.123"
         optional = [name for name, gain in RAPF.known.items() if gain.optional]
         for name in optional:
             law = ControllerChoice("rapf", {name: 1.25})
-            assert "no limit" in gain_words(law, ControllerChoice("rapf", {name: None})) + branch_words(
-                ControllerChoice("rapf", {name: None})
-            )
+            free = ControllerChoice("rapf", {name: None})
+            assert "no limit" in free.words_since(law) + free.words
 
 
 class TestLimits:

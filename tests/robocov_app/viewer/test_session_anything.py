@@ -13,7 +13,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, robots_of, step
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, RobocovError
-from robocov_app.viewer.session.map_edits import with_moved, with_obstacle, without_obstacle
+from robocov_app.viewer.session.map_edits import moved, with_obstacle, with_replaced
 from robocov_app.viewer.session.scenario import TeamSpec
 from robocov_app.viewer.session.session import MOST_GHOSTS
 
@@ -104,14 +104,18 @@ class Anything(RuleBasedStateMachine):
         there = self.session.environment
         if there.obstacles:
             k %= len(there.obstacles)
-            self.attempt(lambda: self.session.edit(with_moved(there, k, *by), "moved"))
+            self.attempt(
+                lambda: self.session.edit(
+                    with_replaced(there, k, 1, [moved(there.obstacles[k], *by)]), "moved"
+                )
+            )
 
     @rule(k=st.integers(0, 9))
     def delete_obstacle(self, k):
         there = self.session.environment
         if there.obstacles:
             k %= len(there.obstacles)
-            self.attempt(lambda: self.session.edit(without_obstacle(there, k), "deleted"))
+            self.attempt(lambda: self.session.edit(with_replaced(there, k, 1), "deleted"))
 
     @rule(redo=st.booleans())
     def undo(self, redo):
@@ -237,7 +241,7 @@ def touched(session, kind, point, k) -> None:
     if kind == "draw":
         session.edit(with_obstacle(session.environment, CircleObstacle(point, 0.2)), "drawn")
     elif kind == "delete" and obstacles:
-        session.edit(without_obstacle(session.environment, k % obstacles), "deleted")
+        session.edit(with_replaced(session.environment, k % obstacles, 1), "deleted")
     elif kind == "add":
         session.add_robot(point)
     elif kind == "remove":

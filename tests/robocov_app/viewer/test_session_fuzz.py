@@ -68,7 +68,7 @@ class Monkey:
         elif kind == "revive":
             s.revive_robot(r.choice([*s.setup(s.panes[0]).failed, 9]))
         elif kind == "enter":
-            branch = r.choice(s.branches)
+            branch = r.choice(s.document.branches())
             s.enter(branch.node, r.randint(branch.node.begin, branch.node.end))
         elif kind in ("past", "branch"):
             s.look_at(s.end * r.random())
@@ -105,7 +105,7 @@ def test_a_random_story_is_made_again_bit_for_bit(seed: int) -> None:
     text = dumped(session_json(session.document, session.head, session.step_now, {}))
     twin = Session.opened(session_of(json.loads(text), "twin"))
     compare(session, twin)
-    for branch in session.branches:
+    for branch in session.document.branches():
         for one, node in ((session, branch.node), (twin, twin.document.nodes[branch.node.number])):
             one.enter(node)
             one.remake()

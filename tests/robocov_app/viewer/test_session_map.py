@@ -8,7 +8,7 @@ from touched_run import HALL, LLOYD, RAPF, RPF, all_told, begun, stepped, too_de
 
 from robocov.environment import CircleObstacle, PolygonObstacle
 from robocov.errors import ParameterError, StartError
-from robocov_app.viewer.session.map_edits import without_obstacle
+from robocov_app.viewer.session.map_edits import with_replaced
 from robocov_app.viewer.session.scenario import MOST_PANES, TeamSpec
 
 # panes
@@ -69,7 +69,7 @@ def test_who_leans_on_a_wall_is_not_pushed():
 def test_edits_are_taken_back_and_done_again():
     session = stepped(begun(RAPF, LLOYD), 10)
     first = with_pillar()
-    second = without_obstacle(first, 0)
+    second = with_replaced(first, 0, 1)
     session.edit(first, "circle drawn")
     stepped(session, 5)
     session.edit(second, "pillar deleted")

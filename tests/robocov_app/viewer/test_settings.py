@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robocov_app.toolkit.settings import FOLDER, changed_settings, loaded, save_settings, settings_file
-from robocov_app.viewer.settings import Settings
+from robocov_app.viewer.launch import Settings
 
 load_settings = partial(loaded, Settings)
 

@@ -248,14 +248,14 @@ class TestWall:
 
     def test_wider_and_narrower(self):
         tool, session = Wall(), begun()
-        tool.widen(1.25)
+        tool.widen(session, 1.25)
         assert tool.width == 0.125
         clicked(tool, session, (3.2, 3.2), (3.2, 3.8))
         tool.finish(session)
         assert session.environment.obstacles[-1].width == 0.125
         for factor, end in ((0.8, 0.02), (1.25, 5.0)):
             for _ in range(60):
-                tool.widen(factor)
+                tool.widen(session, factor)
             assert tool.width == end
 
     def test_a_point_is_no_wall(self):

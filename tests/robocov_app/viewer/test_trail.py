@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from touched_run import LLOYD, RAPF, begun, stepped
 
 from robocov_app.viewer.session import history as module
-from robocov_app.viewer.session.history import MOST_ROWS, RATE, Trail, starts_of, trail_of
+from robocov_app.viewer.session.history import MOST_ROWS, RATE, Trail, way_of
 
 STEP = 1 / 60
 
@@ -80,15 +80,11 @@ def test_of_the_older_half_every_second_row_goes():
     assert long.positions[-1, 0, 0] == 6 * MOST_ROWS - 1
 
 
-def test_until_a_time_and_cut_at_it():
+def test_until_a_time():
     trail = walked(10)
     for time, count in ((-1.0, 0), (0.0, 1), (3 / RATE, 4), (3 / RATE + 0.01, 4), (99.0, 10)):
         positions, times = trail.until(time)
         assert len(positions) == len(times) == count
-    trail.cut(3 / RATE)
-    assert len(trail) == 4
-    trail.add(4 / RATE, np.array([[50.0, 50.0]]))
-    assert trail.positions[:, 0, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 50.0]
 
 
 def test_a_trail_of_moments():
@@ -101,10 +97,10 @@ def test_a_trail_of_moments():
 def test_the_trail_of_a_past_is_that_which_was_left():
     session = stepped(begun(RAPF, LLOYD), 60)
     for pane in session.panes:
-        told = trail_of(session.history, pane.number, 60)
+        told, starts = way_of(session.history, pane.number, 60)
         np.testing.assert_array_equal(told.positions, pane.trail.positions)
         assert told.time == pytest.approx(pane.trail.time)
-        np.testing.assert_array_equal(starts_of(session.history, pane.number, 60), pane.starts)
+        np.testing.assert_array_equal(starts, pane.starts)
 
 
 def test_robots_that_came_later_were_nowhere_before():
@@ -114,16 +110,16 @@ def test_robots_that_came_later_were_nowhere_before():
     session.fail_robot(1)
     stepped(session, 10)
     assert session.numbers == (2, place)
-    told = trail_of(session.history, 0, 30)
+    told, starts = way_of(session.history, 0, 30)
     assert told.positions.shape[1] == 2
     assert np.isfinite(told.positions[:, 0]).all()
     assert np.isnan(told.positions[told.time < 9.5 / 60, 1]).all()
     assert np.isfinite(told.positions[told.time > 9.5 / 60, 1]).all()
-    assert starts_of(session.history, 0, 30)[1].tolist() == [3.5, 3.0]
+    assert starts[1].tolist() == [3.5, 3.0]
     # of those that worked then
-    earlier = trail_of(session.history, 0, 5)
+    earlier, starts = way_of(session.history, 0, 5)
     assert np.isfinite(earlier.positions).all()
-    np.testing.assert_array_equal(starts_of(session.history, 0, 5), session.history[0].states[0].positions)
+    np.testing.assert_array_equal(starts, session.history[0].states[0].positions)
 
 
 @pytest.mark.parametrize("steps", range(1, 7))
@@ -132,7 +128,7 @@ def test_who_came_in_between_two_rows_is_in_the_last_one(steps):
     session.add_robot((3.5, 3.0))
     stepped(session, steps)
     for last in range(3, 3 + steps + 1):
-        told = trail_of(session.history, 0, last)
+        told, _ = way_of(session.history, 0, last)
         np.testing.assert_array_equal(told.positions[-1], session.history[last].states[0].positions)
         assert told.time[-1] == pytest.approx(last * STEP)
         assert told.positions[np.isfinite(told.positions[:, 1, 0]), 1][0].tolist() == [3.5, 3.0]

@@ -10,7 +10,7 @@ from touched_run import begun, positions_of, stepped, viewer_of
 
 from robocov.errors import MapError
 from robocov_app.viewer.presenter import Presenter
-from robocov_app.viewer.session.workspace import Workspace, recoverable, recovered
+from robocov_app.viewer.session.workspace import Workspace, offer, recoverable, recovered
 
 
 def kept(workspace: Workspace) -> None:
@@ -30,7 +30,7 @@ def test_what_was_not_saved_is_offered_and_gone_on_with(tmp_path: Path) -> None:
     stepped(session, 10)
     kept(workspace)
     (found,) = recoverable(tmp_path)
-    assert "1 touch, " in found.words and found.words.endswith("never saved")
+    assert "1 touch, " in offer(found) and offer(found).endswith("never saved")
     again, view = recovered(found, (), tmp_path)
     assert view == {"theme": "light"} and again.unsaved
     assert again.session.numbers == (1, 3) and again.session.end == session.end
@@ -79,7 +79,7 @@ def test_a_session_is_saved_opened_and_its_branches_walked_in_the_window(tmp_pat
         assert driver.session.numbers == (2, 3)
         driver.window.commands.typed(f"open {path}")
         driver.frames(2)
-        assert driver.viewer.session.numbers == (2, 3) and len(driver.viewer.session.branches) == 2
+        assert driver.viewer.session.numbers == (2, 3) and len(driver.viewer.session.document.branches()) == 2
         driver.window.commands.typed("branch 1")
         assert driver.viewer.session.numbers == (1, 3)
 

@@ -4,7 +4,6 @@ Those of panes say how one is to go on; `Lockstep` carries them out in all panes
 not fit where they are wanted go as near as they fit.
 """
 
-from bisect import bisect
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Annotated, Any, Literal, TypeAlias
@@ -18,8 +17,7 @@ from robocov.errors import MapError, ParameterError, RobocovError
 from robocov.mapfile import density_of, to_json
 from robocov.mapfile.models import DensityModel, ObstacleModel, plain
 from robocov.world.relocation import nearest_free
-from robocov_app.viewer.session.history import PaneSetup
-from robocov_app.viewer.session.map_edits import painted, with_obstacles
+from robocov_app.viewer.session.map_edits import painted, with_replaced
 from robocov_app.viewer.session.pane import Continuation, Pane
 from robocov_app.viewer.session.scenario import MOST_ROBOTS, Law, Limits, Position, Scenario, read_as, refused
 
@@ -44,7 +42,6 @@ def _density_of(model: Any, context: Any) -> Density | None:
 
 
 def _density_json(density: Density | None, context: object = None) -> object:
-    """Return a density as maps have it."""
     square = Environment("square", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)), (), {})
     return to_json(square.with_density(density)).get("density")
 
@@ -53,14 +50,13 @@ _DENSITY = read_as(DensityModel | None, _density_of, _density_json)
 
 
 def _begun(value: object, read: Any) -> Scenario:
-    """Return a scenario of a file; what cannot be begun is told with its place."""
     try:
         scenario: Scenario = read(value)
+        return scenario
     except MapError:
         raise
     except RobocovError as error:
         raise refused(error) from None
-    return scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,16 +102,8 @@ class Place(OfRobot):
     do: Literal["place"] = field(default="place", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        setup, row = pane.setup, _row(pane, self.robot)
-        if row is None:
-            others, radii = pane.simulation.positions, pane.simulation.team.radius
-            place = _fitting(_without_wreck(setup, self.robot), self.robot, others, radii, self.at)
-            return Continuation(replace(setup, failed={**setup.failed, self.robot: place}))
-        positions, velocities = np.array(pane.simulation.positions), np.array(pane.simulation.velocities)
-        others, radii = np.delete(positions, row, axis=0), np.delete(setup.team.radius, row)
-        positions[row] = _fitting(setup, self.robot, others, radii, self.at)
-        velocities[row] = 0.0
-        return Continuation(setup, positions, velocities)
+        row, place = _row(pane, self.robot), _fitting(pane, self.robot, self.at)
+        return _with(pane, self.robot, failed=place) if row is None else _with(pane, self.robot, place)
 
 
 @dataclass(frozen=True)
@@ -126,12 +114,12 @@ class Join(OfRobot):
     do: Literal["join"] = field(default="join", kw_only=True)
 
     def of(self, pane: Pane) -> Continuation:
-        there = _there(pane)
+        there = pane.setup.there
         if len(there) >= MOST_ROBOTS:
             raise ParameterError(f"there are {MOST_ROBOTS} robots already")
         if self.robot in there:
             raise ParameterError(f"there is a robot {self.robot} already")
-        return _with_robot(pane, pane.setup, self.robot, self.at)
+        return _with(pane, self.robot, _fitting(pane, self.robot, self.at))
 
 
 @dataclass(frozen=True)
@@ -143,7 +131,7 @@ class Leave(OfRobot):
     def of(self, pane: Pane) -> Continuation:
         _row(pane, self.robot)
         _need_another(pane, self.robot)
-        return _without_robot(pane, self.robot)
+        return _with(pane, self.robot)
 
 
 @dataclass(frozen=True)
@@ -158,9 +146,7 @@ class Fail(OfRobot):
             raise ParameterError(f"robot {self.robot} has failed already")
         _need_another(pane, self.robot)
         x, y = pane.simulation.positions[row].tolist()
-        wanted = _without_robot(pane, self.robot)
-        failed = {**wanted.setup.failed, self.robot: (x, y)}
-        return wanted._replace(setup=replace(wanted.setup, failed=failed))
+        return _with(pane, self.robot, failed=(x, y))
 
 
 @dataclass(frozen=True)
@@ -172,8 +158,7 @@ class Revive(OfRobot):
     def of(self, pane: Pane) -> Continuation:
         if _row(pane, self.robot) is not None:
             raise ParameterError(f"robot {self.robot} works")
-        setup = pane.setup
-        return _with_robot(pane, _without_wreck(setup, self.robot), self.robot, setup.failed[self.robot])
+        return _with(pane, self.robot, _fitting(pane, self.robot, pane.setup.failed[self.robot]))
 
 
 @dataclass(frozen=True)
@@ -186,10 +171,7 @@ class EditObstacles(_Change):
     do: Literal["obstacles"] = field(default="obstacles", kw_only=True)
 
     def on(self, environment: Environment) -> Environment:
-        there = environment.obstacles
-        return with_obstacles(
-            environment, (*there[: self.first], *self.added, *there[self.first + self.removed :])
-        )
+        return with_replaced(environment, self.first, self.removed, self.added)
 
 
 @dataclass(frozen=True)
@@ -258,11 +240,11 @@ class Restart(_Change):
 
 MapChange: TypeAlias = EditObstacles | Paint | SetDensity
 PaneChange: TypeAlias = Place | Join | Leave | Fail | Revive | SetController | SetLimits
-Change: TypeAlias = PaneChange | MapChange | Drag | Release | RemovePane | Restart
+Touch: TypeAlias = PaneChange | MapChange | Drag | Release | RemovePane
+Change: TypeAlias = Touch | Restart
 
 
 def map_change(before: Environment, after: Environment) -> EditObstacles:
-    """Return the change from one map to another of the same place that differs in some obstacles."""
     old, new = before.obstacles, after.obstacles
     first = _alike(old, new)
     last = _alike(old[first:][::-1], new[first:][::-1])
@@ -270,17 +252,12 @@ def map_change(before: Environment, after: Environment) -> EditObstacles:
 
 
 def _alike(old: tuple[Obstacle, ...], new: tuple[Obstacle, ...]) -> int:
-    """Return how many obstacles are the same at the beginning."""
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(old, new, strict=False)))
-
-
-def _there(pane: Pane) -> set[int]:
-    return {*pane.numbers, *pane.setup.failed}
 
 
 def _row(pane: Pane, number: int) -> int | None:
     """Return the row of a robot, None where it has failed."""
-    if number not in _there(pane):
+    if number not in pane.setup.there:
         raise ParameterError(f"there is no robot {number}")
     return pane.row(number)
 
@@ -290,32 +267,30 @@ def _need_another(pane: Pane, number: int) -> None:
         raise ParameterError("the last robot that works stays")
 
 
-def _fitting(setup: PaneSetup, number: int, others: np.ndarray, radii: np.ndarray, point: Point) -> Point:
-    """Return the place nearest to a point where a robot fits beside the others and those that failed."""
-    return nearest_free(setup.solid, setup.limits.radius_of(number), others, point, radii)
+def _fitting(pane: Pane, number: int, point: Point) -> Point:
+    """Return the place nearest to a point where a robot fits beside all others."""
+    setup, simulation = pane.setup, pane.simulation
+    rows = [row for row, each in enumerate(pane.numbers) if each != number]
+    wrecks = {each: place for each, place in setup.failed.items() if each != number}
+    solid, radius = replace(setup, failed=wrecks).solid, setup.limits.radius_of(number)
+    return nearest_free(solid, radius, simulation.positions[rows], point, simulation.team.radius[rows])
 
 
-def _without_wreck(setup: PaneSetup, number: int) -> PaneSetup:
-    return replace(setup, failed={key: place for key, place in setup.failed.items() if key != number})
-
-
-def _without_robot(pane: Pane, number: int) -> Continuation:
-    setup, row = _without_wreck(pane.setup, number), pane.row(number)
-    if row is None:
+def _with(pane: Pane, number: int, at: Point | None = None, failed: Point | None = None) -> Continuation:
+    """Return a pane with a robot at rest at a place, or failed at one, or without it."""
+    setup, simulation, wrecks = pane.setup, pane.simulation, dict(pane.setup.failed)
+    moving = zip(simulation.positions, simulation.velocities, strict=True)
+    robots: dict[int, Any] = dict(zip(pane.numbers, moving, strict=True))
+    robots.pop(number, None)
+    if at is not None:
+        robots[number] = at, (0.0, 0.0)
+    if failed is not None:
+        wrecks[number] = failed
+    else:
+        wrecks.pop(number, None)
+    numbers = tuple(sorted(robots))
+    if numbers != setup.numbers or wrecks != setup.failed:
+        setup = replace(setup, numbers=numbers, failed=wrecks)
+    if numbers == pane.numbers and at is None:
         return Continuation(setup)
-    return Continuation(
-        replace(setup, numbers=tuple(each for each in setup.numbers if each != number)),
-        np.delete(pane.simulation.positions, row, axis=0),
-        np.delete(pane.simulation.velocities, row, axis=0),
-    )
-
-
-def _with_robot(pane: Pane, setup: PaneSetup, number: int, point: Point) -> Continuation:
-    """Return a pane's robots and one more, at rest at a point or as near as it fits."""
-    positions, row = pane.simulation.positions, bisect(setup.numbers, number)
-    place = _fitting(setup, number, positions, pane.simulation.team.radius, point)
-    return Continuation(
-        replace(setup, numbers=(*setup.numbers[:row], number, *setup.numbers[row:])),
-        np.insert(positions, row, place, axis=0),
-        np.insert(pane.simulation.velocities, row, 0.0, axis=0),
-    )
+    return Continuation(setup, *(np.array([robots[each][k] for each in numbers]) for k in (0, 1)))

@@ -5,67 +5,45 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)
-"""Simulated seconds per second; infinite for as fast as it goes."""
-
-LONGEST_FRAME = 0.1
-"""Longest frame, s: what it took beyond is not made up for."""
-
-FRAME_BUDGET = 0.008
-"""So many seconds of a frame a window that people look at gives to the steps of the simulation."""
-
-_PATIENT = 16.0
-"""Speed of "as fast as it goes" where no time runs out."""
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, math.inf)  # simulated seconds per second
+LONGEST_FRAME = 0.1  # longest frame, s: what it took beyond is not made up for
+FRAME_BUDGET = 0.008  # seconds of a frame that go to the steps of the simulation, where people look on
+_PATIENT = 16.0  # speed of "as fast as it goes" where no time runs out
 
 
 def speed_words(speed: float) -> str:
-    """Return a speed as people write it: ``0.5×``, ``max``."""
     return "max" if math.isinf(speed) else f"{speed:g}×"
 
 
 def speed_index(speed: float) -> int:
-    """Return the number of the nearest of `SPEEDS`, by their ratios."""
     logs = [math.log(min(each, 1e4)) for each in (*SPEEDS, speed)]
     return min(range(len(SPEEDS)), key=lambda k: abs(logs[k] - logs[-1]))
 
 
 @dataclass
 class Clock:
-    """Turns seconds that have passed into steps of `dt` seconds, at a speed.
-
-    `budget`, s: so long the steps of one frame may take, infinite to make them all whatever they take.
-    `behind`: whether the last frame's steps were more than its budget.
-    """
+    """Turns seconds that have passed into steps of `dt` seconds, at a speed."""
 
     dt: float
     speed: float = 1.0
-    budget: float = math.inf
-    behind: bool = False
+    budget: float = math.inf  # s, so long the steps of a frame may take; infinite: all, whatever they take
+    behind: bool = False  # whether the last frame's steps were more than its budget
     _due: float = 0.0
 
     def advance(self, seconds: float, step: Callable[[], bool]) -> int:
-        """Make the steps that are due after so many seconds; return how many were made.
-
-        `step` makes one and says whether to go on. What does not fit into the budget is dropped: the run
-        becomes slower, the window does not.
-        """
+        """Make due steps until one says False; return how many. Those beyond the budget are dropped."""
         speed = _PATIENT if math.isinf(self.speed) and math.isinf(self.budget) else self.speed
-        wanted = math.inf
-        if math.isfinite(speed):
-            self._due += min(seconds, LONGEST_FRAME) * speed
-            wanted = math.floor(self._due / self.dt + 1e-9)
-        due, self._due = self._due, 0.0
-        began, made = perf_counter(), 0
-        self.behind = False
+        endless, began, made = math.isinf(speed), perf_counter(), 0
+        due = self._due + (0.0 if endless else min(seconds, LONGEST_FRAME) * speed)
+        wanted = math.inf if endless else math.floor(due / self.dt + 1e-9)
+        self._due, self.behind = 0.0, False
         while made < wanted:
             made += 1
             if not step():
                 return made
             if perf_counter() - began > self.budget:
-                self.behind = math.isfinite(wanted) and made < wanted
+                self.behind = not endless and made < wanted
                 break
-        if math.isfinite(wanted) and not self.behind:
-            self._due = max(due - made * self.dt, 0.0)
-        elif not math.isfinite(wanted):
-            self._due = due
+        if not self.behind:
+            self._due = due if endless else max(due - made * self.dt, 0.0)
         return made

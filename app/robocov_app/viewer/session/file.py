@@ -4,8 +4,6 @@ Bundled maps are named, with a digest; others are in the file whole, once. A con
 named by its path, and never run because a file says so.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping
@@ -24,14 +22,11 @@ from robocov.files.strictjson import check_header, located, parse, read_bytes, r
 from robocov.mapfile import bundled_maps, from_json, load_map, to_json
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Restart, Robot, Step
-from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.document import Document, Node
 from robocov_app.viewer.session.scenario import Coordinate, Text
 
 FORMAT, VERSION, SUFFIX = "robocov-session", 1, ".robocov"
-
-MOST_SAMPLES = 30
-"""Samples of a curve that stand in the file, for each touch."""
+MOST_SAMPLES = 30  # samples of a curve that stand in the file, for each touch
 
 
 @dataclass(frozen=True)
@@ -46,6 +41,7 @@ _CHANGE = Annotated[
     _Pulled | changes.Release | changes.RemovePane | Restart | changes.PaneChange | changes.MapChange,
     Field(discriminator="do"),
 ]
+_WRITER: TypeAdapter[Change] = TypeAdapter(Change)
 _Box = Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
 
 
@@ -146,17 +142,16 @@ class SessionModel(_Model, title="robocov session"):
 
 @dataclass(frozen=True, eq=False)
 class SavedSession:
-    """Content of a session file. `step`: the present. `view`: what is shown, and how."""
+    """Content of a session file."""
 
     document: Document
     head: Node
-    step: int
+    step: int  # the present
     view: Mapping[str, Any] = field(default_factory=dict)
     lesson: LessonModel | None = None
 
 
 def session_schema() -> dict[str, Any]:
-    """Return the JSON schema of session files."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **SessionModel.model_json_schema()}
 
 
@@ -169,16 +164,13 @@ def save_session(path: Path, document: Document, head: Node, step: int, view: Ma
 
 def dumped(content: Mapping[str, Any]) -> str:
     """Return a session as text: a line for each touch."""
-    touches = ",\n  ".join(
-        json.dumps(each, ensure_ascii=False, allow_nan=False) for each in content["touches"]
-    )
-    rest = {key: value for key, value in content.items() if key != "touches"}
-    text = json.dumps(rest, ensure_ascii=False, allow_nan=False, indent=1)
+    write = partial(json.dumps, ensure_ascii=False, allow_nan=False)
+    touches = ",\n  ".join(map(write, content["touches"]))
+    text = write({key: value for key, value in content.items() if key != "touches"}, indent=1)
     return text.removesuffix("\n}") + f',\n "touches": [\n  {touches}\n ]\n}}\n'
 
 
 def session_json(document: Document, head: Node, step: int, view: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a session as JSON."""
     from robocov import __version__
 
     maps = _Maps()
@@ -187,31 +179,21 @@ def session_json(document: Document, head: Node, step: int, view: Mapping[str, A
     return {**content, "touches": touches, "head": head.number, "step": step, "view": dict(view)}
 
 
-def _touch_json(node: Node, maps: _Maps) -> dict[str, Any]:
+def _touch_json(node: Node, maps: "_Maps") -> dict[str, Any]:
     told: list[dict[str, Any]] = []
     for change in node.changes:
-        pulled = change if isinstance(change, Drag) else None
-        if pulled is None:
-            told.append(_writer().dump_python(change, mode="json", by_alias=True, context=maps))
-        elif told and told[-1]["do"] == "drag" and told[-1]["robot"] == pulled.robot:
-            told[-1]["path"].append([pulled.step, *pulled.to])
-        else:
-            path = [[pulled.step, *pulled.to]]
-            told.append({"step": pulled.step, "do": "drag", "robot": pulled.robot, "path": path})
+        if not isinstance(change, Drag):
+            told.append(_WRITER.dump_python(change, mode="json", by_alias=True, context=maps))
+            continue
+        if not (told and told[-1]["do"] == "drag" and told[-1]["robot"] == change.robot):
+            told.append({"step": change.step, "do": "drag", "robot": change.robot, "path": []})
+        told[-1]["path"].append([change.step, *change.to])
     parent = None if node.parent is None else node.parent.number
     named = {"name": node.name} if node.name else {}
     head = {"parent": parent, "at": node.at, "kind": node.kind, "words": node.words, **named}
-    curves = {
-        f"{pane} {what}": curve.outline(MOST_SAMPLES)
-        for (pane, what), curve in node.curves.items()
-        if len(curve)
-    }
+    drawn = {key: curve for key, curve in node.curves.items() if len(curve)}
+    curves = {f"{pane} {what}": each.outline(MOST_SAMPLES) for (pane, what), each in drawn.items()}
     return {**head, "end": node.end, "changes": told, **({"curves": curves} if curves else {})}
-
-
-@cache
-def _writer() -> TypeAdapter[Change]:
-    return TypeAdapter(Change)
 
 
 def load_session(path: Path, controllers: Collection[str] = ()) -> SavedSession:
@@ -255,7 +237,6 @@ def session_of(content: Any, where: str, controllers: Collection[str] = ()) -> S
 
 
 def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> Node:
-    """Return the next node of a document."""
     first, parent = not nodes, None
     if (touch.parent is None) != first or (touch.parent is not None and touch.parent >= len(nodes)):
         refuse("parent", value=touch.parent, wanted="null for the first, else an earlier number,")
@@ -280,7 +261,7 @@ def _node(touch: TouchModel, nodes: list[Node], refuse: Callable[..., None]) -> 
         if not pane.isdecimal() or what not in ("distance", "time") or len(samples) != 2:
             refuse("curves", value=name, wanted='"0 distance", "0 time", ... with times and values')
         for time, value in zip(*samples, strict=False):
-            node.curves.setdefault((int(pane), what), Curve()).add(time, value)
+            node.curves[int(pane), what].add(time, value)
     return node
 
 
@@ -298,7 +279,6 @@ class _Maps:
         self.environment = cache(self._environment)
 
     def number(self, environment: Environment) -> int:
-        """Return the number of a map that is written."""
         document = _map_json(environment)
         if document not in self.maps:
             self.maps.append(document)
@@ -315,13 +295,12 @@ class _Maps:
             except MapError as error:
                 words = f"maps[{number}]: {str(error).removeprefix('map: ')}"
                 raise MapError.of(self.where, [Mistake(("maps", number), words)]) from None
+        refuse = partial(_refuse, self.where, "maps", number)
         if model.bundled not in bundled_maps():
-            wanted = "the name of a bundled map"
-            _refuse(self.where, "maps", number, "bundled", value=model.bundled, wanted=wanted)
+            refuse("bundled", value=model.bundled, wanted="the name of a bundled map")
         found = load_map(model.bundled)
         if _digest(to_json(found)) != model.digest:
-            wanted = "that of the map as it is now"
-            _refuse(self.where, "maps", number, "digest", value=model.digest, wanted=wanted)
+            refuse("digest", value=model.digest, wanted="that of the map as it is now")
         return found
 
 

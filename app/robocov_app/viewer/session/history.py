@@ -1,63 +1,50 @@
-"""The past of a run, so that it can be looked at again and resumed from: bounded, thinned with age."""
+"""The past of a run: moments that can be resumed from, trails and cost curves; bounded, thinned with age."""
 
-from __future__ import annotations
-
-from bisect import bisect_right
-from collections.abc import Collection, Mapping
+from bisect import bisect_left, bisect_right
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from copy import copy, deepcopy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import compress
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from robocov.environment import CircleObstacle
+from robocov.arrays import Array
+from robocov.conditions import Conditions
+from robocov.conditions.perception import Inbox, Perception
+from robocov.controllers import informed
+from robocov.controllers.base import Controller
+from robocov.environment import CircleObstacle, Environment
+from robocov.errors import ParameterError
+from robocov.observation import Decision, Observations, Snapshot
+from robocov.observation.neighbours import Neighbours
+from robocov.robots import Team
+from robocov.sensor import RangeSensor
+from robocov.simulation import DEFAULT_DT
+from robocov.voronoi.weighted_cells import weighted_partition
+from robocov.world.solid import movers, solid_pieces
+from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from robocov.arrays import Array, IntArray
-    from robocov.conditions import Conditions
-    from robocov.conditions.perception import Inbox
-    from robocov.environment import Environment
-    from robocov.observation import Decision
-    from robocov.robots import Team
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
-
-MOST_BYTES = 24_000_000
-"""Memory that the moments of a window may take."""
-
-_OVERHEAD = 700
-"""Bytes that a moment of one pane takes beside its arrays."""
-
-_FEWEST = 300
-"""Moments that are kept however large they are."""
-
-_KEPT = 0.75
-"""Of the moments, so many stay at most when they are thinned."""
-
-RATE = 30.0
-"""Most rows for each simulated second."""
-
-MOST_ROWS = 4096
-"""When there are so many, every second of the older half goes."""
+MOST_BYTES = 24_000_000  # memory that the moments of a window may take
+_OVERHEAD = 700  # bytes that a moment of one pane takes beside its arrays
+_FEWEST = 300  # moments that are kept however large they are
+_KEPT = 0.75  # of the moments, so many stay at most when they are thinned
+RATE = 30.0  # most rows for each simulated second
+MOST_ROWS = 4096  # when there are so many, every second of the older half goes
 
 
 @dataclass(frozen=True, eq=False)
 class PaneSetup:
-    """Setup of a pane, which stays from one touch to the next.
+    """Setup of a pane, which stays from one touch to the next."""
 
-    `environment`: the map as it is, without robots that failed. `numbers`, (n,) int: what people call the
-    robots that work, in the order of the rows. `failed`, (x, y) m each: robots that stand where they failed.
-    `conditions`: what goes wrong with messages and sensors; None: nothing. Failing and joining is not among
-    it.
-    """
-
-    environment: Environment
+    environment: Environment  # the map as it is, without robots that failed
     law: ControllerChoice
     limits: TeamSpec
-    numbers: tuple[int, ...]
-    failed: Mapping[int, tuple[float, float]]
-    conditions: Conditions | None = None
+    numbers: tuple[int, ...]  # what people call the robots that work, in the order of the rows
+    failed: Mapping[int, tuple[float, float]]  # robots that stand where they failed, (x, y) m each
+    conditions: Conditions | None = None  # of messages and sensors; failing and joining is not among them
 
     @property
     def solid(self) -> Environment:
@@ -68,9 +55,18 @@ class PaneSetup:
         return _with_wrecks(self.environment, tuple(self.failed.values()), radii)
 
     @property
+    def there(self) -> list[int]:
+        """The numbers of all robots, those that failed with them."""
+        return sorted([*self.numbers, *self.failed])
+
+    @property
     def team(self) -> Team:
-        """The robots that work."""
         return self.limits.team(self.numbers)
+
+    @property
+    def speeds(self) -> Array | None:
+        """How fast each robot can go, (n,) m/s; None where all, failed too, are alike."""
+        return self.team.max_speed if "max_speed" in self.limits.different else None
 
 
 # circumstances are many and stay for long, what is derived from a map is large: only the last few are kept
@@ -83,36 +79,25 @@ def _with_wrecks(
 
 
 class State(NamedTuple):
-    """One pane at one moment.
-
-    `positions`, `velocities`: (n, 2) m and m/s. `memory`: what the controller remembered; None where it can
-    do without. `recorded`: what was decided then, where it comes from a record. `inbox`: the messages that
-    the robots had; None where they know the others as they are. `steering`: heading and turning rate of
-    unicycles, (n, 2) rad and rad/s; None in a team of points.
-    """
+    """One pane at one moment."""
 
     setup: PaneSetup
-    positions: Array
-    velocities: Array
-    memory: Any
-    recorded: Decision | None = None
-    inbox: Inbox | None = None
-    steering: Array | None = None
+    positions: Array  # (n, 2) m
+    velocities: Array  # (n, 2) m/s
+    memory: Any  # what the controller remembered; None where it can do without
+    recorded: Decision | None = None  # what was decided then, where it comes from a record
+    inbox: Inbox | None = None  # the messages that robots had; None where they know the others as they are
+    steering: Array | None = None  # heading and turning rate of unicycles, (n, 2) rad and rad/s
 
 
 class Moment(NamedTuple):
-    """All panes at one moment: enough to go on from there, bit for bit.
+    """All panes at one moment: enough to go on from there, bit for bit."""
 
-    `step`: steps since the start. `scenario`: controllers, limits and map as they were last chosen; None in
-    the past of a record. `hand`, (number, (x, y) m) or None: the robot that is dragged, and where to. `node`:
-    node of the document in whose time it is.
-    """
-
-    step: int
+    step: int  # since the start
     states: Mapping[int, State]
-    scenario: Scenario | None = None
-    hand: tuple[int, tuple[float, float]] | None = None
-    node: int = 0
+    scenario: Scenario  # with controllers, limits and map as they were last chosen
+    hand: tuple[int, tuple[float, float]] | None = None  # the robot that is dragged, and where to, m
+    node: int = 0  # of the document, in whose time it is
 
 
 class History:
@@ -124,122 +109,88 @@ class History:
     """
 
     def __init__(self, dt: float, most_bytes: int = MOST_BYTES) -> None:
-        self.dt = dt
-        self.most_bytes = most_bytes
-        self._moments: list[Moment] = []
-        self._steps: list[int] = []
+        self.dt, self.most_bytes = dt, most_bytes
+        self.moments: list[Moment] = []
         self._sizes: list[int] = []
         self._bytes = 0
-        self.thinned = 0
-        """Number of moments that are gone."""
+        self.thinned = 0  # number of moments that are gone
 
     def __len__(self) -> int:
-        return len(self._moments)
+        return len(self.moments)
 
     def __getitem__(self, k: int) -> Moment:
-        return self._moments[k]
+        return self.moments[k]
 
     @property
     def last(self) -> Moment:
-        """The newest moment."""
-        return self._moments[-1]
+        return self.moments[-1]
 
     @property
     def steps(self) -> list[int]:
-        """The steps of the moments, ascending; not to be changed."""
-        return self._steps
-
-    def since(self, k: int) -> list[Moment]:
-        """Return the moments from number `k` on."""
-        return self._moments[k:]
+        return [moment.step for moment in self.moments]
 
     def time(self, k: int) -> float:
-        """Return the time of moment `k`, s."""
-        return self._steps[k] * self.dt
+        return self.moments[k].step * self.dt
 
     def add(self, moment: Moment) -> None:
-        """Append a moment that is later than all."""
-        self._moments.append(moment)
-        self._steps.append(moment.step)
+        self.moments.append(moment)
         self._sizes.append(_size(moment))
         self._bytes += self._sizes[-1]
-        count = len(self._moments) + 1
-        while self._bytes > self.most_bytes and _FEWEST < len(self._moments) < count:
-            count = len(self._moments)
+        count = len(self) + 1
+        while self._bytes > self.most_bytes and _FEWEST < len(self) < count:
+            count = len(self)
             self._thin()
 
     def amend(self, moment: Moment) -> None:
         """Replace the newest moment, if it is of the same step; else append."""
-        if self._moments and self._moments[-1].step == moment.step:
-            self.cut(len(self._moments) - 2)
+        if self.moments and self.last.step == moment.step:
+            self.moments.pop()
+            self._bytes -= self._sizes.pop()
         self.add(moment)
 
     def at(self, time: float) -> int:
         """Return the number of the last moment not after `time`, the first if there is none."""
-        return max(bisect_right(self._steps, time / self.dt + 1e-6) - 1, 0)
+        step = time / self.dt + 1e-6
+        return max(bisect_right(self.moments, step, key=lambda moment: moment.step) - 1, 0)
 
-    def cut(self, k: int) -> None:
-        """Forget what came after moment `k`."""
-        self._bytes -= sum(self._sizes[k + 1 :])
-        del self._moments[k + 1 :], self._steps[k + 1 :], self._sizes[k + 1 :]
-
-    def until(self, k: int) -> History:
+    def until(self, k: int) -> Self:
         """Return a history of its own that ends with moment `k`."""
-        twin = History(self.dt, self.most_bytes)
-        twin._moments, twin._steps = self._moments[: k + 1], self._steps[: k + 1]
-        twin._sizes = self._sizes[: k + 1]
-        twin._bytes, twin.thinned = sum(twin._sizes), self.thinned
+        twin = copy(self)
+        twin.moments, twin._sizes = self.moments[: k + 1], self._sizes[: k + 1]
+        twin._bytes = sum(twin._sizes)
         return twin
 
     def _thin(self) -> None:
         """Leave at most `_KEPT`: all of the newest, ever fewer of what is older."""
-        count = len(self._moments)
-        steps = np.array(self._steps)
+        count, steps = len(self), np.array(self.steps)
         age = steps[-1] - steps
-        touched = np.array([True, *map(_changes, self._moments, self._moments[1:])])
+        touched = np.array([True, *map(_changes, self.moments, self.moments[1:])])
         for always in (touched, np.arange(count) == 0):
             whole, keep = count // 2, np.ones(count, dtype=bool)
             while whole > 1 and keep.sum() > _KEPT * count:
                 whole //= 2
-                keep = always | (steps % _strides(age, int(age[-1 - whole])) == 0)
+                # of how many steps one is kept: of 1 while recent, of 2, 4, 8 as the age doubles
+                strides = 2 ** np.ceil(np.log2(np.maximum(age / age[-1 - whole], 1.0))).astype(np.intp)
+                keep = always | (steps % strides == 0)
             if keep.sum() <= _KEPT * count:
                 break
-        kept = np.flatnonzero(keep).tolist()
-        self.thinned += count - len(kept)
-        self._moments = [self._moments[k] for k in kept]
-        self._steps = [self._steps[k] for k in kept]
-        self._sizes = [self._sizes[k] for k in kept]
+        self.moments, self._sizes = list(compress(self.moments, keep)), list(compress(self._sizes, keep))
+        self.thinned += count - len(self)
         self._bytes = sum(self._sizes)
-
-
-def _strides(age: IntArray, recent: int) -> IntArray:
-    """Return of how many steps one is kept at ages: 1 while recent, 2, 4, 8 as the age doubles.
-
-    >>> _strides(np.array([0, 100, 101, 200, 201, 401, 801]), 100).tolist()
-    [1, 1, 2, 2, 4, 8, 16]
-    """
-    return np.asarray(2 ** np.ceil(np.log2(np.maximum(age / recent, 1.0))).astype(np.intp))
 
 
 def _changes(before: Moment, after: Moment) -> bool:
     """Whether something was touched between two moments: such are kept, so that no event is lost."""
-    return any(
-        pane in before.states and before.states[pane].setup is not state.setup
-        for pane, state in after.states.items()
-    )
+    pairs = [(before.states[pane], state) for pane, state in after.states.items() if pane in before.states]
+    return any(old.setup is not new.setup for old, new in pairs)
 
 
 def _size(moment: Moment) -> int:
-    """Return about how many bytes a moment takes."""
     return sum(
-        _OVERHEAD
-        + state.positions.nbytes
-        + state.velocities.nbytes
-        + _bytes_of(state.memory)
-        + _bytes_of(state.inbox)
-        + _bytes_of(state.steering)
-        for state in moment.states.values()
-    )
+        _OVERHEAD + sum(_bytes_of(part) for part in (each.memory, each.inbox, each.steering))
+        + each.positions.nbytes + each.velocities.nbytes
+        for each in moment.states.values()
+    )  # fmt: skip
 
 
 def _bytes_of(memory: Any, depth: int = 4) -> int:
@@ -266,9 +217,8 @@ class Trail:
     """Positions at ascending times, for the robots that work now; bounded."""
 
     def __init__(self, n: int) -> None:
-        self._rows = np.empty((64, n, 2))
-        self._times = np.empty(64)
-        self._count = 0
+        # the system gives memory only as it is written to
+        self._rows, self._times, self._count = np.empty((MOST_ROWS, n, 2)), np.empty(MOST_ROWS), 0
 
     def __len__(self) -> int:
         return self._count
@@ -280,51 +230,46 @@ class Trail:
 
     @property
     def time(self) -> Array:
-        """Their times, (k,) s."""
         return self._times[: self._count]
 
     def add(self, time: float, positions: Array, *, always: bool = False) -> None:
-        """Append the (n, 2) m positions at `time`, unless the last are younger than 1 / `RATE`.
-
-        With `always` they are taken in any case; they replace those of the same time.
-        """
+        """Append (n, 2) m positions, unless the last are younger than 1 / `RATE`; `always`: in any case."""
         since = time - self._times[self._count - 1] if self._count else np.inf
         if since < 1e-9 and always:
             self._count -= 1
         elif since < 1.0 / RATE - 1e-6 and not always:
             return
-        if self._count == MOST_ROWS:
-            self._thin()
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-            self._times = np.concatenate([self._times, np.empty_like(self._times)])
+        if self._count == len(self._times):
+            kept = np.r_[0 : self._count // 2 : 2, self._count // 2 : self._count]
+            self._count = len(kept)
+            self._rows[: self._count], self._times[: self._count] = self._rows[kept], self._times[kept]
         self._rows[self._count], self._times[self._count] = positions, time
         self._count += 1
-
-    def cut(self, time: float) -> None:
-        """Forget what came after `time`."""
-        self._count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
 
     def until(self, time: float) -> tuple[Array, Array]:
         """Return positions and times up to `time`."""
         count = int(np.searchsorted(self.time, time + 1e-6, side="right"))
         return self._rows[:count], self._times[:count]
 
-    def _thin(self) -> None:
-        half = MOST_ROWS // 2
-        keep = np.concatenate([np.arange(0, half, 2), np.arange(half, MOST_ROWS)])
-        self._rows[: len(keep)] = self._rows[keep]
-        self._times[: len(keep)] = self._times[keep]
-        self._count = len(keep)
+    def of_robots(self, before: Sequence[int], after: Sequence[int]) -> "Trail":
+        """Return it for other robots, by their numbers: nan where one was not there."""
+        twin, k = Trail(len(after)), self._count
+        twin._rows[:k], twin._times[:k], twin._count = of_robots(self.positions, before, after), self.time, k
+        return twin
 
 
-def trail_of(history: History, pane: int, last: int) -> Trail:
-    """Return where the robots that worked in a pane at moment `last` went until then."""
+def of_robots(positions: Array, before: Sequence[int], after: Sequence[int]) -> Array:
+    """Return positions, (..., n, 2) m, for other robots, by their numbers: nan where one was not there."""
+    rows = {number: row for row, number in enumerate(before)}
+    found = np.array([rows.get(number, -1) for number in after])
+    return np.where(found[:, None] < 0, np.nan, positions[..., found, :])
+
+
+def way_of(history: History, pane: int, last: int) -> tuple[Trail, Array]:
+    """Return the trail of the robots that worked in a pane at moment `last`, and their starts, (n, 2) m."""
     numbers = history[last].states[pane].setup.numbers
-    trail = Trail(len(numbers))
+    trail, starts = Trail(len(numbers)), dict[int, list[float]]()
     before: PaneSetup | None = None
-    rows: list[int] = []
-    their_rows: list[int] = []
     latest = -np.inf
     for k in range(last + 1):
         time, state = history.time(k), history[k].states[pane]
@@ -334,23 +279,164 @@ def trail_of(history: History, pane: int, last: int) -> Trail:
             continue
         if touched:
             before = state.setup
-            rows = [row for row, number in enumerate(numbers) if number in before.numbers]
-            their_rows = [before.numbers.index(numbers[row]) for row in rows]
-        places = np.full((len(numbers), 2), np.nan)
-        places[rows] = state.positions[their_rows]
-        trail.add(time, places, always=True)
+            starts = dict(zip(before.numbers, state.positions.tolist(), strict=True)) | starts
+        trail.add(time, of_robots(state.positions, state.setup.numbers, numbers), always=True)
         latest = time
-    return trail
+    return trail, np.array([starts[number] for number in numbers])
 
 
-def starts_of(history: History, pane: int, last: int) -> Array:
-    """Return where the robots that worked in a pane at moment `last` had come in, (n, 2) m."""
-    starts: dict[int, list[float]] = {}
-    before: PaneSetup | None = None
-    for k in range(last + 1):
-        state = history[k].states[pane]
-        if state.setup is not before:
-            before = state.setup
-            for number, place in zip(before.numbers, state.positions.tolist(), strict=True):
-                starts.setdefault(number, place)
-    return np.array([starts[number] for number in history[last].states[pane].setup.numbers])
+def replayed_snapshot(state: State, time: float, dt: float = DEFAULT_DT) -> Snapshot:
+    """Return a moment as it was at a time, s; a controller that fails on it decided nothing."""
+    setup, team, positions = state.setup, state.setup.team, state.positions
+    region, density, sensor = setup.solid.region, setup.solid.density, sensor_in(setup.solid)
+    sensor.show(time)
+    points = sensor.nearest(positions, team.sensing_range)
+    neighbours = Neighbours.within(positions, team.communication_range)
+    seen = Observations(positions, state.velocities, neighbours, points, region, time, team.max_speed)
+    seen = replace(seen, density=density, steering=state.steering)
+    if (perception := _perception(setup, dt)) is not None:
+        inbox = perception.begin() if state.inbox is None else state.inbox
+        seen, _ = perception.known(seen, inbox, np.ones(len(positions), dtype=bool))
+    decision, recorded = _decision(seen, state), state.recorded
+    if recorded is not None and not np.allclose(decision.forces, recorded.forces, rtol=1e-9, atol=1e-9):
+        decision = recorded  # the controller is not what it was, or not loaded
+        if setup.law.gains.get("cells") == "time" and team.mixed_speeds:
+            cells = weighted_partition(positions, team.max_speed, region, density=density)
+            decision = replace(decision, cells=cells)
+    return Snapshot(seen, decision, None if perception is None else positions)
+
+
+def _decision(seen: Observations, state: State) -> Decision:
+    nothing, controller = Decision(np.zeros_like(seen.positions)), _controller(state.setup)
+    if controller is None:
+        return nothing
+    try:
+        # it may change what it remembers, and is asked again
+        memory = deepcopy(state.memory)
+        if memory is None:
+            memory = controller.begin(state.setup.solid.region, state.setup.team)
+        decision = controller.decide(seen, memory)
+        given = (decision.forces, decision.forces if decision.goals is None else decision.goals)
+        good = isinstance(decision, Decision) and all(isinstance(rows, np.ndarray) for rows in given)
+        good = good and all(rows.shape == seen.positions.shape for rows in given)
+    except (Exception, SystemExit):  # a user's controller may do anything
+        return nothing
+    return decision if good and np.isfinite(decision.forces).all() else nothing
+
+
+@lru_cache(maxsize=8)  # as many as there are panes, and some more
+def _controller(setup: PaneSetup) -> Controller | None:
+    with suppress(ParameterError):  # what a saved run was made with may be gone
+        return informed(setup.law.made(), setup.solid.static)
+    return None
+
+
+@lru_cache(maxsize=8)
+def _perception(setup: PaneSetup, dt: float) -> Perception | None:
+    return None if setup.conditions is None else Perception(setup.conditions, setup.team, dt)
+
+
+@lru_cache(maxsize=4)
+def sensor_in(environment: Environment) -> RangeSensor:
+    return RangeSensor(solid_pieces(environment), movers(environment))
+
+
+MOST_SAMPLES = 3000  # when a curve has so many, every second one of its older half goes
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a time, s; `kind`: ``obstacle``, ``robot``, ``failure``, ``law``, ..."""
+
+    time: float
+    kind: str
+    text: str
+
+
+class Curve:
+    """The mean distance to the nearest robot, (22) by area or by ∫φ, or the mean time, at ascending times."""
+
+    def __init__(self) -> None:
+        self._time: list[float] = []
+        self._value: list[float] = []
+
+    def __len__(self) -> int:
+        return len(self._time)
+
+    @property
+    def time(self) -> Array:
+        return np.array(self._time)
+
+    @property
+    def value(self) -> Array:
+        return np.array(self._value)
+
+    @property
+    def last_time(self) -> float:
+        """The time of the newest sample, s; -inf if there is none."""
+        return self._time[-1] if self._time else -np.inf
+
+    def add(self, time: float, value: float) -> None:
+        """Take a sample at any time; one of the same time is replaced."""
+        if not np.isfinite([time, value]).all():
+            return
+        k = bisect_left(self._time, time - 1e-9)
+        if k < len(self._time) and self._time[k] <= time + 1e-9:
+            self._value[k] = value
+            return
+        if len(self._time) >= MOST_SAMPLES:
+            half = MOST_SAMPLES // 2
+            self._time[:half] = self._time[:half:2]
+            self._value[:half] = self._value[:half:2]
+            k = bisect_left(self._time, time)
+        self._time.insert(k, time)
+        self._value.insert(k, value)
+
+    def outline(self, most: int) -> list[list[float]]:
+        stride = -(-len(self) // most)
+        times, values = self._time[::-stride][::-1], self._value[::-stride][::-1]
+        return [[round(time, 3) for time in times], [float(f"{value:.5g}") for value in values]]
+
+    def between(self, begin: float, end: float) -> "Curve":
+        first = int(np.searchsorted(self._time, begin - 1e-6))
+        last = int(np.searchsorted(self._time, end + 1e-6, side="right"))
+        part = Curve()
+        part._time, part._value = self._time[first:last], self._value[first:last]
+        return part
+
+    def extend(self, later: "Curve", until: float = np.inf) -> None:
+        """Append those samples of another curve that are later than the last one here, up to a time, s."""
+        for time, value in zip(later._time, later._value, strict=True):
+            if self.last_time + 1e-9 < time <= until + 1e-6:
+                self.add(time, value)
+
+    def at(self, time: float) -> float:
+        """Return the value at a time, between samples on the straight line; nan before the first."""
+        if not self._time or time < self._time[0] - 1e-6:
+            return float("nan")
+        return float(np.interp(time, self._time, self._value))
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """The rest of a curve that was left when the run was resumed from before."""
+
+    law: str  # name of the controller
+    words: str  # what was different then
+    time: Array
+    value: Array
+    of: str = "distance"  # or "time"
+    node: int = 0  # at whose end the branch ends
+
+
+class Plotted(NamedTuple):
+    """Plottable quantity. `title`, `short`: as people call it."""
+
+    name: str
+    title: str
+    short: str
+    unit: str
+
+
+DISTANCE = Plotted("distance", "Mean distance to the nearest robot", "mean distance", "m")
+TIME = Plotted("time", "Mean time until the first robot is there", "mean time", "s")

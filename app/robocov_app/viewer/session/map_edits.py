@@ -1,7 +1,9 @@
 """Edits of a map: obstacles drawn, moved and deleted, each a new environment; what cannot be is refused."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 import shapely
@@ -19,37 +21,42 @@ from robocov.environment import (
 from robocov.errors import MapError, place
 from robocov.mapfile import from_json, to_json
 
-SHORTEST = 0.02
-"""Metres below which what is drawn is taken for a slip of the hand."""
+SHORTEST = 0.02  # metres below which what is drawn is taken for a slip of the hand
+CELLS = 96  # cells along the longer side of a map whose density is painted
+LEAST, MOST = 0.05, 50.0  # between these a place counts once it has been painted
+_DAB = 1.15  # factor of one dab on the density at its centre
+_DECIMALS = 3  # of what is painted, so that a map that is saved stays short
 
 
-def with_obstacles(environment: Environment, obstacles: tuple[Obstacle, ...]) -> Environment:
-    """Return the map with other obstacles, without starts that they cover.
+def with_replaced(
+    environment: Environment, first: int, removed: int, added: Iterable[Obstacle] = ()
+) -> Environment:
+    """Return the map, as a file gives it, with obstacles in the place of `removed` ones from a number on.
 
-    Raises MapError where it would break a rule; the message is a sentence for people.
+    Starts that are covered go. Raises MapError where it would break a rule, in a sentence for people.
     """
-    return _checked(replace(environment, obstacles=obstacles))
+    there, starts = environment.obstacles, dict(environment.starts)
+    obstacles = (*there[:first], *added, *there[first + removed :])
+    while True:
+        try:
+            return from_json(to_json(replace(environment, obstacles=obstacles, starts=starts)), "map")
+        except MapError as error:
+            # an obstacle on a start takes that start away, nothing else
+            message = str(error).removeprefix("map: ")
+            told = {name: re.escape(place(("starts", name))) for name in starts}
+            blocked = [name for name, at in told.items() if re.match(rf"{at}[:.\[]", message)]
+            if not blocked:
+                raise MapError(message) from None
+            for name in blocked:
+                del starts[name]
 
 
 def with_obstacle(environment: Environment, obstacle: Obstacle) -> Environment:
-    """Return the map with one obstacle more, on top of the others; MapError as `with_obstacles`."""
-    return with_obstacles(environment, (*environment.obstacles, obstacle))
-
-
-def without_obstacle(environment: Environment, index: int) -> Environment:
-    """Return the map without obstacle number `index`."""
-    return with_obstacles(environment, environment.obstacles[:index] + environment.obstacles[index + 1 :])
-
-
-def with_moved(environment: Environment, index: int, dx: float, dy: float) -> Environment:
-    """Return the map with one obstacle moved by (dx, dy) m; MapError as `with_obstacles`."""
-    there = environment.obstacles
-    return with_obstacles(environment, (*there[:index], moved(there[index], dx, dy), *there[index + 1 :]))
+    """Return the map with one obstacle more, on top of the others; MapError as `with_replaced`."""
+    return with_replaced(environment, len(environment.obstacles), 0, [obstacle])
 
 
 def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
-    """Return the obstacle moved by (dx, dy) m, its coordinates to the tenth of a millimetre."""
-
     def at(point: tuple[float, float]) -> tuple[float, float]:
         return round(point[0] + dx, 4), round(point[1] + dy, 4)
 
@@ -62,10 +69,7 @@ def moved(obstacle: Obstacle, dx: float, dy: float) -> Obstacle:
 
 
 def obstacle_at(environment: Environment, point: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the number of the obstacle at a point, or else of the nearest within `reach` metres.
-
-    Of several it is the topmost; None if there is none.
-    """
+    """Return the number of the topmost obstacle at a point, else of the nearest within `reach` m, or None."""
     away = shapely.distance([shape.polygon for shape in environment.obstacles], shapely.Point(point))
     if not len(away) or away.min() > reach:
         return None
@@ -73,10 +77,7 @@ def obstacle_at(environment: Environment, point: tuple[float, float], reach: flo
 
 
 def snapped(environment: Environment, point: Point, reach: float) -> Point:
-    """Return the corner within `reach` metres of a point, else the nearest place on a wall, else the point.
-
-    What is drawn from wall to wall then leaves no crack.
-    """
+    """Return the corner within `reach` m of a point, else the nearest place on a wall, else the point."""
     walls = environment.free.boundary
     corners = shapely.get_coordinates(walls)
     away = np.hypot(*(corners - point).T)
@@ -110,8 +111,7 @@ def passage_words(before: Environment, after: Environment, radius: float) -> str
 
 
 def words_for(obstacle: Obstacle) -> str:
-    """Return what people call an obstacle."""
-    kind = {PolygonObstacle: "polygon", CircleObstacle: "circle", WallObstacle: "wall"}[type(obstacle)]
+    kind = type(obstacle).__name__.removesuffix("Obstacle").lower()
     return f"{kind} “{obstacle.name}”" if obstacle.name else kind
 
 
@@ -145,47 +145,8 @@ def circle_of(center: tuple[float, float], rim: tuple[float, float]) -> CircleOb
 
 def _rounded(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
     """Return points to the tenth of a millimetre, so that files stay short; repeated ones once."""
-    ring: list[tuple[float, float]] = []
-    for x, y in points:
-        point = round(float(x), 4), round(float(y), 4)
-        if not ring or point != ring[-1]:
-            ring.append(point)
-    return tuple(ring)
-
-
-def _checked(environment: Environment) -> Environment:
-    """Return the map as a file would give it, without the starts that it has covered."""
-    starts = dict(environment.starts)
-    while True:
-        try:
-            return from_json(to_json(replace(environment, starts=starts)), "map")
-        except MapError as error:
-            # an obstacle on a start takes that start away, nothing else
-            message = str(error).removeprefix("map: ")
-            blocked = [name for name in starts if _is_about(message, name)]
-            if not blocked:
-                raise MapError(message) from None
-            for name in blocked:
-                del starts[name]
-
-
-def _is_about(message: str, start: str) -> bool:
-    """Whether a message begins with the place of a start, or of something in it."""
-    where = place(("starts", start))
-    return message.startswith(tuple(f"{where}{after}" for after in (":", ".", "[")))
-
-
-CELLS = 96
-"""Cells along the longer side of a map whose density is painted."""
-
-LEAST, MOST = 0.05, 50.0
-"""Between these a place counts once it has been painted."""
-
-_DAB = 1.15
-"""Factor of one dab on the density at its centre."""
-
-_DECIMALS = 3
-"""Of what is painted, so that a map that is saved stays short."""
+    rounded = [(round(float(x), 4), round(float(y), 4)) for x, y in points]
+    return tuple(point for point, _ in groupby(rounded))
 
 
 def painted(environment: Environment, dabs: Sequence[Point], radius: float, *, lowers: bool) -> Raster:
@@ -208,7 +169,7 @@ def painted_raster(environment: Environment) -> Raster:
     density = environment.density
     if isinstance(density, Raster) and density.interpolation == "bilinear" and min(density.values.shape) > 1:
         return density
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    step = max(high_x - low_x, high_y - low_y) / CELLS
-    columns, rows = (max(round(side / step), 2) for side in (high_x - low_x, high_y - low_y))
-    return sampled(density, (low_x, low_y, high_x, high_y), columns, rows)
+    bounds = low_x, low_y, high_x, high_y = environment.region.bounds
+    sides = high_x - low_x, high_y - low_y
+    columns, rows = (max(round(side / (max(sides) / CELLS)), 2) for side in sides)
+    return sampled(density, bounds, columns, rows)

@@ -1,32 +1,24 @@
 """One controller at work on the team: a pane of the window."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov.controllers import remembers
 from robocov.errors import StartError
+from robocov.observation import Snapshot
 from robocov.simulation import Simulation
 from robocov.world.relocation import relocated
-from robocov_app.render.scene import Sensed
+from robocov_app.render.scene import Scene, Sensed
 from robocov_app.runs.spec import RunSpec
-from robocov_app.viewer.session.curves import Curve
-from robocov_app.viewer.session.history import PaneSetup, State, Trail
+from robocov_app.viewer.session.history import Curve, PaneSetup, State, Trail, of_robots
+from robocov_app.viewer.session.scenario import ControllerChoice
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from robocov.arrays import Array
-    from robocov.observation import Decision
-    from robocov_app.viewer.session.scenario import ControllerChoice
-
-SENSED_EVERY = 3
-"""Steps between notes of what is sensed."""
+SENSED_EVERY = 3  # steps between notes of what is sensed
 
 
 class Continuation(NamedTuple):
@@ -52,29 +44,21 @@ class Pane:
 
     @property
     def law(self) -> ControllerChoice:
-        """The controller as it was chosen."""
         return self.setup.law
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Displayed numbers of the robots that work, row by row."""
         return self.setup.numbers
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
         return self.simulation.time
 
     def row(self, number: int) -> int | None:
         """Return the row of a robot by its number; None where it does not work."""
         return self.numbers.index(number) if number in self.numbers else None
 
-    def decide(self) -> Decision:
-        """Let the controller decide on the present, as the next step will; ParameterError when it fails."""
-        return self.simulation.snapshot.decision
-
     def step(self, pushes: Array | None = None) -> None:
-        """Make one control step."""
         if self._steps % SENSED_EVERY == 0:
             seen = self.simulation.snapshot.seen
             self.sensed.add(seen.time, self.numbers, seen.obstacle_points)
@@ -82,14 +66,20 @@ class Pane:
         self.simulation.step(pushes)
         self.trail.add(self.time, self.simulation.positions)
 
+    def scene(self, setup: PaneSetup, snapshot: Snapshot, trail: tuple[Array, Array], **more: Any) -> Scene:
+        team = self.simulation.team if setup is self.setup else setup.team
+        more |= {"numbers": setup.numbers, "failed": setup.failed, "label": setup.law.label}
+        more["failed_radii"] = {number: setup.limits.radius_of(number) for number in setup.failed}
+        more["starts"] = self.starts if len(self.starts) == len(setup.numbers) else None
+        more |= {"trail": trail[0] if len(trail[0]) else None, "trail_time": trail[1]}
+        return Scene.of(setup.environment, team, snapshot, **more)
+
     def state(self) -> State:
-        """Return what is needed to go on from here."""
         simulation = self.simulation
         # who wrote a controller may have it change what it remembers
         memory = deepcopy(simulation.memory) if remembers(simulation.controller) else None
         moving = simulation.positions, simulation.velocities
-        inbox, steering = simulation.inbox, simulation.steering
-        return State(self.setup, *moving, memory, inbox=inbox, steering=steering)
+        return State(self.setup, *moving, memory, None, simulation.inbox, simulation.steering)
 
     def changed(self, wanted: Continuation) -> Simulation:
         """Return the simulation that goes on from here as wanted; the pane stays as it is.
@@ -130,49 +120,29 @@ class Pane:
         return alike and wanted.setup.environment.same_place(self.setup.environment)
 
     def take(self, setup: PaneSetup, simulation: Simulation) -> None:
-        """Go on with what `changed` returned."""
-        if setup.numbers != self.numbers:
-            self._renumber(self.numbers, setup.numbers, simulation.positions)
+        before, after = self.numbers, setup.numbers
+        if after != before:
+            self.trail, starts = self.trail.of_robots(before, after), of_robots(self.starts, before, after)
+            self.starts = np.where(np.isnan(starts), simulation.positions, starts)
         self.simulation, self.setup = simulation, setup
         self.trail.add(self.time, simulation.positions, always=True)
 
-    def _renumber(self, before: Sequence[int], after: Sequence[int], positions: Array) -> None:
-        """Let trail and starts follow the robots that are there now."""
-        old, times = self.trail.positions, self.trail.time
-        trail = Trail(len(after))
-        rows = np.full((len(old), len(after), 2), np.nan)
-        starts = np.array(positions, dtype=float)
-        for row, number in enumerate(after):
-            if number in before:
-                rows[:, row] = old[:, before.index(number)]
-                starts[row] = self.starts[before.index(number)]
-        for time, place in zip(times.tolist(), rows, strict=True):
-            trail.add(time, place, always=True)
-        self.trail, self.starts = trail, starts
 
-
-def _spec(
-    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None, steering: Array | None = None
-) -> RunSpec:
-    law, conditions = setup.law, setup.conditions
-    return RunSpec(
+def begun(
+    setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None, **later: Any
+) -> Simulation:
+    """Return a simulation that begins so, or goes on `later`; StartError, ParameterError as `Simulation`."""
+    law, steering = setup.law, later.pop("steering", None)
+    spec = RunSpec(
         setup.solid, law.name, law.gains,
         team=setup.team, positions=positions, velocities=velocities, steering=steering, dt=dt,
-        conditions=conditions,
+        conditions=setup.conditions,
     )  # fmt: skip
-
-
-def begun(setup: PaneSetup, positions: Array, dt: float, velocities: Array | None = None) -> Simulation:
-    """Return a simulation that begins so; StartError, ParameterError as `Simulation`."""
-    return _spec(setup, positions, dt, velocities).simulation(setup.law.made())
+    return spec.simulation(law.made(), **later)
 
 
 def resumed(state: State, dt: float, step: int) -> Simulation:
     """Return the simulation that goes on from a state; ParameterError when its controller is gone."""
-    setup = state.setup
-    spec = _spec(setup, state.positions, dt, state.velocities, state.steering)
-    simulation = spec.simulation(setup.law.made(), steps=step, resumed=True)
-    if state.memory is not None or state.inbox is not None:
-        memory = simulation.memory if state.memory is None else state.memory
-        simulation = simulation.remembering(memory, state.inbox)
-    return simulation
+    later: dict[str, Any] = {"steering": state.steering, "steps": step, "resumed": True}
+    simulation = begun(state.setup, state.positions, dt, state.velocities, **later)
+    return simulation.remembering(simulation.memory if state.memory is None else state.memory, state.inbox)

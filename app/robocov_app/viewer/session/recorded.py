@@ -1,88 +1,63 @@
 """Saved runs in the window again: as the past of a session that can be looked at and gone on from."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from robocov.controllers import CONTROLLERS, informed, remembers
+from robocov.controllers.base import Controller
+from robocov.controllers.gains import Gain, Option
 from robocov.errors import InputError, ParameterError, RobocovError
-from robocov.observation import Decision
-from robocov_app.runs.saved import roster_of
+from robocov.observation import Decision, Observations
+from robocov.observation.region import Region
+from robocov.record import Record
+from robocov.robots import Team
+from robocov_app.runs.saved import Saved, roster_of
 from robocov_app.viewer.session.history import MOST_BYTES, History, Moment, PaneSetup, State
-from robocov_app.viewer.session.lockstep import Happening
 from robocov_app.viewer.session.pane import SENSED_EVERY, Pane, resumed
 from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 from robocov_app.viewer.session.session import Session
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from robocov.arrays import Array
-    from robocov.controllers.base import Controller
-    from robocov.controllers.gains import Gain, Option
-    from robocov.observation import Observations
-    from robocov.observation.region import Region
-    from robocov.record import Record
-    from robocov.robots import Team
-    from robocov_app.runs.saved import Saved
-
-MOST_OF_RECORDS = 400_000_000
-"""Bytes that the moments of records may take, beside their arrays; of longer ones old moments are thinned."""
-
-_OF_A_MOMENT = 1500
-"""About how many bytes a moment of one pane takes, beside those arrays."""
+MOST_OF_RECORDS = 400_000_000  # bytes of moments beside records' arrays; of longer ones old ones are thinned
+_OF_A_MOMENT = 1500  # about how many bytes a moment of one pane takes, beside those arrays
 
 
 @dataclass(frozen=True)
 class LostController(ControllerChoice):
-    """A controller that is not loaded, or does not take its gains: its runs can be looked at.
+    """A controller that is not loaded, or does not take its gains: its runs can be looked at."""
 
-    `title`: what people called it. `reason`: why it cannot be had.
-    """
-
-    title: str = ""
-    reason: str = ""
+    title: str = ""  # what people called it
+    reason: str = ""  # why it cannot be had
 
     @property
     def label(self) -> str:
-        """The controller as people called it."""
         return self.title
 
     @property
     def known(self) -> dict[str, Gain | Option]:
-        """Nothing is known of its gains."""
         return {}
 
     def made(self) -> Controller:
-        """Say that there is no such controller. Raises ParameterError always."""
         raise ParameterError(f"this run can be looked at, but not gone on with: {self.reason}")
 
 
-@dataclass(frozen=True)
 class _StandIn(LostController):
-    """Placeholder of a lost controller at the end of its run, until somebody wants to go on."""
+    """Both choice and controller at the end of the run of a lost one, until somebody wants to go on."""
+
+    summary = "stands for a controller that is not there any more"
 
     def made(self) -> Controller:
-        return _Nobody(self)
-
-
-@dataclass(frozen=True)
-class _Nobody:
-    name: ClassVar[str] = "nobody"
-    label: ClassVar[str] = "nobody"
-    summary: ClassVar[str] = "stands for a controller that is not there any more"
-    law: LostController
+        return self
 
     def begin(self, region: Region, team: Team) -> None:
         """Nothing is remembered."""
 
     def decide(self, seen: Observations, memory: None) -> Decision:
-        """Say that there is no such controller."""
-        LostController.made(self.law)
+        super().made()
         raise AssertionError
 
 
@@ -100,30 +75,25 @@ def replayed_session(saved: Sequence[Saved], controllers: Sequence[str] = ()) ->
     first, dt = records[0], control_dt(records[0])
     limits, environment = TeamSpec.of(first.team, rosters[0].numbers), rosters[0].environment
     laws = [law_of(record, controllers) for record in records]
-    casts = [
-        PaneSetup(environment, law, limits, roster.numbers, roster.failed)
-        for law, roster in zip(laws, rosters, strict=True)
-    ]
-    standing = [_standing(cast) for cast in casts]
-    scenario = Scenario(
-        environment,
-        tuple(cast.law for cast in standing),
-        len(first.team),
-        first.start if first.start in environment.starts else None,
-        first.seed or 0,
-        limits,
-        dt,
-        np.array(first.positions[0]),
-        np.array(first.velocities[0]),
-        first.conditions,
-    )
-    session = Session(scenario)
-    history = _history_of(records, casts, replace(scenario, laws=tuple(laws)))
+    robots, given, moving = len(first.team), np.array(first.positions[0]), np.array(first.velocities[0])
+    start, seed = first.start if first.start in environment.starts else None, first.seed or 0
+    choice = tuple(map(_standing, laws)), robots, start, seed
+    scenario = Scenario(environment, *choice, limits, dt, given, moving, first.conditions)
+    session, casts = Session(scenario), list[PaneSetup]()
+    for law, roster in zip(laws, rosters, strict=True):
+        casts.append(PaneSetup(environment, law, limits, roster.numbers, roster.failed))
+    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
+    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
+    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
+    scenario = replace(scenario, laws=tuple(laws))
+    for k in range(len(first)):
+        now = {pane: each[k] for pane, each in enumerate(states)}
+        history.add(Moment(k * round(first.dt / dt), now, scenario))
     for pane, each in zip(session.panes, saved, strict=True):
         _put(pane, each, history)
     for touched in first.session.get("touched", ()):
         words = f"robot {', '.join(map(str, touched['robots']))} was dragged"
-        session.head.happenings.add(Happening(round(touched["to_s"] / dt), "hand", words))
+        session.head.happenings.add((round(touched["to_s"] / dt), "hand", words))
     session.recall(history)
     session.repeatable = all(record.session.get("repeatable", True) for record in records)
     return session
@@ -136,10 +106,7 @@ def control_dt(record: Record) -> float:
 
 
 def _paced(record: Record) -> Record:
-    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even.
-
-    So do those of the window that are thinned with age.
-    """
+    """Return a record that was thinned as one whose `dt` is the time between its moments, if that is even."""
     gap = float(record.time[-1] - record.time[0]) / max(len(record) - 1, 1)
     steps = round(gap / record.dt)
     if steps <= 1 or abs(gap / record.dt - steps) > 1e-6:
@@ -153,25 +120,22 @@ def law_of(record: Record, controllers: Sequence[str] = ()) -> ControllerChoice:
     """Return the controller of a record: a built-in one, or the one of `controllers` that is called as it."""
     kind = record.controller.rpartition(":")[2]
     known = [name for name in controllers if name.rpartition(":")[2] == kind]
-    if record.controller in (*CONTROLLERS, *known):
-        law = ControllerChoice(record.controller, dict(record.gains))
-    elif known:
-        law = ControllerChoice(known[0], dict(record.gains))
-    else:
-        name = f"FILE.py:{kind}" if kind != record.controller else kind
-        reason = (
-            f"{record.label} is none of robocov's controllers; to go on, open it with --controller {name}"
-        )
-        return LostController(record.controller, dict(record.gains), record.label, reason)
+    name, gains = record.controller, dict(record.gains)
+    if name not in (*CONTROLLERS, *known):
+        if not known:
+            own = f"FILE.py:{kind}" if kind != name else kind
+            reason = f"is none of robocov's controllers; to go on, open it with --controller {own}"
+            return LostController(name, gains, record.label, f"{record.label} {reason}")
+        name = known[0]
+    law = ControllerChoice(name, gains)
     try:
         law.made()
         return law.plain()
     except RobocovError as error:
-        return LostController(record.controller, dict(record.gains), record.label, str(error))
+        return LostController(record.controller, gains, record.label, str(error))
 
 
 def _check(saved: Sequence[Saved]) -> None:
-    """Make sure that the window can show the runs, all of them in step."""
     if not 1 <= len(saved) <= MOST_PANES:
         raise InputError(
             f"{saved[0].folder.parent}: {len(saved)} runs, but the window has room for {MOST_PANES}; "
@@ -197,48 +161,29 @@ def _check(saved: Sequence[Saved]) -> None:
                 )
 
 
-def _standing(setup: PaneSetup) -> PaneSetup:
-    """Return the circumstances with somebody in the place of a controller that is not there any more."""
-    law = setup.law
+def _standing(law: ControllerChoice) -> ControllerChoice:
     if not isinstance(law, LostController):
-        return setup
-    return replace(setup, law=_StandIn(law.name, law.gains, law.title, law.reason))
-
-
-def _history_of(records: Sequence[Record], casts: Sequence[PaneSetup], scenario: Scenario) -> History:
-    """Return the past that records tell of; its arrays are theirs."""
-    first, dt = records[0], scenario.dt
-    stride = round(first.dt / dt)
-    needed = len(first) * len(records) * (_OF_A_MOMENT + first.positions[0].nbytes * 2)
-    history = History(dt, MOST_BYTES + min(needed, MOST_OF_RECORDS))
-    states = [_states_of(record, cast) for record, cast in zip(records, casts, strict=True)]
-    for k in range(len(first)):
-        history.add(Moment(k * stride, {pane: each[k] for pane, each in enumerate(states)}, scenario))
-    return history
+        return law
+    return _StandIn(law.name, law.gains, law.title, law.reason)
 
 
 def _states_of(record: Record, cast: PaneSetup) -> list[State]:
-    positions, velocities, forces, goals = (
-        _fixed(array) for array in (record.positions, record.velocities, record.forces, record.goals)
-    )
-    nowhere = [bool(np.isnan(rows).all()) for rows in goals]
+    arrays = record.positions, record.velocities, record.forces, record.goals
+    fixed = [np.broadcast_to(array, array.shape) for array in arrays]  # nobody can change them
     states = []
     for k, (memory, there) in enumerate(
         zip(_memories_of(record, cast.law), _circumstances_of(record, cast), strict=True)
     ):
         rows = slice(None) if there is cast else np.flatnonzero(record.working[k])
-        decision = Decision(forces[k][rows], None if nowhere[k] else goals[k][rows])
+        positions, velocities, forces, goals = (array[k][rows] for array in fixed)
+        decision = Decision(forces, None if np.isnan(record.goals[k]).all() else goals)
         steering = None if record.steering is None else record.steering[k][rows]
-        moving = positions[k][rows], velocities[k][rows]
-        states.append(State(there, *moving, memory, decision, steering=steering))
+        states.append(State(there, positions, velocities, memory, decision, steering=steering))
     return states
 
 
 def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
-    """Yield the circumstances of each moment: who worked then, and who had failed.
-
-    What robots had heard no record tells: who goes on from a moment lets them begin with no messages.
-    """
+    """Yield the circumstances of each moment: who worked, and who had failed; messages no record tells."""
     if record.conditions is None:
         yield from [cast] * len(record)
         return
@@ -256,19 +201,12 @@ def _circumstances_of(record: Record, cast: PaneSetup) -> Iterator[PaneSetup]:
 
 
 def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
-    """Return what the controller remembered at each moment.
-
-    A record does not tell, but the controller can be asked again. Where it does not decide as it did, it is
-    not what it was: from there on it is to begin anew.
-    """
-    nothing: list[Any] = [None] * len(record)
-    if isinstance(law, LostController):
-        return nothing
-    controller = law.made()
-    if not remembers(controller):
-        return nothing
+    """Return what the controller, asked again, remembers at each moment; None once it decides otherwise."""
     found: list[Any] = []
-    try:
+    with suppress(Exception, SystemExit):  # a user's controller may do anything; a lost one is not there
+        controller = law.made()
+        if not remembers(controller):
+            return [None] * len(record)
         controller = informed(controller, record.environment.static)
         memory = controller.begin(record.environment.region, record.team)
         for k in range(len(record)):
@@ -277,17 +215,14 @@ def _memories_of(record: Record, law: ControllerChoice) -> list[Any]:
             if not np.allclose(decision.forces, record.forces[k], rtol=1e-9, atol=1e-9):
                 break
             memory = decision.memory
-    except (Exception, SystemExit):  # a user's controller may do anything
-        pass
-    return found + nothing[len(found) :]
+    return found + [None] * (len(record) - len(found))
 
 
 def _put(pane: Pane, saved: Saved, history: History) -> None:
-    """Let a pane be at the end of a run."""
     record, last = saved.record, history.last
     state = last.states[pane.number]
-    standing = state._replace(setup=_standing(state.setup))
-    pane.simulation = resumed(standing, history.dt, last.step)
+    standing = replace(state.setup, law=_standing(state.setup.law))
+    pane.simulation = resumed(state._replace(setup=standing), history.dt, last.step)
     pane.setup = state.setup
     pane.starts = record.positions[0][record.working[-1]]
     for k in range(0, len(record), max(1, round(SENSED_EVERY * history.dt / record.dt))):
@@ -298,9 +233,3 @@ def _put(pane: Pane, saved: Saved, history: History) -> None:
         for what, values in told.items():
             for time, value in zip(saved.history.time, () if values is None else values, strict=False):
                 pane.curves[what].add(float(time), float(value))
-
-
-def _fixed(array: Array) -> Array:
-    view = array.view()
-    view.setflags(write=False)
-    return view

@@ -1,11 +1,9 @@
 """Scenario of a run: map, controllers, team and starts; and how these stand in session files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, GetPydanticSchema, WrapSerializer
@@ -21,14 +19,9 @@ from robocov.errors import ParameterError, RobocovError, shown
 from robocov.robots import TURNING_RATE, UNITS, Team
 from robocov.simulation import DEFAULT_DT
 
-MOST_ROBOTS = 1000
-"""So many robots can be asked for in the window."""
-
-MOST_THAT_TALK = 100
-"""So many robots can be asked for where each has messages of its own of every other."""
-
-MOST_PANES = 4
-"""So many controllers can be compared side by side."""
+MOST_ROBOTS = 1000  # so many robots can be asked for in the window
+MOST_THAT_TALK = 100  # so many robots can be asked for where each has messages of its own of every other
+MOST_PANES = 4  # so many controllers can be compared side by side
 
 
 def read_as(kind: Any, made: Callable[[Any, Any], object], plain: Callable[[Any, Any], object]) -> Any:
@@ -47,11 +40,10 @@ def read_as(kind: Any, made: Callable[[Any, Any], object], plain: Callable[[Any,
 
 
 def refused(error: object) -> PydanticCustomError:
-    """Return an error as pydantic notes it, with the place in the file."""
     return PydanticCustomError("refused", "{words}", {"words": str(error)})
 
 
-def _known(law: ControllerChoice, info: Any) -> ControllerChoice:
+def _known(law: "ControllerChoice", info: Any) -> "ControllerChoice":
     """Return a controller of a file as the user has named it: none is run because a file says so."""
     kind, own = law.name.rpartition(":")[2], info.context.controllers
     if law.name not in CONTROLLERS and law.name not in own:
@@ -115,41 +107,35 @@ class ControllerChoice:
 
     @cached_property
     def label(self) -> str:
-        """The controller as people call it."""
         return str(controller_kind(self.name).label)
 
     @cached_property
     def known(self) -> dict[str, Gain | Option]:
-        """Known gains of the controller, by name."""
         return gains_of(controller_kind(self.name))
 
     def value(self, gain: str) -> Value:
-        """Return the value of a gain."""
         return self.gains[gain] if gain in self.gains else self.known[gain].default
 
-    def with_gain(self, gain: str, value: Value) -> ControllerChoice:
+    def with_gain(self, gain: str, value: Value) -> Self:
         """Return the law with another value of one gain; ParameterError as `made`."""
         changed = replace(self, gains={**self.gains, gain: value})
         changed.made()
         return changed.plain()
 
-    def plain(self) -> ControllerChoice:
-        """Return the law without gains that are as by default."""
+    def plain(self) -> Self:
         usual = {name: gain.default for name, gain in self.known.items()}.items()
-        return replace(
-            self, gains={name: value for name, value in self.gains.items() if (name, value) not in usual}
-        )
+        return replace(self, gains=dict(each for each in self.gains.items() if each not in usual))
 
+    @property
+    def words(self) -> str:
+        """How a branch that was left with it is called."""
+        gains = [f"{name} {_said(value)}" for name, value in self.plain().gains.items()]
+        return ", ".join([self.label, *gains])
 
-def gain_words(before: ControllerChoice, after: ControllerChoice) -> str:
-    """Return which gains differ, as people write them."""
-    changed = [name for name in after.known if before.value(name) != after.value(name)]
-    return ", ".join(f"{name} = {_said(after.value(name))}" for name in changed)
-
-
-def branch_words(law: ControllerChoice) -> str:
-    """Return how a branch that was left is called."""
-    return ", ".join([law.label, *(f"{name} {_said(value)}" for name, value in law.plain().gains.items())])
+    def words_since(self, before: Self) -> str:
+        """Return which gains differ from those before, as people write them."""
+        changed = [name for name in self.known if self.value(name) != before.value(name)]
+        return ", ".join(f"{name} = {_said(self.value(name))}" for name in changed)
 
 
 def _said(value: Value) -> str:
@@ -187,19 +173,14 @@ class TeamSpec:
         return replace(team, **changed) if changed else team
 
     def radius_of(self, number: int) -> float:
-        """Return the radius of the robot with a number, m."""
         return float(self.team((number,)).radius[0])
 
     @classmethod
-    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> TeamSpec:
-        """Return what the robots of a team are and can do; by default they are numbered from 1."""
+    def of(cls, team: Team, numbers: Sequence[int] | None = None) -> Self:
         columns = {name: getattr(team, name).tolist() for name in UNITS}
         numbers = range(1, len(team) + 1) if numbers is None else numbers
-        different = {
-            name: dict(zip(numbers, values, strict=True))
-            for name, values in columns.items()
-            if len(set(values)) > 1
-        }
+        varied = {name: values for name, values in columns.items() if len(set(values)) > 1}
+        different = {name: dict(zip(numbers, values, strict=True)) for name, values in varied.items()}
         return cls(**{name: values[0] for name, values in columns.items()}, different=different)
 
 
@@ -249,7 +230,6 @@ class Scenario:
 
     @property
     def start_name(self) -> str:
-        """The name of the start, also of one that an obstacle has covered since."""
         if self.start is not None and self.start not in self.environment.starts:
             return self.start
         return self.environment.start(self.start).name

@@ -1,17 +1,14 @@
 """The session: panes in lockstep with their whole past, every way to touch them, and to take touches back.
 
-What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`;
-the past is looked at through kept moments. Whatever fails leaves everything as it was: a new state is built,
-then taken over.
+What the user does is a tree of touches (`Document`). The present is a `Lockstep` at some step of its `head`,
+the past is kept moments. Whatever fails leaves all as it was: a new state is built, then taken over.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from operator import itemgetter
+from operator import attrgetter
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
@@ -20,80 +17,62 @@ from robocov.environment import Environment, Point
 from robocov.errors import ParameterError, RobocovError
 from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.observation import Snapshot
-from robocov.sensor import RangeSensor
-from robocov.world.solid import movers, solid_pieces
 from robocov_app.render.scene import Sensed
 from robocov_app.viewer.session import changes
-from robocov_app.viewer.session.changes import Change, Drag, Release, map_change
+from robocov_app.viewer.session import history as past
+from robocov_app.viewer.session.changes import Drag, Release, Touch, map_change
 from robocov_app.viewer.session.clock import Clock
-from robocov_app.viewer.session.curves import Curve, Event, Ghost
-from robocov_app.viewer.session.decision_replay import DecisionReplay
-from robocov_app.viewer.session.document import Branch, Document, Node, replayed
-from robocov_app.viewer.session.history import History, Moment, PaneSetup, State, Trail, starts_of, trail_of
-from robocov_app.viewer.session.lockstep import Lockstep
-from robocov_app.viewer.session.scenario import MOST_PANES, branch_words, gain_words
+from robocov_app.viewer.session.document import MOST_KEPT, Document, Lockstep, Node, replayed
+from robocov_app.viewer.session.file import SavedSession
+from robocov_app.viewer.session.history import Curve, Event, Ghost, History, Moment, PaneSetup, State, Trail
+from robocov_app.viewer.session.pane import Pane
+from robocov_app.viewer.session.scenario import MOST_PANES, ControllerChoice, Scenario, TeamSpec
 
-if TYPE_CHECKING:
-    from robocov_app.viewer.session.file import SavedSession
-    from robocov_app.viewer.session.pane import Pane
-    from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
-
-MOST_GHOSTS = 8
-"""Branches whose curves are shown."""
-
-PUSHED = 5e-3
-"""Metres from which on a robot counts as pushed out of the way: who leans on something moves in any case."""
-
-MOST_SENSED = 300
-"""Moments of another branch from which it is found out anew what was sensed."""
-
-_SLIDE = 1.0
-"""Seconds of simulation within which changes of a value are one touch, as of a slider that is dragged."""
-
-_SLICE = 0.03
-"""Seconds of a frame for making a branch again."""
+MOST_GHOSTS = 8  # branches whose curves are shown
+PUSHED = 5e-3  # metres from which on a robot counts as pushed: who leans on something moves in any case
+MOST_SENSED = 300  # moments of another branch from which it is found out anew what was sensed
+_SLIDE = 1.0  # seconds of simulation within which changes of a value, as by a slider, are one touch
+_SLICE = 0.03  # seconds of a frame for making a branch again
 
 
 class Session:
     """Session of the window; StartError, ParameterError when the scenario cannot be begun.
 
-    What touches it goes on from the moment that is looked at; what cannot be is refused, and nothing has
-    changed then. `head`: where in the document the present is. `recorded_until`, s: up to there the run is a
-    record, which its scenario leads to where `repeatable`. `serial`: grows when what is known of times so far
-    does not hold any more, `revision` with every touch.
+    What touches it goes on from the moment that is looked at, or is refused, and nothing has changed then.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self.clock = Clock(scenario.dt)
         self.playing, self.stop_when_settled, self.settled = True, False, False
-        self.recorded_until: float | None = None
-        self.repeatable = True
-        self.serial = self.revision = 0
-        self._past = DecisionReplay()
-        self._run = Lockstep(scenario)
-        self.document = Document(scenario)
-        self.head = self.document.nodes[0]
+        self.recorded_until: float | None = None  # s, up to there the run is a record
+        self.repeatable = True  # whether the scenario leads to that record
+        self.serial = 0  # grows when what is known of times so far does not hold any more
+        self.revision = 0  # grows with every touch
         self._remaking: Iterator[None] | None = None
         self._script: list[Node] = []
-        self._begin_time_line()
+        self.document = Document(scenario)
+        self._begin_at(self.document.nodes[0], Lockstep(scenario))
 
     @classmethod
-    def opened(cls, saved: SavedSession) -> Session:
+    def opened(cls, saved: SavedSession) -> Self:
         """Return the session of a file, made again up to its present; paused."""
         root = saved.document.path(saved.head)[0]
         session = cls(root.begun)
-        session.playing = False
-        session.document, session.head = saved.document, root
-        session._begin_time_line()
+        session.playing, session.document = False, saved.document
+        session._begin_at(root, session._run)
         for _ in session._remade(saved.head, saved.step):
             pass
         return session
 
-    def _begin_time_line(self) -> None:
-        """Take note of a run that begins at `head`."""
-        self.clock.dt = self._past.dt = self.scenario.dt
-        self.history = History(self.scenario.dt)
-        self.history.add(self._run.moment(self.head.number))
+    def _begin_at(self, head: Node, run: Lockstep) -> None:
+        history = History(run.scenario.dt)
+        history.add(run.moment(head.number))
+        self._go_on(head, run, history)
+
+    def _go_on(self, head: Node, run: Lockstep, history: History) -> None:
+        self.head = head  # where in the document the present is
+        self._run, self.history = run, history
+        self.clock.dt = run.scenario.dt
         self._cursor: int | None = None
         self._waited = 0
         self._gesture: tuple[object, float] | None = None
@@ -104,61 +83,49 @@ class Session:
 
     def recall(self, history: History) -> None:
         """Take over a past that was recorded, and look at its beginning; the panes are at its end."""
-        self.history, last = history, history.last.step
-        self._run.step = self.head.end = last
-        assert history.last.scenario is not None
-        self._run.scenario = history.last.scenario
-        self.recorded_until = last * history.dt
+        self.history, last = history, history.last
+        self._run.step = self.head.end = last.step
+        self._run.scenario = last.scenario
+        self.recorded_until = last.step * history.dt
         self._cursor = 0 if len(history) > 1 else None
         self.serial += 1
         for pane in self.panes:
-            pane.trail = trail_of(history, pane.number, len(history) - 1)
-
-    # what there is
+            pane.trail, _ = past.way_of(history, pane.number, len(history) - 1)
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario of the run; controllers, gains, limits and the map as they were last chosen."""
         return self._run.scenario
 
     @property
     def panes(self) -> list[Pane]:
-        """The panes, as they are in the present."""
         return self._run.panes
 
     @property
     def hand(self) -> tuple[int, Point] | None:
-        """The robot that is dragged, and where to, m."""
         return self._run.hand
 
     @property
     def environment(self) -> Environment:
-        """The map as it is now, or was at the moment that is looked at."""
         return self.setup(self.panes[0]).environment
 
     @property
     def time(self) -> float:
-        """Time of the moment that is looked at, s."""
-        return self.end if self._cursor is None else self.history.time(self._cursor)
+        return self.history.time(self._number)
 
     @property
     def end(self) -> float:
-        """Time up to which the run has come, s."""
         return self._run.time
 
     @property
     def live(self) -> bool:
-        """Whether the present is looked at, not the past."""
         return self._cursor is None
 
     @property
     def numbers(self) -> tuple[int, ...]:
-        """Displayed numbers of the robots that work, in the first pane."""
         return self.setup(self.panes[0]).numbers
 
     @property
     def step_now(self) -> int:
-        """The step of the present."""
         return self._run.step
 
     @property
@@ -180,15 +147,13 @@ class Session:
 
     @property
     def _number(self) -> int:
-        """Index of the moment that is looked at."""
         return len(self.history) - 1 if self._cursor is None else self._cursor
 
     def _state(self, pane: Pane) -> State:
         return self.history[self._number].states[pane.number]
 
     def setup(self, pane: Pane) -> PaneSetup:
-        """Return what holds for a pane at the moment that is looked at."""
-        return pane.setup if self._cursor is None else self._state(pane).setup
+        return self._state(pane).setup
 
     def snapshot(self, pane: Pane) -> Snapshot:
         """Return the moment that is looked at; a controller that fails on it has decided nothing."""
@@ -197,37 +162,35 @@ class Session:
                 return pane.simulation.snapshot
             except RobocovError:
                 pass
-        return self._past.snapshot(self._state(pane), self.time)
+        return past.replayed_snapshot(self._state(pane), self.time, self.scenario.dt)
 
     def positions(self, pane: Pane) -> Array:
         """Return where the robots are at the moment that is looked at, (n, 2) m."""
-        return pane.simulation.positions if self._cursor is None else self._state(pane).positions
+        return pane.simulation.positions if self.live else self._state(pane).positions
 
     def trail(self, pane: Pane) -> tuple[Array, Array]:
         """Return where the robots went up to the moment that is looked at: (k, n, 2) m and (k,) s."""
-        if self._cursor is None or self.setup(pane).numbers == pane.numbers:
+        if self.setup(pane).numbers == pane.numbers:
             return pane.trail.until(self.time)
         key = self._cursor, self.serial
         kept, trail = self._rebuilt.get(pane.number, (None, pane.trail))
         if kept != key:
-            trail = trail_of(self.history, pane.number, self._cursor)
+            trail, _ = past.way_of(self.history, pane.number, self._number)
             self._rebuilt[pane.number] = key, trail
         return trail.positions, trail.time
 
     @property
     def events(self) -> list[Event]:
-        """Events on the way to the present, in order."""
-        limits, found = self.document.limits(self.head, self._run.step), []
+        limits, found = self.document.limits(self.head, self._run.step), list[Event]()
         for node in self.document.path(self.head):
             happened = [] if node.scenario is not None else [(node.at, node.kind, node.words)]
-            happened += sorted((each.step, each.kind, each.words) for each in node.happenings)
-            found += [each for each in happened if each[0] <= limits[node.number]]
-        dt = self.scenario.dt
-        return [Event(step * dt, kind, words) for step, kind, words in sorted(found, key=itemgetter(0))]
+            for step, kind, words in (*happened, *sorted(node.happenings)):
+                if step <= limits[node.number]:
+                    found.append(Event(step * self.scenario.dt, kind, words))
+        return sorted(found, key=attrgetter("time"))
 
     @property
     def ghosts(self) -> list[Ghost]:
-        """The cost curves of other branches, from where they left this one; the newest last."""
         if self._ghosts is None:
             self._ghosts = self._other_curves()[-2 * MOST_GHOSTS * len(self.panes) :]
         return self._ghosts
@@ -242,41 +205,46 @@ class Session:
                 places.append(state.positions[state.setup.numbers.index(number)])
         return np.array(places).reshape(-1, 2)
 
-    # time
+    def compared(self, what: str = "distance") -> tuple[float, dict[int, float]]:
+        """Return the newest time not after now when the costs of all panes with any are known, and these."""
+        curves = {pane.number: curve for pane in self.panes if len(curve := pane.curves[what])}
+        time = min([self.time, *(curve.last_time for curve in curves.values())])
+        values = {number: curve.at(time) for number, curve in curves.items()}
+        return time, {number: value for number, value in values.items() if np.isfinite(value)}
 
     def advance(self, seconds: float) -> int:
-        """Let so many seconds pass on the clock; return how many steps were made or shown."""
         if self._remaking is not None:
             self.remake(_SLICE)
             return 0
         return self.clock.advance(seconds, self._play_on) if self.playing else 0
 
     def step(self) -> None:
-        """Make a single step, or show the next moment of the past; it pauses what is playing."""
         self.playing = False
         if self._cursor is not None:
-            self._show_next(self._cursor)
+            self._look(self._cursor + 1)
         else:
             self._advance()
 
     def look_at(self, time: float) -> None:
-        """Look at the last moment not after `time`; at the end, at the present."""
         cursor = self.history.at(time)
         self.release()
-        self._cursor, self._waited = (cursor if cursor < len(self.history) - 1 else None), 0
+        self._look(cursor)
 
     def look_by(self, moments: int) -> None:
-        """Look so many moments further on, or back."""
-        self.look_at(self.history.time(min(max(self._number + moments, 0), len(self.history) - 1)))
+        self.release()
+        self._look(max(self._number + moments, 0))
+
+    def _look(self, cursor: int) -> None:
+        self._cursor, self._waited = (cursor if cursor < len(self.history) - 1 else None), 0
 
     def _play_on(self) -> bool:
         """Make one step, or show the next moment of the past; say whether to go on."""
         if self._cursor is not None:
-            steps = self.history.steps
+            now, after = self.history[self._cursor], self.history[self._cursor + 1]
             self._waited += 1
             # where the past was thinned, moments stay for as many steps as are missing
-            if self._waited >= steps[self._cursor + 1] - steps[self._cursor]:
-                self._show_next(self._cursor)
+            if self._waited >= after.step - now.step:
+                self._look(self._cursor + 1)
             if self._cursor is None and self.at_end_of_record:
                 self.playing = False  # to go on from there is for people to decide
             return self.playing
@@ -289,17 +257,12 @@ class Session:
             self.playing = False
         return self.playing
 
-    def _show_next(self, now: int) -> None:
-        self._waited = 0
-        self._cursor = now + 1 if now + 1 < len(self.history) - 1 else None
-
     def _advance(self) -> None:
         self.head.happenings.update(self._run.advance())
         self.head.carry_out(self._run)  # it goes on amid a touch that lasted, as a drag
         self.head.end = max(self.head.end, self._run.step)
         self.history.add(self._run.moment(self.head.number))
-        if self._script:
-            self._follow()
+        self._follow()
         if self._run.step % 12 == 0:
             self.settled = self._has_settled()
 
@@ -309,56 +272,37 @@ class Session:
             return False
         before = self.history[self.history.at(self.end - SETTLED_WINDOW)]
         for pane in self.panes:
-            state = before.states.get(pane.number)
-            if state is None or state.setup is not pane.setup:
+            state = before.states[pane.number]
+            if state.setup is not pane.setup:
                 return False
-            moved = np.hypot(*(pane.simulation.positions - state.positions).T)
-            if moved.max(initial=0.0) >= SETTLED_DISTANCE:
+            if np.hypot(*(pane.simulation.positions - state.positions).T).max() >= SETTLED_DISTANCE:
                 return False
         return True
-
-    # branches
 
     def follow(self, node: Node) -> None:
         """Let what was done on the way to a node be done again as time goes by; any other touch ends that."""
         self._script = self.document.path(node)
 
     def _follow(self) -> None:
-        """Carry out what the script says of this step."""
         if self.head not in self._script:
             self._script = []
-            return
-        todo = False
-        for node in self._script[self._script.index(self.head) + 1 :]:
+        for node in self._script[self._script.index(self.head) + 1 :] if self._script else ():
             if node.at != self._run.step:
                 break
-            self.head, todo = node, True
+            self.head, self.settled = node, False
             node.carry_out(self._run)
-        if todo:
-            self.settled = False
             self.history.amend(self._run.moment(self.head.number))
 
     def branch(self) -> bool:
-        """Go on from the moment looked at; what came after it stays, as a branch that can be gone back to.
-
-        Return whether there was anything to leave: at the present there is not.
-        """
+        """Go on from the moment looked at, if that is past, and say so; what came after stays as a branch."""
         if self._cursor is None:
             return False
         moment = self.history[self._cursor]
         self._take_over(Lockstep.resumed(moment), moment.node, self.history.until(self._cursor))
         return True
 
-    @property
-    def branches(self) -> list[Branch]:
-        """All stories that there are, the newest last."""
-        return self.document.branches()
-
     def enter(self, node: Node, step: int | None = None) -> None:
-        """Go to a step of a node, its end by default: to what was kept, and from there by simulating again.
-
-        Where that takes long it goes on with every `advance`; until then the present stays as it was.
-        """
+        """Go to a step of a node, its end by default; where simulating takes long, with every `advance`."""
         self.remake()
         self._remaking = self._remade(node, node.end if step is None else step)
         self.remake(np.inf if np.isinf(self.clock.budget) else 4 * _SLICE)
@@ -366,30 +310,24 @@ class Session:
     def remake(self, seconds: float = np.inf) -> None:
         """Go on with making a branch again for so many seconds, by default to its end."""
         began = perf_counter()
-        while self._remaking is not None:
-            try:
-                next(self._remaking)
-            except StopIteration:
-                self._remaking = None
-            except BaseException:
-                self._remaking = None
-                raise
+        remaking, self._remaking = self._remaking, None
+        for _ in remaking or ():
             if perf_counter() - began > seconds:
+                self._remaking = remaking
                 return
 
     def undo(self) -> str | None:
         """Go back to right before the newest touch; return what it was, None if there is none."""
-        node = self.head
-        if node.parent is None:
+        node, parent = self.head, self.head.parent
+        if parent is None:
             return None
-        node.parent.redo = node
-        self.enter(node.parent, node.at)
+        parent.redo = node
+        self.enter(parent, node.at)
         return node.words
 
     def redo(self) -> str | None:
         """Go to the end of what was undone last; return what it was, None if there is none."""
-        node = self.head.redo
-        if node is None:
+        if (node := self.head.redo) is None:
             return None
         self.enter(node)
         return node.words
@@ -399,7 +337,7 @@ class Session:
         path, limits = self.document.path(node), self.document.limits(node, step)
         rank = {each.number: k for k, each in enumerate(path)}
         on_the_way = set(rank) & {each.number for each in self.document.path(self.head)}
-        kept = [moment for moment in self.history.since(0) if moment.node in on_the_way]
+        kept = [moment for moment in self.history.moments if moment.node in on_the_way]
         kept += [moment for each in path if each.number not in on_the_way for moment in each.kept]
         kept = [moment for moment in kept if moment.step <= limits[moment.node]]
         kept.sort(key=lambda moment: (rank[moment.node], moment.step))
@@ -413,7 +351,7 @@ class Session:
             yield
         self._take_over(run, node.number, history)
 
-    def _take_over(self, run: Lockstep, node: int, history: History, change: Change | None = None) -> None:
+    def _take_over(self, run: Lockstep, node: int, history: History, change: Touch | None = None) -> None:
         """Let another moment of the document be the present, and carry out a change there if that can be."""
         self.stow()
         left = self.document.limits(self.head, self._run.step)
@@ -421,50 +359,40 @@ class Session:
         path, limits = self.document.path(head), self.document.limits(head, run.step)
         before = {pane.number: pane for pane in self.panes} if on_the_way else {}
         for pane in run.panes:
-            last = len(history) - 1
-            pane.starts = starts_of(history, pane.number, last)
-            pane.trail = trail_of(history, pane.number, last)
+            pane.trail, pane.starts = past.way_of(history, pane.number, len(history) - 1)
             for what, curve in pane.curves.items():
                 for each in path:
-                    if (pane.number, what) in each.curves:
-                        curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
-            if pane.number in before:
-                pane.sensed = before[pane.number].sensed.copy()
-                pane.sensed.cut(run.time)
-            else:
-                pane.sensed = _sensed_in(history, pane.number)
+                    curve.extend(each.curves[pane.number, what], limits[each.number] * run.scenario.dt)
+            known = before.get(pane.number)
+            pane.sensed = _sensed_in(history, pane.number) if known is None else known.sensed.copy()
+            pane.sensed.cut(run.time)
         if change is not None:
             run.apply(change)
-        self.head, self._run, self.history = head, run, history
-        self.clock.dt = self._past.dt = run.scenario.dt
-        self._cursor, self._waited, self._gesture, self._ghosts = None, 0, None, None
-        self.serial += 1
-        self.settled = False
+        self._go_on(head, run, history)
 
     def stow(self) -> None:
         """Remember moments and curves of the present branch in its nodes."""
         moments: dict[int, list[Moment]] = {}
-        for moment in self.history.since(0):
+        for moment in self.history.moments:
             moments.setdefault(moment.node, []).append(moment)
         path, dt = self.document.path(self.head), self.scenario.dt
         for node, after in zip(path, [*path[1:], None], strict=True):
             now = moments.get(node.number, [])
             later = node.kept if after is None or not now else []
-            node.keep([*now, *(each for each in later if each.step > self._run.step)])
+            kept = [*now, *(each for each in later if each.step > self._run.step)]
+            node.kept = kept[:: -max(-(-len(kept) // MOST_KEPT), 1)][::-1]  # the last among them
             for pane in self.panes:
                 node.controllers[pane.number] = pane.law
                 for what, curve in pane.curves.items():
                     known = curve.between(node.begin * dt, np.inf if after is None else after.at * dt)
-                    if (pane.number, what) in node.curves:
-                        known.extend(node.curves[pane.number, what], np.inf)
-                    if len(known):
-                        node.curves[pane.number, what] = known
+                    known.extend(node.curves[pane.number, what])
+                    node.curves[pane.number, what] = known
 
     def _other_curves(self) -> list[Ghost]:
         limits, dt, found = self.document.limits(self.head, self._run.step), self.scenario.dt, []
         root = self.document.path(self.head)[0]
-        for branch in self.branches:
-            path = self.document.path(branch.node)
+        for branch in self.document.branches():
+            path, number = self.document.path(branch.node), branch.node.number
             if path[0] is not root:
                 continue
             theirs = self.document.limits(branch.node, branch.end)
@@ -472,24 +400,15 @@ class Session:
                 for what in ("distance", "time"):
                     curve = Curve()
                     for node in path:
-                        since = limits.get(node.number, -np.inf)
-                        if (pane, what) in node.curves and theirs[node.number] > since:
-                            known = node.curves[pane, what].between(since * dt, theirs[node.number] * dt)
-                            curve.extend(known, np.inf)
+                        since, until = limits.get(node.number, -np.inf), theirs[node.number]
+                        if until > since:
+                            curve.extend(node.curves[pane, what].between(since * dt, until * dt))
                     if len(curve) > 1:
-                        words = branch_words(law)
-                        found.append(
-                            Ghost(law.name, words, curve.time, curve.value, what, branch.node.number)
-                        )
+                        found.append(Ghost(law.name, law.words, curve.time, curve.value, what, number))
         return found
 
-    # how it is touched
-
-    def do(self, change: Change, kind: str, words: str, gesture: object = None) -> None:
-        """Carry a change out from the moment looked at, as a touch of its own or a part of the present one.
-
-        Changes of the same `gesture`, not None, without anything else between, are one touch.
-        """
+    def do(self, change: Touch, kind: str, words: str, gesture: object = None) -> None:
+        """Carry a change out from the moment looked at; changes of one `gesture`, not None, are one touch."""
         self.remake()
         self._script = []
         let_go = False
@@ -520,57 +439,46 @@ class Session:
         self.history.amend(run.moment(self.head.number))
 
     def restart(self, **changed: object) -> None:
-        """Begin anew, with changes of the scenario if there are any."""
+        """Begin at time 0, with changes of the scenario if there are any; undo comes back to this run."""
         scenario = self.scenario
         if changed.keys() & {"environment", "robots", "start", "seed"}:
             changed.setdefault("given", None)
         known = {None, "uniform", *scenario.environment.starts}  # an obstacle may have covered it
         if "environment" in changed or scenario.start not in known:
             changed.setdefault("start", None)
-        self.begin(replace(scenario, **changed), "begun anew")  # type: ignore[arg-type]
-
-    def begin(self, scenario: Scenario, words: str) -> None:
-        """Begin another scenario at time 0; undo comes back to this one."""
+        scenario = replace(scenario, **changed)  # type: ignore[arg-type]
         self.remake()
         run = Lockstep(scenario)
         self.stow()
         restart = changes.Restart(scenario)
-        self.head = self.document.add(self.head, self._run.step, "begin", words, restart)
-        self._run = run
+        self._begin_at(self.document.add(self.head, self._run.step, "begin", "begun anew", restart), run)
         self.recorded_until = None
         self.revision += 1
-        self._begin_time_line()
 
     def set_law(self, pane: Pane, law: ControllerChoice) -> None:
-        """Let another controller, or other gains, take over in a pane."""
         before, change = self.setup(pane).law, changes.SetController(pane.number, law)
         if law == before:
             return
-        law.made()
         if law.name != before.name:
             self.do(change, "law", f"{law.label} takes over")
         else:
-            words = gain_words(before, law)
+            words = law.words_since(before)
             gesture = "gain", pane.number, words.partition(" = ")[0]
             self.do(change, "law", f"{law.label}: {words}", gesture)
 
     def set_limits(self, limits: TeamSpec) -> None:
-        """Change what all robots are and can do."""
         if limits != self.setup(self.panes[0]).limits:
             self.do(changes.SetLimits(limits), "limits", "limits changed", "limits")
 
     def add_pane(self, law: ControllerChoice) -> None:
-        """Compare with one controller more; all begin anew, from the same starts."""
         if len(self.panes) >= MOST_PANES:
             raise ParameterError(f"there is room for {MOST_PANES} controllers side by side")
         self.restart(laws=(*self.scenario.laws, law))
 
     def remove_pane(self, pane: Pane) -> None:
-        """Leave a pane out from now on; the others go on."""
         self.do(changes.RemovePane(pane.number), "pane", f"{pane.law.label} left out")
 
     def edit(self, environment: Environment, words: str) -> int:
-        """Go on with other obstacles; return how many robots had to be pushed out of the way."""
         change = map_change(self.environment, environment)
         before = {pane.number: self.positions(pane) for pane in self.panes}
         self.do(change, "obstacle", words)
@@ -578,67 +486,55 @@ class Session:
         return max(int((np.hypot(*(after[k] - before[k]).T) > PUSHED).sum()) for k in before)
 
     def paint(self, dabs: tuple[Point, ...], radius: float, *, lowers: bool, stroke: object) -> None:
-        """Dab the density with a brush; the dabs of a stroke are one touch."""
         words = "density lowered" if lowers else "density raised"
         self.do(changes.Paint(dabs, radius, lowers), "density", words, ("stroke", stroke))
 
     def grab(self, number: int, point: Point) -> None:
-        """Drag a robot towards a point: by a spring while the run goes on, at once while it is paused.
-
-        One that failed comes at once.
-        """
+        """Drag a robot to a point: by a spring while the run goes on; one that failed, or paused, at once."""
         if self.playing and number in self.numbers:
             to = round(float(point[0]), 4), round(float(point[1]), 4)
             self.do(Drag(number, to), "hand", f"robot {number} was dragged", ("hand", number))
         else:
-            self._place(number, point)
+            self.place(number, point)
 
     def release(self) -> None:
-        """Let go of a robot that is dragged; one that was swung flies on."""
         if self.hand is not None and self._cursor is None:
             number = self.hand[0]
             self.do(Release(), "hand", f"robot {number} was dragged", ("hand", number))
         self._gesture = None
 
     def place(self, number: int, point: Point) -> None:
-        """Put a robot, or one that failed, at a point or as near as it fits."""
-        self._place(number, point)
-        self._gesture = None
-
-    def _place(self, number: int, point: Point) -> None:
+        """Put a robot, or one that failed, at a point or as near as it fits, until `release` as one touch."""
         at = float(point[0]), float(point[1])
         self.do(changes.Place(number, at), "hand", f"robot {number} was moved", ("place", number))
 
     def add_robot(self, point: Point) -> int:
-        """Let one robot more join at a point, or as near as it fits; return its number."""
-        new = max({*self.numbers, *self.setup(self.panes[0]).failed}) + 1
+        new = self.setup(self.panes[0]).there[-1] + 1
         at = float(point[0]), float(point[1])
         self.do(changes.Join(new, at), "robot", f"robot {new} joined")
         return new
 
     def remove_robot(self, number: int) -> None:
-        """Take a robot out, whether it works or not."""
         self.do(changes.Leave(number), "robot", f"robot {number} taken out")
 
     def fail_robot(self, number: int) -> None:
-        """Let a robot fail: it stays where it is, stops, and is not heard any more."""
         self.do(changes.Fail(number), "failure", f"robot {number} failed")
 
     def revive_robot(self, number: int) -> None:
-        """Let a robot that failed work again, where it stands or as near as it fits."""
         self.do(changes.Revive(number), "robot", f"robot {number} works again")
+
+    def fail_or_revive(self, number: int) -> str:
+        failed = number in self.setup(self.panes[0]).failed
+        (self.revive_robot if failed else self.fail_robot)(number)
+        return self.head.words
 
 
 def _sensed_in(history: History, pane: int) -> Sensed:
     """Return what a pane's robots have sensed, as far as kept moments tell."""
-    found, sensor = Sensed(), None
-    setup: PaneSetup | None = None
+    found = Sensed()
     for k in range(0, len(history), max(1, len(history) // MOST_SENSED)):
-        state = history[k].states[pane]
-        if state.setup is not setup or sensor is None:
-            setup = state.setup
-            sensor = RangeSensor(solid_pieces(setup.solid), movers(setup.solid))
-        sensor.show(history.time(k))
-        points = sensor.nearest(state.positions, setup.team.sensing_range)
-        found.add(history.time(k), setup.numbers, points)
+        time, state = history.time(k), history[k].states[pane]
+        setup, sensor = state.setup, past.sensor_in(state.setup.solid)
+        sensor.show(time)
+        found.add(time, setup.numbers, sensor.nearest(state.positions, setup.team.sensing_range))
     return found

@@ -1,36 +1,28 @@
-"""Saved and autosaved state of the open session: no work is lost."""
+"""Saved and autosaved state of the open session, and its runs: no work is lost."""
 
+import re
+import subprocess
+import sys
+import tempfile
 from collections.abc import Collection, Mapping
-from datetime import datetime
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import Any
 
+from robocov.controllers import CONTROLLERS
+from robocov.errors import OutputError
+from robocov_app.runs.saved import folder_names
 from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import autosave
-from robocov_app.viewer.session.file import SUFFIX, load_session, save_session, session_json, session_of
+from robocov_app.viewer.session.changes import Restart, SetController
+from robocov_app.viewer.session.document import Document
+from robocov_app.viewer.session.file import SUFFIX, save_session, session_json, session_of
 from robocov_app.viewer.session.session import Session
 
 KIND = "robocov-session-draft"
-
-_PAUSE = 0.9
-"""Seconds between two copies of a session that goes on."""
-
-
-class Recovered(NamedTuple):
-    """A session that a window left behind."""
-
-    folder: Path
-    path: Path | None
-    when: datetime
-    touches: int
-
-    @property
-    def words(self) -> str:
-        """Words of the offer."""
-        where = "never saved" if self.path is None else f"not saved to {self.path.name}"
-        touches = "1 touch" if self.touches == 1 else f"{self.touches} touches"
-        return f"a session of {self.when:%H:%M}, {touches}, {where}"
+_PAUSE = 0.9  # seconds between two copies of a session that goes on
 
 
 class Workspace:
@@ -47,7 +39,6 @@ class Workspace:
 
     @property
     def unsaved(self) -> bool:
-        """Whether there are touches that are in no file."""
         return self.session.revision != self._saved
 
     def keep(self, view: Mapping[str, Any]) -> None:
@@ -63,10 +54,7 @@ class Workspace:
         self._autosaver.keep(lambda: {"session": content})
 
     def save(self, folder: Path, view: Mapping[str, Any], path: Path | None = None) -> Path:
-        """Write the session to a file, by default its own, or a new one in a folder; return it.
-
-        OutputError when it cannot be written; ParameterError where its past is a record that nothing repeats.
-        """
+        """Write the session to a file, by default its own or a new one; raises as `require_document`."""
         session = self.session
         session.require_document()
         session.stow()
@@ -77,34 +65,123 @@ class Workspace:
         return target
 
     def close(self) -> None:
-        """End; what is not saved stays aside, and is offered at the next start."""
         self._autosaver.close(discard=not self.unsaved)
 
 
-def opened(
-    path: Path, controllers: Collection[str], folder: Path | None
-) -> tuple[Workspace, Mapping[str, Any]]:
-    """Return a session from its file, and what is shown of it; MapError, InputError as `load_session`."""
-    saved = load_session(path, controllers)
-    return Workspace(Session.opened(saved), folder, path), saved.view
+def recoverable(folder: Path | None) -> tuple[autosave.Record, ...]:
+    return autosave.recoverable(folder, KIND, lambda record: record if "session" in record.content else None)
 
 
-def recoverable(folder: Path | None) -> tuple[Recovered, ...]:
-    """Return the sessions that windows left behind which live no more, the newest first."""
-
-    def read(record: autosave.Record) -> Recovered | None:
-        content = record.content.get("session")
-        if content is None:
-            return None
-        return Recovered(record.folder, record.path, record.when, len(content["touches"]) - 1)
-
-    return autosave.recoverable(folder, KIND, read)
+def offer(work: autosave.Record) -> str:
+    where = "never saved" if work.path is None else f"not saved to {work.path.name}"
+    count = len(work.content["session"]["touches"]) - 1
+    return f"a session of {work.when:%H:%M}, {count} {'touch' if count == 1 else 'touches'}, {where}"
 
 
 def recovered(
-    work: Recovered, controllers: Collection[str], folder: Path | None
+    work: autosave.Record, controllers: Collection[str], folder: Path | None
 ) -> tuple[Workspace, Mapping[str, Any]]:
-    """Return a session that was left behind, to go on with."""
-    record = autosave.read_record(work.folder, KIND)
-    saved = session_of(record.content["session"], str(work.folder), controllers)
+    saved = session_of(work.content["session"], str(work.folder), controllers)
     return Workspace(Session.opened(saved), folder, work.path, work.folder), saved.view
+
+
+_ERRORS = "errors.txt"
+
+
+@dataclass
+class _Job:
+    target: Path
+    process: subprocess.Popen[bytes]
+    temporary: tempfile.TemporaryDirectory[str]  # with the session, and what the process says on stderr
+
+
+class RunSaver:
+    """Has runs saved by other processes. No call but `finish` waits for them."""
+
+    def __init__(self, lattice: int) -> None:
+        self._lattice = lattice
+        self._jobs: list[_Job] = []
+        self._said: list[tuple[str, bool]] = []
+
+    def save(self, session: Session, folder: Path, map_name: str = "") -> str:
+        """Begin to save the story up to the present in a new folder; raises as `require_document`."""
+        session.require_document()
+        name = (
+            map_name.replace("\\", "/").rpartition("/")[2].removesuffix(".json") or session.environment.name
+        )
+        laws = [pane.law.name for pane in session.panes]
+        what = folder_names(laws)[0] if len(laws) == 1 else "comparison"
+        stem = re.sub(r"[^\w.-]+", "-", name).strip(".-")[:64] or "map"
+        target = _made(folder, f"{stem}-{what}")
+        temporary = tempfile.TemporaryDirectory(prefix="robocov-")
+        file = Path(temporary.name) / f"session{SUFFIX}"
+        save_session(file, session.document, session.head, session.step_now, {})
+        command = [sys.executable, "-m", "robocov_app", "run", str(file), "--json"]
+        command += ["--out", str(target.resolve()), "--lattice", str(self._lattice)]
+        if own := own_controllers(session.document):
+            command += ["--controller", ",".join(own)]
+        nothing = subprocess.DEVNULL
+        with file.with_name(_ERRORS).open("wb") as errors:
+            process = subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=errors)
+        self._jobs.append(_Job(target, process, temporary))
+        return f"saving the run: {target}/"
+
+    def poll(self) -> list[tuple[str, bool]]:
+        """Return what is to be told since the last call, in words, and whether it is trouble."""
+        for job in self._jobs[:]:
+            if job.process.poll() is not None:
+                self._end(job)
+        said, self._said = self._said, []
+        return said
+
+    def finish(self) -> None:
+        try:
+            for k, job in enumerate(self._jobs):
+                try:
+                    job.process.wait(0.5)
+                except subprocess.TimeoutExpired:
+                    if k == 0:
+                        sys.stderr.write("saving runs; Ctrl-C gives up\n")
+                    job.process.wait()
+        except BaseException:
+            for job in self._jobs:
+                job.process.kill()
+                job.process.wait()
+            raise
+        finally:
+            for job in self._jobs[:]:
+                self._end(job)
+
+    def _end(self, job: _Job) -> None:
+        self._jobs.remove(job)
+        with job.temporary as folder:
+            lines = Path(folder, _ERRORS).read_text("utf-8", "replace").strip().splitlines()
+        if job.process.returncode == 0:
+            self._said.append((f"run saved: {job.target}/ (record, cost, pictures)", False))
+            return
+        reason = lines[-1].removeprefix("robocov: error: ") if lines else "the process has ended"
+        with suppress(OSError):
+            job.target.rmdir()  # fails, as it should, where there is something in it
+        self._said.append((f"run not saved: {job.target}/: {reason}", True))
+
+
+def own_controllers(document: Document) -> list[str]:
+    changes = [change for node in document.nodes for change in node.changes]
+    laws = [law for each in changes if isinstance(each, Restart) for law in each.scenario.laws]
+    laws += [each.law for each in changes if isinstance(each, SetController)]
+    return [name for name in dict.fromkeys(law.name for law in laws) if name not in CONTROLLERS]
+
+
+def _made(folder: Path, stem: str) -> Path:
+    """Make a folder that was not there before; OutputError when it cannot be made."""
+    while True:
+        target = free_name(folder, stem, "")
+        try:
+            target.mkdir(parents=True)
+        except FileExistsError:
+            if not target.exists():  # a file stands where a folder is wanted
+                raise OutputError(f"{target}: cannot be made") from None
+        except OSError as error:
+            raise OutputError(f"{target}: cannot be made: {error.strerror or error}") from error
+        else:
+            return target
