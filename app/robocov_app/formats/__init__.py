@@ -5,10 +5,8 @@ free, as the file has it; `robocov_app.formats.geometry.conversion` makes the `E
 way for all.
 """
 
-from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
@@ -46,43 +44,31 @@ __all__ = [
     "ReadOptions", "Shaping", "WriteOptions", "detect", "export_map", "exporter", "import_map", "importer",
     "read_map", "shaped",
 ]  # fmt: skip
-
-_Format = TypeVar("_Format", Importer, Exporter)
-
 # the first whose `sniff` says yes has it: the surest come first
 _SURE = (irsim, ros, movingai, stage, argos, tmx, picture, osm, svg, dxf, wkt, geojson)
-
+# the formats that can be read, by name
 IMPORTERS: dict[str, Importer] = {each.IMPORTER.name: each.IMPORTER for each in (*_SURE, houseexpo, rings)}
-"""The formats that can be read, by name."""
-
 _EXPORT = (ros, movingai, picture, svg, wkt, geojson)
-
+# the formats that can be written, by name
 EXPORTERS: dict[str, Exporter] = {each.EXPORTER.name: each.EXPORTER for each in _EXPORT}
-"""The formats that can be written, by name."""
 
 
 def importer(name: str) -> Importer:
-    """Return the format called `name`; the ParameterError where there is none names the nearest."""
-    return _named(IMPORTERS, name)
-
-
-def _named(formats: dict[str, _Format], name: str) -> _Format:
-    if name not in formats:
-        raise ParameterError(unknown_name("format", name, formats))
-    return formats[name]
+    if name not in IMPORTERS:
+        raise ParameterError(unknown_name("format", name, IMPORTERS))
+    return IMPORTERS[name]
 
 
 def detect(path: str | Path) -> Importer:
     """Return the format of the file at `path`: by its content, or else by its suffix."""
     path = Path(path)
     head = files.head(path)
-    kind = named_kind(path, head)
-    if kind is not None:
+    if (kind := named_kind(path, head)) is not None:
         raise MapError(f"{one_line(path)}: {one_line(kind)}")
     for candidate in IMPORTERS.values():
         if candidate.sniff(path, head):
             return candidate
-    named = [candidate for candidate in IMPORTERS.values() if path.suffix.lower() in candidate.suffixes]
+    named = [each for each in IMPORTERS.values() if path.suffix.lower() in each.suffixes]
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
     wanted = f"one of {', '.join(IMPORTERS)} was wanted"
@@ -115,24 +101,16 @@ def read_map(
     """Return the foreign map at `path` as it was read; parameters and errors are those of `import_map`."""
     path = Path(path)
     chosen = detect(path) if format is None else importer(format)
-    _require_known(options.given(), chosen.options, chosen.name)
+    options.require_known(chosen)
     return chosen.read(path, options)
 
 
-def _require_known(given: Collection[str], known: Collection[str], name: str) -> None:
-    strange = [each for each in given if each not in known]
-    if strange:
-        words = ", ".join(f"--{each}" for each in sorted(known)) or "none"
-        raise ParameterError(f"--{strange[0]}: no option of the format {name}, whose options are: {words}")
-
-
 def exporter(path: str | Path, name: str | None = None) -> Exporter:
-    """Return the format called `name`, or else that of the suffix of `path`."""
-    if name is not None:
-        return _named(EXPORTERS, name)
+    if name is not None and name not in EXPORTERS:
+        raise ParameterError(unknown_name("format", name, EXPORTERS))
     suffix = Path(path).suffix.lower()
     for candidate in EXPORTERS.values():
-        if suffix in candidate.suffixes:
+        if candidate.name == name or (name is None and suffix in candidate.suffixes):
             return candidate
     known = ", ".join(suffix for candidate in EXPORTERS.values() for suffix in candidate.suffixes)
     raise ParameterError(f"{one_line(path)}: unknown format, but a file ending in one of {known} was wanted")
@@ -152,7 +130,7 @@ def export_map(
     """
     path = Path(path)
     chosen = exporter(path, format)
-    _require_known(options.given(), chosen.options, chosen.name)
+    options.require_known(chosen)
     report = chosen.write(environment, path, options)
     dropped = list(report.dropped)
     if environment.density is not None:

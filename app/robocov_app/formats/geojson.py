@@ -18,10 +18,10 @@ from robocov.errors import ParameterError, RobocovError, one_line, place, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
 from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
-from robocov_app.formats.files import begins_with, is_number, located_errors, positions, read_json, refused
+from robocov_app.formats.files import JsonFile, begins_with, is_number
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid, rings
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Kind, Shapes, foreign_map
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
@@ -39,55 +39,64 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     the older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export`
     writes; the option overrules both.
     """
-    document, content, where = read_json(path)
+    file = JsonFile(path)
+    document, where = file.document, file.where
     shapes = Shapes(where, options)
-    found = _Found(where, shapes)
-    with located_errors(content, where):
-        found.read(document)
-        units = document.get("units")
-        if units is not None and options.units is None:
-            if units not in ("metres", "degrees"):
-                raise refused(where, ("units",), units, "metres or degrees was wanted")
-            options = replace(options, units=units)
-        origin = _origin(document, where)
-    figures, shapes.notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
+    found = _Found(file, shapes)
+    found.read()
+    units, origin = document.get("units"), document.get("origin")
+    if units not in (None, "metres", "degrees") and options.units is None:
+        raise file.refused(("units",), units, "metres or degrees was")
+    if origin is not None:
+        good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
+        if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
+            raise file.refused(("origin",), origin, "longitude and latitude in degrees were")
+        origin = float(origin[0]), float(origin[1])
+    figures, shapes.notes = in_metres(
+        found.figures,
+        replace(options, units=options.units or units),
+        where,
+        crs=found.crs,
+        globe=True,
+        origin=origin,
+    )
     shapes.add_all(figures)
-    named = document.get("name")
-    name = named if isinstance(named, str) and named.strip() else path.stem
-    text = document.get("description")
+    named, text = document.get("name"), document.get("description")
+    name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return foreign_map(shapes, IMPORTER.name, one_line(name)[:80] or "map", text, solid=False)
+    return foreign_map(shapes, IMPORTER.name, name or "map", text, solid=False)
 
 
 class _Found:
-    def __init__(self, where: str, shapes: Shapes) -> None:
-        self.where, self.shapes = where, shapes
+    def __init__(self, file: JsonFile, shapes: Shapes) -> None:
+        self.file, self.shapes = file, shapes
         self.figures: list[Figure] = []
         self.crs: str | None = None
 
-    def read(self, document: Any) -> None:
+    def read(self) -> None:
+        document = self.file.document
         kind = document.get("type") if isinstance(document, dict) else None
         if kind == "FeatureCollection":
             features = document.get("features")
             if not isinstance(features, list):
-                raise refused(self.where, ("features",), features, "a list of features was wanted")
+                raise self.file.refused(("features",), features, "a list of features was")
             self._see_system(document, ())
             for k, feature in enumerate(features):
                 self._feature(feature, ("features", k))
         elif kind == "Feature":
             self._feature(document, ())
         elif kind == "Topology":
-            raise refused(self.where, ("type",), kind, "GeoJSON, not TopoJSON, was wanted")
+            raise self.file.refused(("type",), kind, "GeoJSON, not TopoJSON, was")
         else:
             self._geometry(document, (), ())
 
     def _feature(self, feature: Any, at: Steps) -> None:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise refused(self.where, at, feature, "a Feature was wanted")
+            raise self.file.refused(at, feature, "a Feature was")
         self._see_system(feature, at)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise refused(self.where, (*at, "properties"), properties, "an object was wanted")
+            raise self.file.refused((*at, "properties"), properties, "an object was")
         given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
         labels = [one_line(label).strip() for label in given if type(label) in (str, int)]
         kind = properties.get("kind")
@@ -96,55 +105,44 @@ class _Found:
         if feature.get("geometry") is None:
             self.shapes.leave_out("feature", "without a geometry")
         else:
-            names = tuple(dict.fromkeys(label for label in labels if label))
+            names = tuple(dict.fromkeys(filter(None, labels)))
             self._geometry(feature["geometry"], (*at, "geometry"), names)
 
     def _geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
         kind = geometry.get("type") if isinstance(geometry, dict) else None
         if kind not in _GEOMETRIES:
-            value = geometry if kind is None else kind
-            place = at if kind is None else (*at, "type")
-            raise refused(self.where, place, value, f"one of {', '.join(_GEOMETRIES)} was wanted")
+            value, where = (geometry, at) if kind is None else (kind, (*at, "type"))
+            raise self.file.refused(where, value, f"one of {', '.join(_GEOMETRIES)} was")
         self._see_system(geometry, at)
-        if kind == "GeometryCollection":
-            parts = geometry.get("geometries")
-            if not isinstance(parts, list):
-                raise refused(self.where, (*at, "geometries"), parts, "a list of geometries was wanted")
-            for k, part in enumerate(parts):
-                self._geometry(part, (*at, "geometries", k), labels)
+        if kind != "GeometryCollection":
+            self._coordinates(kind, geometry.get("coordinates"), (*at, "coordinates"), labels)
             return
-        value, place = geometry.get("coordinates"), (*at, "coordinates")
-        if kind not in _PLURAL:
-            self._coordinates(kind, value, place, labels)
-            return
-        if not isinstance(value, list):
-            raise refused(self.where, place, value, "a list was wanted")
-        for k, part in enumerate(value):
-            self._coordinates(_PLURAL[kind], part, (*place, k), labels)
+        parts = geometry.get("geometries")
+        if not isinstance(parts, list):
+            raise self.file.refused((*at, "geometries"), parts, "a list of geometries was")
+        for k, part in enumerate(parts):
+            self._geometry(part, (*at, "geometries", k), labels)
 
     def _coordinates(self, kind: str, value: Any, at: Steps, labels: tuple[str, ...]) -> None:
-        if value == []:
+        if kind in _PLURAL:
+            if not isinstance(value, list):
+                raise self.file.refused(at, value, "a list was")
+            for k, part in enumerate(value):
+                self._coordinates(_PLURAL[kind], part, (*at, k), labels)
+        elif value == []:
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "Point":
-            self._keep("point", [self._points([value], at, 1)], labels, at)
+            self.figures.append(Figure("point", (self._points([value], at, 1),), labels, place(at)))
         elif kind == "LineString":
-            self._keep("line", [self._points(value, at, 2)], labels, at)
+            self.figures.append(Figure("line", (self._points(value, at, 2),), labels, place(at)))
         elif not isinstance(value, list):
-            raise refused(self.where, at, value, "a list of rings was wanted")
+            raise self.file.refused(at, value, "a list of rings was")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
-            if unclosed:
-                self.shapes.mended["ring", "closed: the last point was not the first"] += unclosed
-            self._keep("polygon", rings, labels, at)
-
-    def _keep(self, kind: Kind, rings: list[Array], labels: tuple[str, ...], at: Steps) -> None:
-        self.figures.append(Figure(kind, tuple(rings), labels, place(at)))
+            self.figures.append(self.shapes.polygon(rings, labels, place(at)))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
-        points = positions(value, at, self.where, least=least, dimensions=(2, 4))
-        self.shapes.leave_heights(points[:, 2:3])
-        return points[:, :2]
+        return self.shapes.flat(self.file.positions(value, at, least, 2, 4))
 
     def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
         """Keep the reference system that an object names, as GeoJSON did before RFC 7946."""
@@ -154,22 +152,10 @@ class _Found:
         properties = given.get("properties") if isinstance(given, dict) else None
         name = properties.get("name") if isinstance(properties, dict) else None
         if not isinstance(name, str):
-            raise refused(self.where, (*at, "crs"), given, "the name of a reference system was wanted")
+            raise self.file.refused((*at, "crs"), given, "the name of a reference system was")
         if self.crs not in (None, name):
-            wanted = f"the same system as before, {self.crs}, was wanted"
-            raise refused(self.where, (*at, "crs"), given, wanted)
+            raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}, was")
         self.crs = name
-
-
-def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:
-    """Return longitude and latitude of [0, 0] m where the file gives them."""
-    origin = document.get("origin")
-    if origin is None:
-        return None
-    good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
-    if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
-        raise refused(where, ("origin",), origin, "longitude and latitude in degrees were wanted")
-    return float(origin[0]), float(origin[1])
 
 
 IMPORTER = Importer(
@@ -179,8 +165,6 @@ IMPORTER = Importer(
         {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
     ),
 )  # fmt: skip
-
-
 _FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
@@ -213,7 +197,7 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
     with written(path) as part:
         part.write_text(_text(environment, options, features), encoding="utf-8")
-    dropped = tuple(thing for thing in not_held(environment) if not thing.startswith("names"))
+    dropped = not_held(environment, names=False)
     area = free_area(areas[0], areas[1:])
     return ExportReport("geojson", (path,), environment.free_area, area, dropped, tuple(notes))
 
@@ -239,7 +223,6 @@ def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, 
 
 
 def _text(environment: Environment, options: WriteOptions, features: list[dict[str, Any]]) -> str:
-    """Return the document, a feature on a line."""
     head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
     if environment.description:
         head["description"] = environment.description

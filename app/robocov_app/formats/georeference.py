@@ -59,13 +59,11 @@ def in_metres(
 
 
 def _points(figures: Sequence[Figure]) -> Array:
-    """Return the points of all figures, one after the other, (k, 2)."""
     rings = [ring for figure in figures for ring in figure.rings]
     return np.concatenate(rings) if rings else np.empty((0, 2))
 
 
 def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
-    """Return figures with these points instead of theirs."""
     moved, begin = [], 0
     for figure in figures:
         cuts = begin + np.cumsum([0, *map(len, figure.rings)])

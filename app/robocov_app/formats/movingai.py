@@ -49,15 +49,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{place}: {shown(letter)}, but one of . G S @ O T W was wanted")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
-    return foreign_map(
-        cells,
-        name=path.stem,
-        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
-        format="movingai",
-        cell=cell,
-        where=where,
-        notes=notes,
-    )
+    text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
+    return foreign_map(cells, where, "movingai", path.stem, text, cell, notes=notes)
 
 
 def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
@@ -93,7 +86,6 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
 
 
 def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDArray[np.uint8]:
-    """Return the letters of the grid, (rows, columns) bytes, the top row first."""
     lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
     for k in range(rows):
         found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0

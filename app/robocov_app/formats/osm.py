@@ -19,9 +19,8 @@ from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreig
 from robocov_app.formats.georeference import DEGREES, in_metres
 
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+# barriers that are walls; gates, kerbs and chains are not
 _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail", "jersey_barrier"}
-"""Barriers that are walls; gates, kerbs and chains are not."""
-
 _POSTS = {"bollard", "block", "tree"}
 _KEYS = {"area", "barrier", "building", "layer", "location", "name", "natural", "tunnel", "type", "width"}
 _KEYS |= {"waterway", "water"}
@@ -40,14 +39,12 @@ class _Thing:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Its name, and what it is: the value of the tag, and the tag."""
         found = [self.tags[key] for key in ("name", "barrier", "building", "natural") if key in self.tags]
         found += [key for key in ("barrier", "building", "natural", "waterway") if key in self.tags]
         return tuple(dict.fromkeys(one_line(label) for label in found if label != "yes"))
 
     @property
     def covered(self) -> bool:
-        """Whether it is below the ground."""
         under = self.tags.get("location") == "underground" or self.tags.get("layer", "0").startswith("-")
         return under or self.tags.get("tunnel", "no") != "no"
 

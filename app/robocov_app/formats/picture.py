@@ -61,7 +61,6 @@ class Brightness:
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins with `head` is a picture of a kind that can be read."""
     return any(begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_PILLOW.values()))
 
 
@@ -204,12 +203,9 @@ def _converted(image: Image) -> Brightness:
     return Brightness(level, 255 * colours, alpha, texts, lossy)
 
 
+# key of the text chunk that says where the picture belongs: JSON with ``cell_m`` and ``origin_m``
 CHUNK = "robocov"
-"""Key of the text chunk that says where the picture belongs: JSON with ``cell_m`` and ``origin_m``."""
-
-TITLE = "Title"
-"""Key of the text chunk with the name of what is shown."""
-
+TITLE = "Title"  # key of the text chunk with the name of what is shown
 _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
@@ -232,15 +228,15 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         cells[picture.alpha < _OPAQUE] = UNKNOWN
     return foreign_map(
         cells,
-        name=picture.texts.get(TITLE, "").strip() or path.stem,
-        description=f"A picture of {cell:g} m a pixel, imported.",
-        format="picture",
-        cell=cell,
+        where,
+        "picture",
+        picture.texts.get(TITLE, "").strip() or path.stem,
+        f"A picture of {cell:g} m a pixel, imported.",
+        cell,
         origin=origin,
         unknown=options.unknown or "obstacle",
         called="transparent",
         noise=_NOISE if picture.lossy else 0.0,
-        where=where,
     )
 
 

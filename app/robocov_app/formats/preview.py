@@ -22,12 +22,10 @@ from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
+# of the page, of the arenas on it, and the least for what is written, in pixels
 _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
-"""Of the page, of the arenas on it, and the least for what is written, in pixels."""
-
+# of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report
 _SCALE, _TOP, _ABOVE, _LINE = 1.3, 66.0, 34.0, 17.0
-"""Of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report."""
-
 _MARK = 0.55  # opacity of what is marked
 _MOST_LINES = 12  # of the report; what is beyond is counted
 _RING = 20.0  # size of the ring around a passage that is too short to be seen, in points
@@ -41,7 +39,6 @@ def preview(
     *,
     theme: Theme | str = LIGHT,
 ) -> None:
-    """Draw an import to a .png, .svg or .pdf: `plot_import`, saved."""
     check_figure_path(path)
     save_figure(plot_import(foreign, environment, report, theme=theme), path)
 
@@ -120,7 +117,6 @@ def _laid_out(
 
 
 def _indent(page: Page, name: str) -> float:
-    """Return how far from a caption's beginning its facts begin."""
     return page.text_width(name, points=TITLE, bold=True) + 12 * page.scale
 
 
@@ -133,7 +129,6 @@ def _halo(theme: Theme, width: float) -> list[AbstractPathEffect]:
 
 
 def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
-    """Draw an area with its holes."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
@@ -185,7 +180,6 @@ def _number(value: float) -> str:
 
 
 def _handles(environment: Environment, theme: Theme, compared: Comparison) -> list[Artist]:
-    """Return the legend's entries for what is drawn."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -13,7 +13,6 @@ _ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with ma
 _UNPACK = "unpack it first"
 _PNG = "save it as a PNG"
 _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
-
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),
@@ -52,7 +51,6 @@ _KINDS = [
 _TABLE = [
     (re.compile(begin.encode("latin-1"), re.DOTALL | re.IGNORECASE), what, way) for begin, what, way in _KINDS
 ]
-
 _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 

@@ -185,6 +185,6 @@ def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
 
 
 def test_turns_are_in_radians() -> None:
-    from robocov_app.formats.irsim import _frame
+    from robocov_app.formats.geometry.frames import frame
 
-    assert _frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))
+    assert frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))

@@ -19,9 +19,7 @@ from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
 
-CELL = 0.05
-"""Side of a cell in metres where none is given: what maps of robots mostly have."""
-
+CELL = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
 _LEAST = math.pi * DEFAULT_RADIUS**2  # parts of the free space with no room for a robot, in m², do not count
 _MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
 _DIGITS = 6  # decimals of a grid's corner: a micrometre
@@ -172,12 +170,10 @@ def _smaller(cell: float) -> Iterator[float]:
                 yield size
 
 
-def not_held(environment: Environment) -> tuple[str, ...]:
-    """Return what of `environment` no raster format holds, in words."""
-    lost = []
-    if environment.starts:
-        lost.append(f"starts: {', '.join(environment.starts)}")
-    if any(obstacle.name for obstacle in environment.obstacles):
+def not_held(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
+    """Return what of `environment` a format has no place for, in words; most have none for `names`."""
+    lost = [f"starts: {', '.join(environment.starts)}"] if environment.starts else []
+    if names and any(obstacle.name for obstacle in environment.obstacles):
         lost.append("names of obstacles")
     return tuple(lost)
 
@@ -192,7 +188,6 @@ def grid_report(
     dropped: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> ExportReport:
-    """Return the report of a map that was written as the free cells of a grid."""
     return ExportReport(
         name,
         files,

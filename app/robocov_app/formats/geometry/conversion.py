@@ -30,14 +30,12 @@ from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.formats.base import ForeignMap, ImportReport, Primitive, check_options, square_metres
+from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
 from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
 from robocov_app.formats.geometry.polygons import CRUMB, bounded, filled, made_valid, polygons_of, rounded
 from robocov_app.formats.geometry.simplify import sharpened, simplified
 
-DEFAULT_TOLERANCE = 0.02
-"""By how much walls of vector formats may move, in metres."""
-
+DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
 # coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
 _GRID = 1e-4
 # obstacles smaller than this, in m², are perhaps noise: so many of them are worth a word
@@ -47,13 +45,10 @@ _TINY, _MANY = 0.01, 10
 _LITTLE, _CONSIDERABLE, _OFFERED = 0.5, 0.1, 3
 # of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
-
+# most obstacles and vertices of a map that is made: it takes seconds to make one that has as many
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
-"""Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
-
+# circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds
 MOST_PRIMITIVES = 5_000
-"""Circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds."""
-
 _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
@@ -62,7 +57,7 @@ _SLIVER = 2.0
 
 
 @dataclass(frozen=True)
-class Shaping:
+class Shaping(Options):
     """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
@@ -87,8 +82,9 @@ class Shaping:
     """The map's default start: a disc at the roomiest place, or anywhere."""
 
     def __post_init__(self) -> None:
-        ranges = {"simplify": (0.0, 10.0, "m"), "specks": (0.0, 1e6, "m²"), "margin": (0.0, 100.0, "m")}
-        check_options(self, ranges | {"radius": (1e-3, 100.0, "m")})
+        self.require(
+            simplify=(0, 10, "m"), specks=(0, 1e6, "m²"), margin=(0, 100, "m"), radius=(1e-3, 100, "m")
+        )
         if self.inside is None:
             return
         if len(self.inside) != 2 or not all(abs(value) <= FARTHEST for value in self.inside):
@@ -271,7 +267,6 @@ class _Shaper:
         return kept
 
     def _offer(self, left: list[Polygon], share: float, next_share: float) -> None:
-        """Name the largest parts that are left out where little stays, or one of them is large."""
         if share < _LITTLE or next_share > _CONSIDERABLE:
             self.others = [_place_in(part) for part in left[:_OFFERED]]
             choices = " or ".join(
@@ -320,7 +315,6 @@ class _Shaper:
         return min(cell, width)
 
     def _require_few(self, count: int, what: str, most: int) -> None:
-        """Check that a map is none that takes minutes to make, and for ever to simulate."""
         if count > most:
             raise MapError(
                 f"{self.where}: {count} {what}, but at most {most} were wanted: --specks AREA drops small "
@@ -384,7 +378,6 @@ class _Shaper:
         return starts
 
     def _note_unreached(self, environment: Environment) -> None:
-        """Say how much of the free space robots do not reach from where most of it is."""
         radius = self.shaping.radius
         places = sorted((place.area for place in rooms(environment.free, radius)), reverse=True)[1:]
         if places:
@@ -528,13 +521,11 @@ class Comparison:
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x and y, then largest."""
         x, y, right, top = self.region.bounds
         return x, y, right, top
 
 
 def compare(foreign: ForeignMap, environment: Environment, report: ImportReport) -> Comparison:
-    """Return what an import has changed of the free space."""
     before, after = foreign.free, environment.free
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]

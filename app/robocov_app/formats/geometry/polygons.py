@@ -14,19 +14,14 @@ from robocov.arrays import Array
 from robocov.environment import GRID
 from robocov.errors import MapError
 
+# the first ring with the others as holes, or what SVG calls ``fill-rule``
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
-"""The first ring with the others as holes, or what SVG calls ``fill-rule``."""
-
-DIGITS = 6
-"""Decimals of metres by default: the free space is known to a micrometre."""
-
+DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
 MAX_CROSSINGS = 30_000
 """Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
 cross itself millions of times, and to find all of these places takes minutes and gigabytes."""
 
-CRUMB = 1e-4
-"""Obstacles and parts that are smaller, in m², come of rounding."""
-
+CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 _FEW = 12  # so few edges are compared each with each, which is quicker than a tree of them
 _RAYS = 500_000  # so many pairs of a ray and an edge are looked at together, which bounds the memory
 # edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
@@ -81,7 +76,6 @@ def edges_of(lines: Iterable[BaseGeometry]) -> Array:
 
 
 def sides_of(area: BaseGeometry) -> Array:
-    """Return the (n, 2, 2) sides of polygons."""
     return edges_of(shapely.get_rings(shapely.get_parts(area)))
 
 
@@ -178,7 +172,6 @@ def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array
 
 
 def made_valid(area: BaseGeometry) -> BaseGeometry:
-    """Return a valid area of rings that may cross themselves or each other."""
     made: BaseGeometry = shapely.make_valid(area, method="structure", keep_collapsed=False)
     return made
 
@@ -191,7 +184,6 @@ def polygons(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def polygons_of(geometry: BaseGeometry) -> MultiPolygon:
-    """Return the polygons in `geometry` as one geometry."""
     return MultiPolygon(polygons(geometry))
 
 

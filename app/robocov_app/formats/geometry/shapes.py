@@ -20,10 +20,7 @@ from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed, polygons_of, united
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
-
-THICKNESS = 0.1
-"""Width of walls that are drawn as lines without one, in metres."""
-
+THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
 
@@ -74,7 +71,6 @@ class Line:
 
     @cached_property
     def solid(self) -> BaseGeometry:
-        """Area that the wall covers."""
         points, width, matrix = self.stretched or (self.points, self.width, None)
         solid = LineString(points).buffer(
             width / 2, cap_style=self.cap, join_style=self.join, mitre_limit=self.mitre_limit
@@ -134,7 +130,6 @@ class Shapes:
         return False
 
     def add_all(self, figures: Iterable[Figure]) -> None:
-        """Add geometries as `add`, and join the lines that meet."""
         for figure in figures:
             self.add(figure)
         self.join_lines()
@@ -172,7 +167,6 @@ class Shapes:
         return not area.is_empty
 
     def add_line(self, line: Line, *, at: str = "") -> None:
-        """Add a wall. Raises MapError as `add_outline`."""
         (points,) = self._checked([line.points], at)
         width = max(line.width, 0.0)
         files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
@@ -196,19 +190,29 @@ class Shapes:
         ]
 
     def add_circle(self, centre: Array, radius: float, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a disc, as the polygon that stands for a round obstacle. Raises MapError as `add_outline`."""
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
         circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
         (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
         self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle))
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a pillar, if points were asked for. Raises MapError as `add_outline`."""
         ((x, y),) = self._checked([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
         else:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
+
+    def polygon(self, rings: Iterable[Array], labels: tuple[str, ...], at: str) -> Figure:
+        """Return a polygon of a format that closes rings; those that are not closed are counted."""
+        rings = tuple(rings)
+        if unclosed := sum(bool((ring[0] != ring[-1]).any()) for ring in rings):
+            self.mended["ring", "closed: the last point was not the first"] += unclosed
+        return Figure("polygon", rings, labels, at)
+
+    def flat(self, points: Array) -> Array:
+        """Return (k, 2) of points, whose third coordinates are counted."""
+        self.leave_heights(points[:, 2:3])
+        return points[:, :2]
 
     def leave_heights(self, heights: Array) -> None:
         """Count third coordinates, which no map has; nan is none."""
@@ -217,17 +221,14 @@ class Shapes:
             self._heights.append(heights)
 
     def leave_out(self, thing: str, why: str = "", count: int = 1) -> None:
-        """Count something that is no part of the map."""
         self.left_out[thing, why] += count
 
     @property
     def thickness(self) -> float:
-        """Width of lines that have none of their own, m."""
         return THICKNESS if self.options.thickness is None else self.options.thickness
 
     @property
     def areas(self) -> list[BaseGeometry]:
-        """Areas that the outlines enclose."""
         return [outline.area for outline in self.outlines]
 
     @property
@@ -237,7 +238,6 @@ class Shapes:
 
     @property
     def repaired(self) -> tuple[str, ...]:
-        """Repairs that were made, in words."""
         told = [f"{counted(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())]
         if len(self._met) == 1:
             told.append(f"the outline met itself: {self._met[0]}")
@@ -247,7 +247,6 @@ class Shapes:
 
     @property
     def dropped(self) -> tuple[str, ...]:
-        """Left-out content, in words."""
         left = sorted(self.left_out.items())
         told = [f"{_many(count, thing)} {why}".strip() for (thing, why), count in left]
         if self._heights:
@@ -268,7 +267,6 @@ class Shapes:
                     raise ParameterError(f"{self.where}: {name}: {what}")
 
     def count(self, vertices: int) -> None:
-        """Count vertices that were read. Raises MapError when there are too many."""
         self.vertices += vertices
         files.require_vertices(self.vertices, self.where)
 
@@ -305,22 +303,16 @@ def name_of(labels: Sequence[str]) -> str | None:
 
 
 def folded(labels: Iterable[str]) -> set[str]:
-    """Return labels as they are compared."""
     return {label.casefold() for label in labels}
 
 
 def polygonised(lines: Iterable[Line]) -> BaseGeometry:
-    """Return the area that lines enclose together, in whatever order they stand."""
     noded = shapely.union_all([LineString(line.points) for line in lines])
     return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(noded))))
 
 
-BOUNDARY = "boundary"
-"""A shape of this name, id, class or layer is the boundary."""
-
-AROUND = 1.0
-"""Room left around the shapes where none of them is the boundary, in metres."""
-
+BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
+AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
 # a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
 _MOST = 0.5
 # shapes that are farther from each other, in metres, are of no map: unions of such take seconds
@@ -440,7 +432,6 @@ def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
 
 
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
-    """Refuse what no map may be, before it is computed with."""
     x, y, right, top = bounds
     if max(right - x, top - y) > most:
         size = f"{right - x:.6g} x {top - y:.6g} m"

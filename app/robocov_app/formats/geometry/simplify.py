@@ -139,7 +139,6 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
 
 
 def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
-    """Return how often each thing that is checked was wrong at first, in words."""
     less = {
         "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
         "outline": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
@@ -274,7 +273,6 @@ def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
 
 
 def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:
-    """Return the polygons of a drawing of `outline`."""
     rings = shapely.linearrings(drawing.points, indices=drawing.ring)
     return MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
 

@@ -24,13 +24,10 @@ _LARGEST = 1e30
 _PIXELS = {
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
-
-PIXEL = 0.0254 / 96
-"""A user unit in metres, where nothing says otherwise."""
+PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
 
 
 def number(text: str) -> float:
-    """Return a number, next to nothing as nothing; ValueError when it is too large to calculate with."""
     value = float(text)
     if not abs(value) <= _LARGEST:
         raise ValueError(f"{text[:20]}, but a number up to {_LARGEST:g} was wanted")
@@ -71,11 +68,6 @@ def composed(outer: Array, inner: Array) -> Array:
     if not (np.abs(both) <= _LARGEST).all():
         raise ValueError(f"a transform to coordinates beyond {_LARGEST:g}, but smaller ones were wanted")
     return np.asarray(both)
-
-
-def moved(matrix: Array, points: Array) -> Array:
-    """Return (k, 2) points under a matrix."""
-    return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])
 
 
 def stretch(matrix: Array) -> tuple[float, float]:
@@ -139,9 +131,8 @@ def fitted(box: tuple[float, float, float, float], width: float, height: float, 
     return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
 
 
+# commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none
 MOST_DRAWS = 150_000
-"""Commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none."""
-
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -244,7 +235,6 @@ class _Pen:
         self.last = kind
 
     def polyline(self, values: list[float], *, relative: bool) -> None:
-        """Draw lines to many points, x and y in turn."""
         points = np.array(values).reshape(-1, 2)
         if relative:
             points = np.cumsum(points, axis=0) + self.at
@@ -299,7 +289,6 @@ class _Pen:
         self._line(end_x, end_y)
 
     def _arc(self, v: list[float], end: Point) -> None:
-        """Draw an elliptic arc (SVG 2, appendix B.2.4 and B.2.5)."""
         (x, y), rx, ry, turn = self.at, abs(v[0]), abs(v[1]), math.radians(v[2])
         if end == self.at:
             return
@@ -326,9 +315,7 @@ class _Pen:
         self._line(*end)
 
 
-Style: TypeAlias = Mapping[str, str]
-"""Properties by name, as they are written."""
-
+Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
 INHERITED = {
     "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
     "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
@@ -343,9 +330,8 @@ _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _AT_RULE_PARTS = re.compile(r"[{};]")
-
+# characters of style sheets, rules in them, and pairs of a rule and an element that are looked at
 MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000
-"""Characters of style sheets, rules in them, and pairs of a rule and an element that are looked at."""
 
 
 class _Rule(NamedTuple):
@@ -470,7 +456,6 @@ def is_painted(style: Style, what: str) -> bool:
 
 
 def is_hidden(own: Style) -> bool:
-    """Return whether an element is not drawn, with all in it."""
     return own.get("display", "").lower() == "none" or _is_zero(own.get("opacity", "1"))
 
 
