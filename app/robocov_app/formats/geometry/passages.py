@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 
-from robocov.arrays import Array, IntArray, ranges
+from robocov.arrays import Array, IntArray
 from robocov.environment import Point
 from robocov_app.formats.geometry.polygons import sides_of
 
@@ -112,14 +112,3 @@ def closed_gaps(
     was = np.nan_to_num(shapely.distance(*before), nan=np.inf)
     lost = was > width * _CLEARLY
     return pairs[lost], places[lost]
-
-
-def paths_of(points: Array, begin: IntArray, size: IntArray, first: IntArray, last: IntArray) -> Array:
-    """Return runs of vertices of rings as linestrings, (m,).
-
-    `begin`, `size`, (m,): where each run's ring begins among `points`, and how many vertices it has. `first`,
-    `last`, (m,): the first and the last vertex of each run, along the ring; the same for all of a ring.
-    """
-    count = (last - first - 1) % size + 2
-    at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)
-    return np.asarray(shapely.linestrings(points[at], indices=np.arange(len(count)).repeat(count)))

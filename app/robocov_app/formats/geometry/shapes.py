@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -91,7 +91,6 @@ class Line:
         return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
 
 
-@dataclass(eq=False)
 class Shapes:
     """Shapes that a reader has found in the file `where`: checked, counted, chosen by name.
 
@@ -100,24 +99,22 @@ class Shapes:
     written. `robots`, `notes`, `cell`: as of a `ForeignMap`.
     """
 
-    where: str
-    options: ReadOptions
-    outlines: list[Outline] = field(default_factory=list)
-    lines: list[Line] = field(default_factory=list)
-    pillars: list[CircleObstacle] = field(default_factory=list)
-    vertices: int = 0
-    left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
-    mended: Counter[tuple[str, str]] = field(default_factory=Counter)
-    labels: dict[str, str] = field(default_factory=dict)
-    robots: list[tuple[float, float]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    cell: float | None = None
-    _heights: list[Array] = field(default_factory=list)
-    _met: list[str] = field(default_factory=list)
-
-    @cached_property
-    def _crossings(self) -> Crossings:
-        return Crossings(self.where)
+    def __init__(self, where: str, options: ReadOptions) -> None:
+        self.where, self.options = where, options
+        self.outlines: list[Outline] = []
+        self.lines: list[Line] = []
+        self.pillars: list[CircleObstacle] = []
+        self.vertices = 0
+        self.left_out: Counter[tuple[str, str]] = Counter()
+        self.mended: Counter[tuple[str, str]] = Counter()
+        self.labels: dict[str, str] = {}
+        self.robots: list[tuple[float, float]] = []
+        self.notes: list[str] = []
+        self.cell: float | None = None
+        self.thickness = THICKNESS if options.thickness is None else options.thickness
+        self._heights: list[Array] = []
+        self._met: list[str] = []
+        self._crossings = Crossings(where)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
@@ -216,16 +213,10 @@ class Shapes:
 
     def leave_heights(self, heights: Array) -> None:
         """Count third coordinates, which no map has; nan is none."""
-        heights = heights[~np.isnan(heights)]
-        if len(heights):
-            self._heights.append(heights)
+        self._heights.append(heights[~np.isnan(heights)])
 
     def leave_out(self, thing: str, why: str = "", count: int = 1) -> None:
         self.left_out[thing, why] += count
-
-    @property
-    def thickness(self) -> float:
-        return THICKNESS if self.options.thickness is None else self.options.thickness
 
     @property
     def areas(self) -> list[BaseGeometry]:
@@ -249,8 +240,8 @@ class Shapes:
     def dropped(self) -> tuple[str, ...]:
         left = sorted(self.left_out.items())
         told = [f"{_many(count, thing)} {why}".strip() for (thing, why), count in left]
-        if self._heights:
-            heights = np.concatenate(self._heights)
+        heights = np.concatenate([*self._heights, np.empty(0)])
+        if len(heights):
             span = f"z from {heights.min():.4g} to {heights.max():.4g}"
             told.append(f"{counted(len(heights), 'third coordinate')}, {span}")
         return tuple(told)
@@ -304,11 +295,6 @@ def name_of(labels: Sequence[str]) -> str | None:
 
 def folded(labels: Iterable[str]) -> set[str]:
     return {label.casefold() for label in labels}
-
-
-def polygonised(lines: Iterable[Line]) -> BaseGeometry:
-    noded = shapely.union_all([LineString(line.points) for line in lines])
-    return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(noded))))
 
 
 BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
@@ -391,13 +377,9 @@ def foreign_map(
     shapely.prepare(area)
     around = shapely.covered_by(area, blocks)
     solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in shapes.pillars)]
-    outside = int((~shapely.intersects(area, solids)).sum() + around.sum())
-    if outside:
+    if outside := int((~shapely.intersects(area, solids)).sum() + around.sum()):
         shapes.leave_out("shape", "outside of the boundary", outside)
-    free = area
-    if solids:
-        free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID))
-    outer = None
+    free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID)) if solids else area
     # what is free of a grid has its own outline
     plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
     if boundary is not None and (solid or boundary.area is not area) and plain:
@@ -405,6 +387,25 @@ def foreign_map(
     elif (walls or shapes.pillars) and len(area.geoms) == len(free.geoms) == 1:
         # walls that begin at the edge are no part of it
         outer = Polygon(area.geoms[0].exterior)
+    else:
+        outer = None
+    notes = [*shapes.notes]
+    if boundary and boundary.words and solid:
+        notes.append(f"the boundary is {boundary.words}")
+    many = counted(int((~around).sum()), "closed outline")
+    if not around.all() and (boundary is None or boundary.words):  # else the format says what all of it is
+        notes.append(f"{many} taken as solid (--outlines free: as free space)")
+    elif not solid and len(shapes.outlines) > 1:
+        many = counted(len(shapes.outlines), "closed outline")
+        notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
+    if walls:
+        narrow, wide = (f"{most(line.width for line in walls):.3g}" for most in (min, max))
+        span = narrow if narrow == wide else f"{narrow} to {wide}"
+        notes.append(f"{counted(len(walls), 'line')} taken as walls, {span} m wide (--thickness)")
+    if shapes.pillars:
+        notes.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
+    circles = (outline.circle for outline in inner if outline.circle is not None)
+    straight = (wall for line in walls if (wall := line.wall) is not None)
     return ForeignMap(
         name=name,
         description=description,
@@ -413,15 +414,11 @@ def foreign_map(
         boundary=outer,
         vertices_read=shapes.vertices,
         cell=shapes.cell,
-        primitives=(
-            *(outline.circle for outline in inner if outline.circle is not None),
-            *(wall for line in walls if (wall := line.wall) is not None),
-            *shapes.pillars,
-        ),
+        primitives=(*circles, *straight, *shapes.pillars),
         robots=tuple(shapes.robots),
         repaired=shapes.repaired,
         dropped=shapes.dropped,
-        notes=(*shapes.notes, *_words(shapes, solid, boundary, int((~around).sum()))),
+        notes=tuple(notes),
     )
 
 
@@ -434,27 +431,8 @@ def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     x, y, right, top = bounds
     if max(right - x, top - y) > most:
-        size = f"{right - x:.6g} x {top - y:.6g} m"
         wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
-        raise MapError(f"{where}: {size}, but {wanted}")
-
-
-def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
-    told = [f"the boundary is {boundary.words}"] if boundary and boundary.words and solid else []
-    if blocks and (boundary is None or boundary.words):  # else the format says what all of it is
-        told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
-    elif not solid and len(shapes.outlines) > 1:
-        many = counted(len(shapes.outlines), "closed outline")
-        told.append(f"{many} taken as free space (--outlines solid: as obstacles)")
-    used = boundary.lines if boundary is not None else ()
-    widths = sorted(line.width for line in shapes.lines if line not in used)
-    if widths:
-        narrow, wide = f"{widths[0]:.3g}", f"{widths[-1]:.3g}"
-        span = narrow if narrow == wide else f"{narrow} to {wide}"
-        told.append(f"{counted(len(widths), 'line')} taken as walls, {span} m wide (--thickness)")
-    if shapes.pillars:
-        told.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
-    return told
+        raise MapError(f"{where}: {right - x:.6g} x {top - y:.6g} m, but {wanted}")
 
 
 def _named(shapes: Shapes) -> _Enclosure | None:
@@ -462,13 +440,15 @@ def _named(shapes: Shapes) -> _Enclosure | None:
     key = (wanted or BOUNDARY).casefold()
     outlines = frozenset(o for o in shapes.outlines if key in map(str.casefold, o.labels))
     lines = frozenset(line for line in shapes.lines if key in map(str.casefold, line.labels))
-    area = _together([*(o.area for o in outlines), polygonised(lines)])
-    if area.is_empty:
-        if wanted is None:
-            return None
+    noded = shapely.union_all([LineString(line.points) for line in lines])
+    rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    area = _together([*(o.area for o in outlines), shapely.union_all(rooms)])
+    if not area.is_empty:
+        return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+    if wanted is not None:
         what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
         raise MapError(f"{shapes.where}: {what}")
-    return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+    return None
 
 
 def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
@@ -482,11 +462,7 @@ def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None
-    if wholly:
-        holds = bool(shapely.covers(outline.area, inner).all())
-    else:
-        holds = not inner or _holds(outline.area, inner)
-    if not holds:
+    if inner and not (shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)):
         return None
     called = f", {shown(outline.labels[0])}," if outline.labels else ""
     words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"

@@ -1,5 +1,6 @@
 """The language of SVG: numbers, lengths, transforms, paths, and how elements are painted."""
 
+import cmath
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -9,7 +10,6 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from robocov.arrays import Array, ranges
-from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.formats.geometry.curves import arcs, beziers
 from robocov_app.formats.xml_tree import Element
@@ -162,12 +162,12 @@ def subpaths(
             pen.close()
             continue
         values, at = pen.arguments(text, at, command, most, draws)
+        count = _ARGUMENTS[command.upper()]
         if command in "MmLl":
             pen.draw(command, values[:2])
             if len(values) > 2:  # lines through all that follow
                 pen.polyline(values[2:], relative=command.islower())
         else:
-            count = _ARGUMENTS[command.upper()]
             for k in range(0, len(values), count):
                 pen.draw(command, values[k : k + count])
     if text[at : at + 1].strip(" \t\r\n\f,") or text[at:].strip(" \t\r\n\f,"):
@@ -176,7 +176,7 @@ def subpaths(
 
 
 class _Pen:
-    """Pen position and the path drawn so far.
+    """Pen position and the path drawn so far, in places x + i y.
 
     A curve is kept with the index of the vertex that it ends at: all become points together, which is
     quicker.
@@ -184,15 +184,13 @@ class _Pen:
 
     def __init__(self) -> None:
         self.draws = 0
-        self.vertices: list[Point] = []
-        self.at: Point = (0.0, 0.0)
-        self.start: Point = (0.0, 0.0)
-        self.handle: Point = (0.0, 0.0)
+        self.vertices: list[complex] = []
+        self.at = self.start = self.handle = 0j
         self.last = ""
         self._begins: list[int] = []
         self._closed: list[bool] = []
-        self._beziers: list[tuple[float, ...]] = []
-        self._arcs: list[tuple[float, ...]] = []
+        self._beziers: list[tuple[complex, ...]] = []
+        self._arcs: list[tuple[complex, ...]] = []
 
     def arguments(self, text: str, at: int, command: str, most: int, draws: int) -> tuple[list[float], int]:
         values: list[float] = []
@@ -212,33 +210,30 @@ class _Pen:
         return values, at
 
     def draw(self, command: str, v: list[float]) -> None:
-        kind = command.upper()
-        x, y = self.at if command.islower() else (0.0, 0.0)
+        kind, origin = command.upper(), self.at if command.islower() else 0j
         self.draws += 1
         if kind == "M":
-            self.at = self.start = (x + v[0], y + v[1])
+            self.at = self.start = origin + complex(*v)
         if kind == "M" or self.last == "Z":  # after a Z the next subpath begins where the last did
             self._begins.append(len(self.vertices))
             self._closed.append(False)
             self.vertices.append(self.at)
         match kind:
             case "L":
-                self._line(x + v[0], y + v[1])
+                self._line(origin + complex(*v))
             case "H":
-                self._line(x + v[0], self.at[1])
+                self._line(complex(origin.real + v[0], self.at.imag))
             case "V":
-                self._line(self.at[0], y + v[0])
+                self._line(complex(self.at.real, origin.imag + v[0]))
             case "A":
-                self._arc(v, (x + v[5], y + v[6]))
+                self._arc(v, origin + complex(*v[5:]))
             case "C" | "S" | "Q" | "T":
-                self._curve(kind, [(x + a, y + b) for a, b in zip(v[::2], v[1::2], strict=True)])
+                self._curve(kind, [origin + complex(*pair) for pair in zip(v[::2], v[1::2], strict=True)])
         self.last = kind
 
     def polyline(self, values: list[float], *, relative: bool) -> None:
-        points = np.array(values).reshape(-1, 2)
-        if relative:
-            points = np.cumsum(points, axis=0) + self.at
-        self.vertices += map(tuple, points.tolist())
+        points = np.array(values).view(complex)
+        self.vertices += (np.cumsum(points) + self.at if relative else points).tolist()
         self.at = self.vertices[-1]
         self.last = "L"
 
@@ -248,17 +243,18 @@ class _Pen:
         self.last = "Z"
 
     def finished(self, tolerance: float, most: int) -> list[tuple[Array, bool]]:
-        vertices = np.array(self.vertices).reshape(-1, 2)
+        vertices = np.array(self.vertices, complex).view(float).reshape(-1, 2)
         count = np.ones(len(vertices), dtype=np.intp)
         curves = []
         if self._beziers:
             rows = np.array(self._beziers)
-            flat = beziers(rows[:, 1:].reshape(-1, 4, 2), tolerance, most)
-            curves.append((rows[:, 0].astype(np.intp), *flat))
+            flat = beziers(rows[:, 1:].copy().view(float).reshape(-1, 4, 2), tolerance, most)
+            curves.append((rows[:, 0].real.astype(np.intp), *flat))
         if self._arcs:
             rows = np.array(self._arcs)
-            flat = arcs(rows[:, 1:3], rows[:, 3:5], rows[:, 5:7], rows[:, 7], rows[:, 8], tolerance, most)
-            curves.append((rows[:, 0].astype(np.intp), *flat))
+            centre, u, v = (rows[:, k : k + 1].copy().view(float) for k in (1, 2, 3))
+            flat = arcs(centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance, most)
+            curves.append((rows[:, 0].real.astype(np.intp), *flat))
         for index, _, steps in curves:
             count[index] = steps
         end = np.cumsum(count)
@@ -269,50 +265,47 @@ class _Pen:
         parts = np.split(all_points, (end - count)[self._begins[1:]]) if self._begins else []
         return [(part, closed) for part, closed in zip(parts, self._closed, strict=True) if len(part) > 1]
 
-    def _line(self, x: float, y: float) -> None:
-        self.at = (x, y)
-        self.vertices.append(self.at)
+    def _line(self, end: complex) -> None:
+        self.at = end
+        self.vertices.append(end)
 
-    def _curve(self, kind: str, points: list[Point]) -> None:
+    def _curve(self, kind: str, points: list[complex]) -> None:
         """Draw a Bézier curve; S and T begin with the mirror image of the handle before them."""
         if kind in "ST":
             smooth = self.last in ("CS" if kind == "S" else "QT")
-            mirrored = (2 * self.at[0] - self.handle[0], 2 * self.at[1] - self.handle[1])
-            points = [mirrored if smooth else self.at, *points]
-        self.handle = points[-2]
-        (x, y), (end_x, end_y) = self.at, points[-1]
-        if len(points) == 2:  # the same curve as one of degree 3
-            u, v = points[0]
-            first = (x + 2 * (u - x) / 3, y + 2 * (v - y) / 3)
-            points = [first, (end_x + 2 * (u - end_x) / 3, end_y + 2 * (v - end_y) / 3)]
-        self._beziers.append((len(self.vertices), x, y, *points[0], *points[1], end_x, end_y))
-        self._line(end_x, end_y)
+            points = [2 * self.at - self.handle if smooth else self.at, *points]
+        *handles, end = points
+        self.handle = handles[-1]
+        if len(handles) == 1:  # the same curve as one of degree 3
+            handles = [place + 2 * (handles[0] - place) / 3 for place in (self.at, end)]
+        self._beziers.append((len(self.vertices), self.at, *handles, end))
+        self._line(end)
 
-    def _arc(self, v: list[float], end: Point) -> None:
-        (x, y), rx, ry, turn = self.at, abs(v[0]), abs(v[1]), math.radians(v[2])
+    def _arc(self, given: list[float], end: complex) -> None:
+        """Draw an elliptic arc (SVG 2, appendix B.2.4 and B.2.5)."""
+        rx, ry, angle = abs(given[0]), abs(given[1]), math.radians(given[2])
         if end == self.at:
             return
         if rx == 0.0 or ry == 0.0:
-            self._line(*end)
+            self._line(end)
             return
-        cos, sin = math.cos(turn), math.sin(turn)
-        dx, dy = (x - end[0]) / 2, (y - end[1]) / 2
+        turn = complex(math.cos(angle), math.sin(angle))
+        half = (self.at - end) / 2 * turn.conjugate()
         # along the axes, where the ellipse is a circle of radius 1
-        a, b = (cos * dx + sin * dy) / rx, (cos * dy - sin * dx) / ry
-        size = math.hypot(a, b)
+        place = complex(half.real / rx, half.imag / ry)
+        size = abs(place)
         if size > 1.0:  # too small to reach: as large as it takes
-            rx, ry, a, b = rx * size, ry * size, a / size, b / size
+            rx, ry, place = rx * size, ry * size, place / size
         ratio = math.sqrt(max(1.0 / max(min(size, 1.0), 1e-150) ** 2 - 1.0, 0.0))
-        sign = -1.0 if v[3] == v[4] else 1.0
-        p, q = sign * ratio * b, -sign * ratio * a
+        middle = (1j if given[3] == given[4] else -1j) * ratio * place
         # the chord is twice the size: exact for huge radii too
         sweep = 2.0 * math.asin(min(size, 1.0))
-        sweep = math.copysign(math.tau - sweep if v[3] else sweep, 1.0 if v[4] else -1.0)
-        ux, uy, vx, vy = cos * rx, sin * rx, -sin * ry, cos * ry
-        centre = ((x + end[0]) / 2 + ux * p + vx * q, (y + end[1]) / 2 + uy * p + vy * q)
-        begin = math.atan2(b - q, a - p)
-        self._arcs.append((len(self.vertices), *centre, ux, uy, vx, vy, begin, sweep))
-        self._line(*end)
+        sweep = math.copysign(math.tau - sweep if given[3] else sweep, 1.0 if given[4] else -1.0)
+        u, v = turn * rx, turn * (1j * ry)
+        centre = (self.at + end) / 2 + u * middle.real + v * middle.imag
+        begin = cmath.phase(place - middle)
+        self._arcs.append((len(self.vertices), centre, u, v, begin, sweep))
+        self._line(end)
 
 
 Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
