@@ -44,8 +44,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         elif (body := child.child("body")) is not None:
             position = body.numbers("position", count=3, default="0,0,0")
             _place(child, position, body.numbers("orientation", count=3, default="0,0,0"), shapes)
-    text = "An arena of ARGoS, imported."
-    return foreign_map(shapes, IMPORTER.name, path.stem, text, solid=True, world=world)
+    return foreign_map(shapes, path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -30,8 +30,8 @@ class ForeignMap:
 
     name: str
     description: str
-    format: str
     free: MultiPolygon
+    format: str = ""
     boundary: Polygon | None = None
     vertices_read: int = 0
     cell: float | None = None
@@ -184,7 +184,7 @@ class Importer:
     """A foreign format: its name as in ``--format``, a title for people, suffixes in lower case.
 
     ``sniff(path, head)``: whether a file that begins with these bytes (`files.HEAD` of them, or all) is of
-    it; cheap, and never raises. ``read(path, options)``: the map in it; a MapError of one line on whatever it
+    it; cheap, and never raises. ``reader(path, options)``: the map in it; a one-line MapError on whatever it
     cannot use, within a second and 200 MB. `options`: those of `ReadOptions` that mean something here.
     """
 
@@ -192,8 +192,11 @@ class Importer:
     title: str
     suffixes: tuple[str, ...]
     sniff: Callable[[Path, bytes], bool]
-    read: Callable[[Path, ReadOptions], ForeignMap]
+    reader: Callable[[Path, ReadOptions], ForeignMap]
     options: frozenset[str] = frozenset()
+
+    def read(self, path: Path, options: ReadOptions) -> ForeignMap:
+        return replace(self.reader(path, options), format=self.name)
 
 
 @dataclass(frozen=True)

@@ -301,7 +301,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), "Imported from DXF.", solid=True)
+    return foreign_map(shapes, files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
 def _check(path: Path, where: str) -> None:

@@ -64,7 +64,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     named, text = document.get("name"), document.get("description")
     name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return foreign_map(shapes, IMPORTER.name, name or "map", text, solid=False)
+    return foreign_map(shapes, name or "map", text, solid=False)
 
 
 class _Found:

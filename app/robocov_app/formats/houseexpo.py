@@ -46,7 +46,6 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     return ForeignMap(
         name=f"HouseExpo {one_line(name)[:60]}",
         description=f"A floor plan{many}, imported from HouseExpo.",
-        format=IMPORTER.name,
         free=MultiPolygon(parts),
         vertices_read=len(vertices),
         cut_corners=True,

@@ -80,7 +80,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         many = counted(moving, "obstacle")
         shapes.notes.append(f"{many} with kinematics taken as standing where the file has them")
     name = world["name"].text() or path.stem
-    return foreign_map(shapes, IMPORTER.name, name, "A world of IR-SIM, imported.", solid=True, world=free)
+    return foreign_map(shapes, name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
 def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:

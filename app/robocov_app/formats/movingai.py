@@ -50,7 +50,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
     text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
-    return foreign_map(cells, where, "movingai", path.stem, text, cell, notes=notes)
+    return foreign_map(cells, where, path.stem, text, cell, notes=notes)
 
 
 def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:

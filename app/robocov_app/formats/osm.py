@@ -73,7 +73,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     if extract.gates:
         shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
     text = "Imported from OpenStreetMap, © OpenStreetMap contributors."
-    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), text, solid=True)
+    return foreign_map(shapes, files.name_of_map(path), text, solid=True)
 
 
 class _Extract:

@@ -229,7 +229,6 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     return foreign_map(
         cells,
         where,
-        "picture",
         picture.texts.get(TITLE, "").strip() or path.stem,
         f"A picture of {cell:g} m a pixel, imported.",
         cell,

@@ -31,8 +31,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     for number, rings in enumerate(polygons, start=1):
         shapes.add_outline([ring * scale for ring in rings], at=f"polygon {number}")
     shapes.notes = [f"a unit is {scale:g} m" + ("" if options.scale else " (the file says none; --scale)")]
-    name, text = name_of_map(path), "Imported from rings."
-    return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
+    return foreign_map(shapes, name_of_map(path), "Imported from rings.", solid=False, accessible=True)
 
 
 def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:

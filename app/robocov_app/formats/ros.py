@@ -93,7 +93,6 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     return foreign_map(
         cells,
         where,
-        "ros",
         path.stem,
         f"A ROS map of {cell:g} m a cell, imported.",
         cell,

@@ -117,7 +117,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         shapes.notes.append(words)
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
-    return foreign_map(shapes, IMPORTER.name, name, "A world of Stage, imported.", solid=True, world=free)
+    return foreign_map(shapes, name, "A world of Stage, imported.", solid=True, world=free)
 
 
 class _World:

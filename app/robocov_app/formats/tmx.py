@@ -119,8 +119,7 @@ class _Map:
         world = free_area(~solid, (width, height), (0.0, 0.0), where)
         shapes.count(vertices_of(world))
         shapes.cell = max(width, height) if solid.any() else None
-        text = "A map of Tiled, imported."
-        return foreign_map(shapes, IMPORTER.name, self.path.stem, text, solid=True, world=world)
+        return foreign_map(shapes, self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
         """Return the tiles that are solid, by their global IDs."""

@@ -219,8 +219,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     crs = f"EPSG:{parsed.srid}" if parsed.srid else None
     figures, shapes.notes = in_metres(figures, options, where, crs=crs)
     shapes.add_all(figures)
-    name, text = name_of_map(path), "Imported from WKT."
-    return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
+    return foreign_map(shapes, name_of_map(path), "Imported from WKT.", solid=False, accessible=True)
 
 
 IMPORTER = Importer(

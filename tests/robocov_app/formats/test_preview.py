@@ -26,7 +26,7 @@ CLOSET = box(13, 0, 15, 2)
 
 def foreign(free: Any, **given: Any) -> ForeignMap:
     parts = list(getattr(free, "geoms", [free]))
-    return ForeignMap("plan", "", "svg", MultiPolygon(parts), vertices_read=123, **given)
+    return ForeignMap("plan", "", MultiPolygon(parts), "svg", vertices_read=123, **given)
 
 
 def plotted(free: Any, shaping: Shaping = Shaping(specks=0.05), theme: str = "light", **given: Any) -> Any:  # noqa: B008

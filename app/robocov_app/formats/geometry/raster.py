@@ -32,7 +32,6 @@ _TOUCHING = np.ones((3, 3), dtype=bool)  # known cells that touch at a corner be
 def foreign_map(
     cells: Cells,
     where: str,
-    format: str,  # noqa: A002 - as of the map
     name: str,
     description: str,
     cell: float,
@@ -89,7 +88,6 @@ def foreign_map(
     return ForeignMap(
         name=name,
         description=description,
-        format=format,
         free=area,
         boundary=boundary,
         vertices_read=vertices_of(area),

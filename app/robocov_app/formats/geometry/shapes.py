@@ -316,7 +316,6 @@ class _Enclosure(NamedTuple):
 
 def foreign_map(
     shapes: Shapes,
-    format: str,  # noqa: A002 - as of a `ForeignMap`
     name: str,
     description: str,
     *,
@@ -409,7 +408,6 @@ def foreign_map(
     return ForeignMap(
         name=name,
         description=description,
-        format=format,
         free=free,
         boundary=outer,
         vertices_read=shapes.vertices,

@@ -86,7 +86,7 @@ def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
     texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
     text = texts.get("desc", "")[:1000] or "Imported from SVG."
-    return foreign_map(shapes, IMPORTER.name, name, text, solid=True)
+    return foreign_map(shapes, name, text, solid=True)
 
 
 def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
