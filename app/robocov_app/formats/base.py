@@ -45,11 +45,7 @@ class ForeignMap:
 
 
 def square_metres(area: float, digits: int = 4) -> str:
-    """Return an area with so many digits, and never as a power of ten.
-
-    >>> square_metres(30083.2), square_metres(0.123456)
-    ('30083 m²', '0.1235 m²')
-    """
+    """Return an area with so many digits, and never as a power of ten."""
     return f"{area:.0f} m²" if area >= 1000 else f"{area:.{digits}g} m²"
 
 

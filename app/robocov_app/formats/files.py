@@ -196,11 +196,7 @@ DEEPEST = 12  # deepest nesting of lists and mappings
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice.
-
-    >>> parse_yaml(b"image: a.pgm\\norigin: [0, 1.5, 0]", "map.yaml")
-    {'image': 'a.pgm', 'origin': ['0', '1.5', '0']}
-    """
+    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice."""
     if len(text) > MAX_YAML_BYTES:
         raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
     try:

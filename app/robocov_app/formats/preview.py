@@ -159,11 +159,7 @@ def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
 
 
 def _number(value: float) -> str:
-    r"""Return a number as it is read most easily: whole where it is large.
-
-    >>> _number(1761234.5), _number(35.2789)
-    ('1\u202f761\u202f234', '35.28')
-    """
+    """Return a number as it is read most easily: whole where it is large."""
     return f"{value:.4g}" if abs(value) < 9999.5 else f"{value:,.0f}".replace(",", "\u202f")
 
 

@@ -159,11 +159,7 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
 
 
 def _smaller(cell: float) -> Iterator[float]:
-    """Return round sizes below that of a cell, the largest first.
-
-    >>> list(itertools.islice(_smaller(0.15), 4))
-    [0.1, 0.05, 0.02, 0.01]
-    """
+    """Return round sizes below that of a cell, the largest first."""
     for power in itertools.count(math.floor(-math.log10(cell))):
         for digit in (5, 2, 1):
             if (size := round(digit * 10.0**-power, power)) < cell * (1 - 1e-9):

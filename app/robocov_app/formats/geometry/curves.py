@@ -26,9 +26,6 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
     control points bound the curvature. (G. Wang, The subdivision method for finding the intersection between
     two Bézier curves or surfaces, Zhejiang University Journal, 1984.) Raises ValueError when there would be
     more than `most`.
-
-    >>> beziers(np.array([[[0.0, 0.0], [2.0, 3.0], [4.0, 3.0], [6.0, 0.0]]]), 0.6)[0].tolist()
-    [[3.0, 2.25], [6.0, 0.0]]
     """
     bend = np.hypot(*np.moveaxis(np.diff(control, 2, axis=1), 2, 0)).max(axis=1, initial=0.0)
     count = _counted(np.sqrt(0.75 * bend / tolerance), most)

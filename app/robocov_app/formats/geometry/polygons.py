@@ -87,10 +87,6 @@ def enclosed(
     `rings`, (k, 2) m: closed or not. `crossings`: of the file so far; MapError when they are too many.
     Returns the area, the largest part first; where rings of a polygon with holes meet, in words; and how many
     holes take nothing out of it, by the reason.
-
-    >>> square = np.array([[0, 0], [4, 0], [4, 4], [0, 4]])
-    >>> [enclosed([square, 1 + square / 2], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
-    [12.0, 12.0, 16.0]
     """
     crossings = Crossings() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
@@ -212,11 +208,6 @@ def bounded(
 
     It is `given`, m, without holes, or else the outline of `free`, or of several parts the convex hull; or
     the `hull` of that; with so much `margin`, m, around it.
-
-    >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
-    >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
-    >>> boundary.area, [part.area for part in solid]
-    (12.0, [1.0])
     """
     parts = list(free.geoms)
     if given is not None:
@@ -244,11 +235,7 @@ def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
 
 
 def decimal(value: float, digits: int) -> str:
-    """Return a number with at most so many decimals, and none that say nothing.
-
-    >>> decimal(1.5, 3), decimal(-0.0001, 3), decimal(1200.0, 0)
-    ('1.5', '0', '1200')
-    """
+    """Return a number with at most so many decimals, and none that say nothing."""
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")

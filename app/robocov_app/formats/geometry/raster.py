@@ -144,11 +144,7 @@ def _counts(number: list[int], rows: int, columns: int, cell: float, called: str
 
 
 def _share(number: int, total: int) -> str:
-    """Return a part of the cells in per cent, never rounded to none or all.
-
-    >>> _share(1, 100_000), _share(500, 1000)
-    ('<0.1 %', '50 %')
-    """
+    """Return a part of the cells in per cent, never rounded to none or all."""
     share = 100 * number / total
     if 0.0 < share < 0.1:
         return "<0.1 %"
@@ -161,9 +157,6 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
     Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row). Every vertex is a
     true corner, none lies within a straight wall, and no two rings touch: necks join obstacles that touch at
     a corner. Raises MapError when there are more than `files.MAX_VERTICES`.
-
-    >>> traced(np.array([[True, True], [True, False]]), "grid").wkt
-    'MULTIPOLYGON (((0 0, 2 0, 2 1, 1 1, 1 2, 0 2, 0 0)))'
     """
     column, row, west, north, neck, north_east = _corners(free, where)
     if not len(row):

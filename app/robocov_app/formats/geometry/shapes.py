@@ -277,11 +277,7 @@ class Shapes:
 
 
 def _many(count: int, thing: str) -> str:
-    """Return how many things there are, also of nouns in y and x.
-
-    >>> _many(2, "empty geometry"), _many(2, "box")
-    ('2 empty geometries', '2 boxes')
-    """
+    """Return how many things there are, also of nouns in y and x."""
     if count != 1 and thing.endswith(("y", "x")):
         return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
     return counted(count, thing)

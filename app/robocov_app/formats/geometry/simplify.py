@@ -476,10 +476,6 @@ def sharpened(plan: Polygon, tolerance: float) -> Polygon:
 
     A run of short edges becomes the point where the long edges before and after it meet, if all of the run is
     near that: unlike a plain simplification, it keeps the directions of the walls.
-
-    >>> cut = Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)])
-    >>> sharpened(cut, 0.02).area
-    12.0
     """
     rings = [_sharpened(np.asarray(ring.coords)[:-1], tolerance) for ring in (plan.exterior, *plan.interiors)]
     sharp = Polygon(rings[0], rings[1:])

@@ -145,10 +145,6 @@ def subpaths(
 
     `tolerance`: largest distance of a curve from its points. `most`, `draws`: points and commands at most.
     Raises ValueError where it is no path data, or has more; the message says which character.
-
-    >>> [(points, closed)], _ = subpaths("m0 0h4v2z", 0.1, 100)
-    >>> points.tolist(), closed
-    ([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]], True)
     """
     if sum(text.count(letter) for command in _ARGUMENTS for letter in (command, command.lower())) > draws:
         raise ValueError(f"more than {draws} commands, but fewer were wanted")
@@ -418,11 +414,7 @@ class StyleSheet:
 
 
 def declarations(text: str) -> dict[str, str]:
-    """Return the properties of a ``style`` attribute or of the body of a rule.
-
-    >>> declarations("fill: none; stroke-width:2px;")
-    {'fill': 'none', 'stroke-width': '2px'}
-    """
+    """Return the properties of a ``style`` attribute or of the body of a rule."""
     pairs = (part.partition(":") for part in text.split(";") if ":" in part)
     return {name.strip().lower(): value.strip() for name, _, value in pairs}
 
