@@ -2,6 +2,10 @@
 
 C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for multi-robot systems, Swarm
 Intelligence 6 (2012), 271-295.
+
+Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places are
+a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is distributed at
+random is left out and counted: only ARGoS can tell from the seed where it puts it.
 """
 
 import math
@@ -24,12 +28,6 @@ _UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are ti
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the arena of an experiment.
-
-    Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places
-    are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
-    distributed at random is left out and counted: only ARGoS can tell from the seed where it puts it.
-    """
     root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.child("arena")
     if arena is None:

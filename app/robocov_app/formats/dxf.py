@@ -1,4 +1,12 @@
-"""DXF drawings."""
+"""DXF drawings.
+
+Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for the
+boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
+Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out wherever they are
+inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
+hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
+``scale`` overrules the unit of the header; one of them is needed.
+"""
 
 import logging
 import math
@@ -42,10 +50,7 @@ _CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, a
 
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
-    """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
-
-    A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
-    """
+    """Return points of a polyline, (k, 2); the bulge of the edge after each is tan(angle / 4), positive to the left."""
     arcs = extra("ezdxf.math", "dxf")
     drawn = [points[:1]]
     left = float(MOST_POINTS)
@@ -276,15 +281,6 @@ class DxfDrawing:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that the model space of a DXF file draws.
-
-    Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
-    the boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option
-    ``thickness``. Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out
-    wherever they are inserted. Layers that are off or frozen, texts, dimensions and what has a third
-    dimension are left out; so are hatches without the option ``hatches``. Curves become lines that stay
-    within a millimetre. The option ``scale`` overrules the unit of the header; one of them is needed.
-    """
     where = one_line(path)
     _check(path, where)
     document = _document(path, where)

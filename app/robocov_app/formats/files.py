@@ -6,6 +6,7 @@ anything but text: what a value is, who asks for it decides.
 
 import codecs
 import stat
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import takewhile
@@ -14,6 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
@@ -148,6 +150,14 @@ def _exists(named: Path) -> bool:
     return False
 
 
+def whole_numbers(text: str | bytes, separator: str) -> NDArray[np.int64] | None:
+    """Return the numbers in a text, None where there is anything else."""
+    with warnings.catch_warnings(), suppress(DeprecationWarning, ValueError, OverflowError):
+        warnings.simplefilter("error", DeprecationWarning)
+        return np.fromstring(text, dtype=np.int64, sep=separator) if text.strip() else np.empty(0, np.int64)
+    return None
+
+
 def begins_with(head: bytes, bracket: bytes) -> bool:
     return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == bracket
 
@@ -168,10 +178,7 @@ class JsonFile:
         return located(MapError.of(self.where, [mistake]), self._content, self.where)
 
     def positions(self, value: Any, at: Steps, least: int, fewest: int, most: int) -> Array:
-        """Return the points of a list of at least so many as (k, d); missing dimensions are nan.
-
-        Each has from `fewest` to `most` dimensions; d is the most that there are.
-        """
+        """Return the points of a list as (k, d), d from `fewest` to `most`; missing dimensions are nan."""
         if not isinstance(value, list) or len(value) < least:
             points = "point" if least == 1 else "points"
             raise self.refused(at, value, f"a list of at least {least} {points} [x, y] was")

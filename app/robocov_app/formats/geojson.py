@@ -1,4 +1,11 @@
-"""GeoJSON (RFC 7946), in degrees or metres."""
+"""GeoJSON (RFC 7946), in degrees or metres.
+
+What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind`` and
+``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
+projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
+older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
+the option overrules both.
+"""
 
 import json
 import re
@@ -31,14 +38,6 @@ _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes;
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that a FeatureCollection, a Feature or a geometry stands for.
-
-    What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind``
-    and ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and
-    are projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of
-    the older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export`
-    writes; the option overrules both.
-    """
     file = JsonFile(path)
     document, where = file.document, file.where
     shapes = Shapes(where, options)

@@ -92,10 +92,7 @@ def _unwrapped(points: Array, about: float) -> Array:
 
 
 def _authority(crs: str, where: str) -> str:
-    """Return a name of a reference system as AUTHORITY:CODE.
-
-    Only codes are looked up: definitions in full may name files.
-    """
+    """Return a name as AUTHORITY:CODE: only codes are looked up, as definitions in full may name files."""
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
         wanted = f"a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"

@@ -1,4 +1,8 @@
-"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in metres."""
+"""HouseExpo floor plans: one JSON file a house, its free space as one ring ``verts`` in metres.
+
+The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
+corners cut by a step or two of it. Doors and furniture are not in the format.
+"""
 
 from pathlib import Path
 
@@ -16,11 +20,6 @@ _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return a floor plan.
-
-    The ring may be closed or not, repeat vertices and cross itself. Plans are drawn on a grid of 1 cm, with
-    corners cut by a step or two of it. Doors and furniture are not in the format.
-    """
     file = JsonFile(path)
     document, vertices = file.document, _vertices(file)
     ring = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]

@@ -2,6 +2,10 @@
 
 A YAML with the size of the ``world``, perhaps a picture of it, and groups of ``robot`` and ``obstacle``: so
 many of a shape, at given states [x, y, theta] or distributed.
+
+Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
+``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out and
+counted. The states of robots are a start.
 """
 
 from __future__ import annotations
@@ -32,12 +36,6 @@ _TRUE = ("true", "yes", "on", "1")
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of a world; one that is generated is refused.
-
-    Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
-    ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out
-    and counted. The states of robots are a start.
-    """
     where = one_line(path)
     shapes = Shapes(where, options)
     root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")

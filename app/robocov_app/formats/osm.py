@@ -1,4 +1,10 @@
-"""OpenStreetMap extracts: buildings and water are solid, barriers are walls, the bounds are the boundary."""
+"""OpenStreetMap extracts, in metres east and north of their middle.
+
+Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says that
+it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the option
+``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the ground,
+roofs, and ways whose nodes the extract lacks are left out.
+"""
 
 import re
 from array import array
@@ -50,13 +56,6 @@ class _Thing:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that an extract of OpenStreetMap shows, in metres east and north of its middle.
-
-    Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says
-    that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
-    option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below
-    the ground, roofs, and ways whose nodes the extract lacks are left out.
-    """
     where = one_line(path)
     extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))
     shapes = Shapes(where, options)

@@ -10,6 +10,7 @@ import json
 import re
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ _STRIP = 512  # rows that are converted at a time, which bounds the memory
 # what separates the numbers of a PGM header: a comment runs to the end of its line
 _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
 _DIGITS = re.compile(rb"\d+")
+_NETPBM = re.compile(rb"P[2356][\s#]")
 # first bytes (magic numbers) of formats that Pillow reads, by its names for them
 _PILLOW = {
     "PNG": re.compile(rb"\x89PNG\r\n\x1a\n"),
@@ -61,14 +63,11 @@ class Brightness:
 
 
 def is_picture(head: bytes) -> bool:
-    return any(begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_PILLOW.values()))
+    return any(begin.match(head) for begin in (_NETPBM, *_PILLOW.values()))
 
 
 def read_picture(path: Path, where: str) -> Brightness:
-    """Return the picture at `path`, which messages call `where`.
-
-    Raises MapError when it is none that can be read, broken, cut off, or has over `files.MAX_CELLS` pixels.
-    """
+    """Return the picture at `path`, which messages call `where`; MapError where it is none, broken or too large."""
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
         return _netpbm(data, where)
@@ -81,8 +80,7 @@ def read_picture(path: Path, where: str) -> Brightness:
 
 def _netpbm(data: bytes, where: str) -> Brightness:
     """Return a PGM or PPM; see https://netpbm.sourceforge.net/doc/pgm.html."""
-    numbers: list[int] = []
-    at = 2
+    numbers, at = [], 2
     for name in ("width", "height", "largest value"):
         blank = _BLANK.match(data, at)
         digits = _DIGITS.match(data, blank.end()) if blank else None
@@ -97,7 +95,6 @@ def _netpbm(data: bytes, where: str) -> Brightness:
         raise MapError(f"{where}: largest value: {most}, but a number from 1 to 65535 was wanted")
     colours = 3 if data[1:2] in b"36" else 1
     count = width * height * colours
-    level: Any
     if data[1:2] in b"56":
         raw = np.dtype(np.uint8 if most < 256 else ">u2")
         # one blank ends the header, or a line end of two; what comes after the picture is not looked at
@@ -105,7 +102,7 @@ def _netpbm(data: bytes, where: str) -> Brightness:
         if len(data) - at < count * raw.itemsize:
             have = max(0, len(data) - at) // raw.itemsize
             raise MapError(f"{where}: cut off after {have // colours} of {count // colours} pixels")
-        level = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
+        level: Any = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
     else:
         level = _plain(data[at:], count, where)
     highest = int(level.max())
@@ -126,19 +123,15 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     done = at = 0
     while done < count and at < len(text):
         blank = _BLANK.search(text, at + _PIECE)
-        piece = text[at : blank.start() if blank else len(text)].strip()
+        end = blank.start() if blank else len(text)
+        numbers = files.whole_numbers(text[at:end], " ")
         at = blank.end() if blank else len(text)
-        if not piece:
-            continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)
-            try:
-                numbers = np.fromstring(piece, dtype=np.int64, sep=" ")[: count - done]
-            except (DeprecationWarning, ValueError, OverflowError):
-                raise MapError(f"{where}: pixels that are not whole numbers, of {count}") from None
-        low, high = int(numbers.min()), int(numbers.max())
-        if low < 0 or high > 65535:
-            worst = low if low < 0 else high
+        if numbers is None:
+            raise MapError(f"{where}: pixels that are not whole numbers, of {count}")
+        numbers = numbers[: count - done]
+        strange = numbers[(numbers < 0) | (numbers > 65535)]
+        if len(strange):
+            worst = min(strange) if min(strange) < 0 else max(strange)
             raise MapError(f"{where}: a pixel of {worst}, but a number from 0 to 65535 was wanted")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
@@ -241,14 +234,12 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
     """Return what the picture says of itself: metres a pixel, and its lower left corner."""
-    nothing = (None, (0.0, 0.0))
-    try:
+    with suppress(ValueError, KeyError, TypeError, RecursionError, OverflowError):
         given = json.loads(picture.texts.get(CHUNK, ""))
         cell, (x, y) = float(given["cell_m"]), map(float, given["origin_m"])
-    except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
-        return nothing
-    sane = 1e-6 <= cell <= 1e4 and abs(x) <= FARTHEST and abs(y) <= FARTHEST
-    return (cell, (x, y)) if sane else nothing
+        if 1e-6 <= cell <= 1e4 and abs(x) <= FARTHEST and abs(y) <= FARTHEST:
+            return cell, (x, y)
+    return None, (0.0, 0.0)
 
 
 IMPORTER = Importer(

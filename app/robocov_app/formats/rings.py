@@ -1,4 +1,10 @@
-"""Lists of rings, as triangulation libraries take them: the first is the outline, the others are holes."""
+"""Lists of rings, as triangulation libraries take them: the first is the outline, the others are holes.
+
+It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free space
+and the others are obstacles; or one ring alone; or a list of such lists; or, flat, an object with
+``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and ``dimensions``. There
+are no units: the option ``scale`` is metres a unit, 1 by default.
+"""
 
 import re
 from itertools import pairwise
@@ -16,13 +22,6 @@ _FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the polygons in a file of rings.
-
-    It holds a list of rings, each a list of points [x, y], of which the first is the outline of the free
-    space and the others are obstacles; or one ring alone; or a list of such lists; or, flat, an object with
-    ``vertices`` (x, y, x, y, ...), ``holes`` (the index of the first vertex of each) and ``dimensions``.
-    There are no units: the option ``scale`` is metres a unit, 1 by default.
-    """
     file = JsonFile(path)
     shapes = Shapes(file.where, options)
     scale = 1.0 if options.scale is None else options.scale

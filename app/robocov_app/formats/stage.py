@@ -5,6 +5,10 @@ includes. A model is as large as its ``size``, whatever its bitmap or its blocks
 them is scaled to it.
 
 R. Vaughan, Massively multi-robot simulation in Stage, Swarm Intelligence 2 (2008), 189-208.
+
+Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
+(``position``) are places to start; sensors and the like are left out. The map is the largest model with a
+bitmap or a ``boundary``, if most of the others are in it.
 """
 
 from __future__ import annotations
@@ -94,12 +98,6 @@ class _Room:
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of a world.
-
-    Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
-    (``position``) are places to start; sensors and the like are left out. The map is the largest model with a
-    bitmap or a ``boundary``, if most of the others are in it.
-    """
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)
     world.place(world.root.inside, np.eye(3))

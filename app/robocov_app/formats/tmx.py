@@ -2,12 +2,17 @@
 
 Read here, with limits, and not by pytmx or pytiled-parser: these unpack whatever size a file has, and open
 whatever other file it names.
+
+Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like) or by
+collision objects; of a layer without any such tile all, if the option ``only`` names it, or its name, class
+or a property says so. Objects are solid if they or their layer say so or are asked for, and all of them where
+nothing else is. Hidden layers count: those of walls mostly are hidden. `options`: ``cell`` is the width of a
+tile in metres, or ``scale`` that of a pixel.
 """
 
 import binascii
 import math
 import re
-import warnings
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -68,14 +73,6 @@ class _Layer(NamedTuple):
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that a TMX file of Tiled draws.
-
-    Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like)
-    or by collision objects; of a layer without any such tile all, if the option ``only`` names it, or its
-    name, class or a property says so. Objects are solid if they or their layer say so or are asked for, and
-    all of them where nothing else is. Hidden layers count: those of walls mostly are hidden. `options`:
-    ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel.
-    """
     root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
     return _Map(path, root, Shapes(root.where, options)).read()
 
@@ -293,13 +290,8 @@ def _decoded(part: Element, data: Element, count: int) -> _IDs:
         ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
     elif encoding == "csv":
         more = part.text.count(",") > count  # a comma may end it
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)
-            try:
-                numbers = np.fromstring("" if more else part.text, dtype=np.int64, sep=",")
-            except (DeprecationWarning, ValueError, OverflowError):
-                numbers = np.array([-1])
-        if len(numbers) and not 0 <= numbers.min() <= numbers.max() < 2**32:
+        numbers = files.whole_numbers("" if more else part.text, ",")
+        if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
             part.refuse("what is not whole numbers from 0, but those, with commas, were wanted")
         ids = None if more else numbers.astype(np.uint32)
     elif not encoding:

@@ -1,6 +1,11 @@
 """Well-known text.
 
 The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS.
+
+Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
+Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in it;
+where there are only lines they are walls. The option ``outlines`` says it otherwise; see
+`shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
 """
 
 import re
@@ -205,13 +210,6 @@ _BEGIN = re.compile(
 
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that the geometries of a file stand for.
-
-    Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
-    Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
-    it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-    `shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
-    """
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)

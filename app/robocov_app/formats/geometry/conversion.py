@@ -31,9 +31,16 @@ from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
-from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
-from robocov_app.formats.geometry.polygons import CRUMB, bounded, filled, made_valid, polygons_of, rounded
-from robocov_app.formats.geometry.simplify import sharpened, simplified
+from robocov_app.formats.geometry.polygons import (
+    CRUMB,
+    bounded,
+    filled,
+    made_valid,
+    polygons_of,
+    rounded,
+    sides_of,
+)
+from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
 
 DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
 # coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
@@ -52,6 +59,9 @@ MOST_PRIMITIVES = 5_000
 _Obstacle = TypeVar("_Obstacle", bound=Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
+# squares that are looked at more closely, at each size, and sides that rays cross to tell which are inside
+_SQUARES, _MOST_RAYS = 1024, 5_000_000
+_QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
 # width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost
 _SLIVER = 2.0
 
@@ -512,3 +522,51 @@ def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> Mul
     # of a long strip this is its width
     width = 2.0 * shapely.area(parts) / shapely.length(parts)
     return MultiPolygon(parts[width > max(_SLIVER * tolerance, 1e-3) / 2].tolist())
+
+
+def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+    """Return where the centre of a robot may be, each place that it cannot leave, but for tiny ones."""
+    inner = free.buffer(-radius, quad_segs=4)
+    return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
+
+
+def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[tuple[float, float], float]:
+    """Return the place farthest from the walls, and how far that is, m; or any that is far `enough`.
+
+    Squares that may hold a place better by `tolerance` are cut into four, `_SQUARES` of the most promising:
+    where there are more, as in a long hall, another place may be a bit better.
+    """
+    sides = shapely.linestrings(sides_of(free))
+    walls = STRtree(sides)
+    shapely.prepare(free)
+    low_x, low_y, high_x, high_y = free.bounds
+    width, height = high_x - low_x, high_y - low_y
+    some = np.linspace(low_y, high_y, _SQUARES)
+    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(rays(sides, some), 1)), 16)
+    side = max(min(width, height), max(width, height) / squares)
+    corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
+    centres = np.stack(corners, axis=-1).reshape(-1, 2) + side / 2
+    best, place = -math.inf, centres[0]
+    while len(centres) and best < enough:
+        _, away = walls.query_nearest(shapely.points(centres), return_distance=True, all_matches=False)
+        away = np.where(shapely.contains_xy(free, *centres.T), away, -away)
+        if away.max() > best:
+            best, place = float(away.max()), centres[away.argmax()]
+        hopeful = away + side * math.sqrt(0.5)
+        order = np.argsort(-hopeful, kind="stable")[:squares]
+        better = best + tolerance if enough == math.inf else max(best + tolerance, enough)
+        centres = centres[order[hopeful[order] > better]]
+        side /= 2
+        centres = (centres[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
+    return (float(place[0]), float(place[1])), best
+
+
+def moved_walls(before: MultiPolygon, after: MultiPolygon) -> tuple[float, float]:
+    """Return what area, m², was free and is not, or is and was not; and how far walls moved, m, at most."""
+    distance = 0.0
+    for one, other in ((before, after), (after, before)):
+        points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
+        walls = STRtree(shapely.linestrings(sides_of(other)))
+        _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
+        distance = max(distance, float(away.max()))
+    return float(shapely.symmetric_difference(before, after).area), distance

@@ -100,11 +100,7 @@ def foreign_map(
 
 
 def free_area(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
-    """Return the free cells, (rows, columns), the top row first, as polygons in metres.
-
-    `cell`, m: width and height of one. `origin`, m: lower left corner of all. Raises MapError as
-    `foreign_map`.
-    """
+    """Return free cells, (rows, columns), the top row first, of a size in m, as polygons; MapError where none is."""
     if not free.any():
         raise MapError(f"{where}: no cell is free, but some were wanted")
     outline = _traced(free[::-1], where)

@@ -43,10 +43,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Closed outline: enclosed area, m, valid; names, ids, classes, layers, the most particular first.
-
-    `circle`: the same as an obstacle of a map, where it is a disc.
-    """
+    """A closed outline: its valid area, m; labels, the most particular first; the disc that it is, if any."""
 
     area: MultiPolygon
     labels: tuple[str, ...] = ()
@@ -147,10 +144,7 @@ class Shapes:
         self, rings: Sequence[Array], labels: Sequence[str] = (), *,
         rule: Rule = "holes", at: str = "", thing: str = "outline",
     ) -> bool:  # fmt: skip
-        """Add the area that rings, (k, 2) m, enclose; without one the `thing`, if it has a name, is counted.
-
-        Raises MapError where a ring is out of range.
-        """
+        """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
         rings = self._checked(rings, at)
         area, reason, lost = enclosed(rings, rule, self._crossings)
         for why, count in lost.items():

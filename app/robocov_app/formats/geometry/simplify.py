@@ -23,7 +23,6 @@ from shapely import MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
-from robocov_app.formats.geometry.passages import closed_gaps
 from robocov_app.formats.geometry.raster import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
@@ -47,6 +46,9 @@ _RIGHT, _SQUARE = 1e-5, 0.2
 # in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
 # angle below which two walls count as parallel
 _SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
+_CHUNK = 2048  # sides that are looked at together for gaps, which bounds the memory
+_MOST_GAPS, _MOST_RAYS = 200_000, 300_000_000  # looked at; sides that rays cross to tell what is inside
+_CLEARLY = 1 + 1e-6  # a gap of just a robot's diameter is none
 _LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
@@ -496,3 +498,50 @@ def _sharpened(ring: Array, tolerance: float) -> Array:
         if np.hypot(*(runs[k] - corner[k]).T).max() <= _NEAR * tolerance:
             runs[k] = corner[k : k + 1]
     return np.concatenate(runs)
+
+
+def rays(sides: Array, y: Array) -> int:
+    """Return how many sides horizontal lines at `y` cross, together: the cost of telling what is inside."""
+    bounds = shapely.bounds(sides)
+    low, high = np.sort(bounds[:, 1]), np.sort(bounds[:, 3])
+    return int((np.searchsorted(low, y, side="right") - np.searchsorted(high, y)).sum())
+
+
+def closed_gaps(
+    sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
+) -> tuple[IntArray, Array] | None:
+    """Return the (p, 2) sides and the middles of gaps that are too narrow now; None if they are too many.
+
+    A gap is where two `sides`, (m, 2, 2), of walls as they are now face each other across the `free` space.
+    It was wide enough for a robot of diameter `width` if the walls as they were, `paths`, (m,) linestrings,
+    are further apart there; none has `moved` further than so many metres.
+    """
+    lines = shapely.linestrings(sides)
+    tree = STRtree(lines)
+    pairs = np.empty((0, 2), dtype=np.intp)
+    for begin in range(0, len(lines), _CHUNK):
+        one, other = tree.query(lines[begin : begin + _CHUNK], predicate="dwithin", distance=width)
+        one += begin
+        # neighbours meet in a corner; and two walls that are far closer now were close before
+        apart = (one < other) & (sides[one, 1] != sides[other, 0]).any(axis=1)
+        apart &= (sides[other, 1] != sides[one, 0]).any(axis=1)
+        one, other = one[apart], other[apart]
+        distance = shapely.distance(lines[one], lines[other])
+        narrow = (distance < width) & (distance > width - 2 * moved)
+        pairs = np.concatenate([pairs, np.column_stack([one[narrow], other[narrow]])])
+        if len(pairs) > _MOST_GAPS:
+            return None
+    ends = shapely.get_coordinates(shapely.shortest_line(lines[pairs[:, 0]], lines[pairs[:, 1]]))
+    places = ends.reshape(-1, 2, 2).mean(axis=1)
+    if rays(lines, places[:, 1]) > _MOST_RAYS:
+        return None
+    shapely.prepare(free)
+    across = shapely.contains_xy(free, *places.T)
+    pairs, places = pairs[across], places[across]
+    reach = width / 2 + 2 * moved
+    windows = shapely.box(*(places - reach).T, *(places + reach).T)
+    before = [shapely.intersection(paths[pairs[:, k]], windows) for k in (0, 1)]
+    # where nothing is left of a wall it was further away
+    was = np.nan_to_num(shapely.distance(*before), nan=np.inf)
+    lost = was > width * _CLEARLY
+    return pairs[lost], places[lost]

@@ -1,4 +1,14 @@
-"""SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale)."""
+"""SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale).
+
+Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`; names are
+ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes that are only
+stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn more sharply than
+their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
+
+Without the option ``scale``, metres a user unit of the root, the drawing has its own size: 96 px are an inch,
+mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an attribute
+``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own scale.
+"""
 
 from __future__ import annotations
 
@@ -53,18 +63,6 @@ _EVEN = 1.0 + 1e-6
 
 
 def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that an SVG file draws.
-
-    Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`;
-    names are ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes
-    that are only stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn
-    more sharply than their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
-
-    Without the option ``scale``, metres a user unit of the root, the drawing has its own size: 96 px are an
-    inch, mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an
-    attribute ``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own
-    scale.
-    """
     root = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
     shapes = Shapes(root.where, options)
     drawing = _Drawing(root, shapes)
@@ -133,11 +131,7 @@ def _labels(element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Transform and inherited attributes of an element.
-
-    `matrix`, (3, 3): from its units to metres. `labels`: the innermost first. `width`, `height`: of the
-    viewport.
-    """
+    """Matrix from an element's units to metres, (3, 3); inherited style; labels, the innermost first; viewport."""
 
     matrix: Array
     style: Style

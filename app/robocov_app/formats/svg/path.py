@@ -4,7 +4,7 @@ import cmath
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -172,11 +172,7 @@ def subpaths(
 
 
 class _Pen:
-    """Pen position and the path drawn so far, in places x + i y.
-
-    A curve is kept with the index of the vertex that it ends at: all become points together, which is
-    quicker.
-    """
+    """Pen position and path so far, as x + i y; curves become points at the end, all together, which is quicker."""
 
     def __init__(self) -> None:
         self.draws = 0
@@ -324,30 +320,20 @@ MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000
 
 
 class _Rule(NamedTuple):
-    """A rule of a style sheet, for one selector; the second of its properties are marked as important."""
+    """A rule of a style sheet, for what has all `marks`; the second of its properties are important."""
 
-    tag: str
-    marks: tuple[str, ...]
+    marks: frozenset[str]
     weight: tuple[int, int, int, int]
     properties: tuple[dict[str, str], dict[str, str]]
 
-    def fits(self, element: Element, classes: set[str]) -> bool:
-        return self.tag in ("", "*", element.tag) and all(
-            mark[1:] in classes if mark[0] == "." else element.attributes.get("id") == mark[1:]
-            for mark in self.marks
-        )
 
-
-@dataclass
 class StyleSheet:
     """The rules of the file `where`, of tags, classes and ids; others, as in @supports, are `strange`."""
 
-    where: str
-    strange: int = 0
-    _keyed: dict[str, list[_Rule]] = field(default_factory=dict)
-    _count: int = 0
-    _size: int = 0
-    _work: int = 0
+    def __init__(self, where: str) -> None:
+        self.where, self.strange = where, 0
+        self._keyed: dict[str, list[_Rule]] = {}
+        self._count = self._size = self._work = 0
 
     def add(self, text: str) -> None:
         """Add the rules of a text. Raises MapError when there are too many."""
@@ -371,13 +357,13 @@ class StyleSheet:
         """Return an element's own properties; MapError when there are too many rules for too many."""
         attributes = element.attributes
         found = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
-        classes = set(attributes.get("class", "").split())
-        keys = ["", element.tag, *(f".{name}" for name in classes), f"#{attributes.get('id', '')}"]
-        looked_at = [rule for key in keys for rule in self._keyed.get(key, ())]
+        marks = {element.tag, f"#{attributes.get('id', '')}"}
+        marks |= {f".{name}" for name in attributes.get("class", "").split()}
+        looked_at = [rule for key in ("", *marks) for rule in self._keyed.get(key, ())]
         self._work += len(looked_at)
         if self._work > MOST_WORK:
             raise MapError(f"{self.where}: too many rules for too many elements, but fewer were wanted")
-        rules = [rule for rule in looked_at if rule.fits(element, classes)]
+        rules = [rule for rule in looked_at if rule.marks <= marks]
         chosen = [rule.properties for rule in sorted(rules, key=lambda rule: rule.weight)]
         chosen.append(_by_importance(declarations(attributes.get("style", ""))))
         for k in (0, 1):
@@ -405,12 +391,13 @@ class StyleSheet:
         if match is None or not selector or self._count >= MOST_RULES:
             self.strange += 1
             return
-        tag, marks = match[1] or "", tuple(re.findall(r"[.#][\w-]+", match[2]))
+        tag = [match[1]] if match[1] not in (None, "*") else []
+        marks = re.findall(r"[.#][\w-]+", match[2])
         ids = sum(mark[0] == "#" for mark in marks)
         self._count += 1
-        rule = _Rule(tag, marks, (ids, len(marks) - ids, int(tag not in ("", "*")), self._count), properties)
-        key = marks[-1] if marks else tag.replace("*", "")
-        self._keyed.setdefault(key, []).append(rule)
+        weight = ids, len(marks) - ids, len(tag), self._count
+        key = [*tag, *marks][-1] if tag or marks else ""
+        self._keyed.setdefault(key, []).append(_Rule(frozenset([*tag, *marks]), weight, properties))
 
 
 def declarations(text: str) -> dict[str, str]:
@@ -445,7 +432,6 @@ def is_hidden(own: Style) -> bool:
 
 
 def _is_zero(number: str) -> bool:
-    try:
+    with suppress(ValueError):
         return float(number.strip().rstrip("%")) == 0.0
-    except ValueError:
-        return False
+    return False
