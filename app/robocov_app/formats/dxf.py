@@ -50,7 +50,7 @@ _CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, a
 
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
-    """Return points of a polyline, (k, 2); the bulge of the edge after each is tan(angle / 4), positive to the left."""
+    """Return points of a polyline, (k, 2); the bulge of an edge after one is tan(angle / 4), to the left."""
     arcs = extra("ezdxf.math", "dxf")
     drawn = [points[:1]]
     left = float(MOST_POINTS)

@@ -1,10 +1,10 @@
 """Coordinates on the globe, as metres about a place: what a robot's map is in."""
 
-import itertools
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -59,26 +59,19 @@ def in_metres(
 
 
 def _points(figures: Sequence[Figure]) -> Array:
-    rings = [ring for figure in figures for ring in figure.rings]
-    return np.concatenate(rings) if rings else np.empty((0, 2))
+    return np.concatenate([ring for figure in figures for ring in figure.rings])
 
 
 def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
-    moved, begin = [], 0
-    for figure in figures:
-        cuts = begin + np.cumsum([0, *map(len, figure.rings)])
-        rings = tuple(points[a:b] for a, b in itertools.pairwise(cuts.tolist()))
-        moved.append(replace(figure, rings=rings))
-        begin = cuts[-1]
-    return moved
+    ends = np.cumsum([len(ring) for figure in figures for ring in figure.rings])
+    rings = iter(np.split(points, ends[:-1]))
+    return [replace(figure, rings=tuple(islice(rings, len(figure.rings)))) for figure in figures]
 
 
 def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
     """Return whether coordinates are degrees of a place, not metres of a plan: a plan is metres wide."""
-    if not possible or not figures:
-        return False
     points = _points(figures)
-    if not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
+    if not possible or not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
         return False
     width, height = np.ptp(_unwrapped(points, points[0, 0]), axis=0)
     shrunk = math.cos(math.radians(float(np.abs(points[:, 1]).max())))

@@ -49,11 +49,6 @@ class _Thing:
         found += [key for key in ("barrier", "building", "natural", "waterway") if key in self.tags]
         return tuple(dict.fromkeys(one_line(label) for label in found if label != "yes"))
 
-    @property
-    def covered(self) -> bool:
-        under = self.tags.get("location") == "underground" or self.tags.get("layer", "0").startswith("-")
-        return under or self.tags.get("tunnel", "no") != "no"
-
 
 def _read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
@@ -110,7 +105,8 @@ class _Extract:
             post = thing.kind == "node" and bool(_POSTS & {tags.get("barrier"), tags.get("natural")})
             if not (built or wall or post or (wet and water)):
                 continue
-            if thing.covered:
+            under = tags.get("location") == "underground" or tags.get("layer", "0").startswith("-")
+            if under or tags.get("tunnel", "no") != "no":
                 shapes.leave_out("thing", "below the ground")
             elif thing.kind == "node":
                 if post:

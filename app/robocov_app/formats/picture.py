@@ -67,7 +67,7 @@ def is_picture(head: bytes) -> bool:
 
 
 def read_picture(path: Path, where: str) -> Brightness:
-    """Return the picture at `path`, which messages call `where`; MapError where it is none, broken or too large."""
+    """Return the picture at `path`, which messages call `where`; MapError where it is broken or too large."""
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
         return _netpbm(data, where)

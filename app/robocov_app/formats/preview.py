@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.patheffects import withStroke
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -81,7 +81,11 @@ def plot_import(
         )
         first.add_collection(edges, autolim=False)
         _draw(first, compared.lost, theme.trajectory, theme.trajectory, _MARK)
-        style = {"color": tone(theme.ink), "zorder": 5, "path_effects": _halo(theme, 3.0)}
+        style = {
+            "color": tone(theme.ink),
+            "zorder": 5,
+            "path_effects": [withStroke(linewidth=3.0, foreground=tone(theme.background))],
+        }
         for x, y in report.others:
             first.plot([x], [y], marker="+", markersize=8.0, **style)
             words = f"{x:.10g} {y:.10g}"
@@ -133,10 +137,6 @@ def _style(fill: Colour, edge: Colour, opacity: float) -> dict[str, Any]:
     return {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
 
 
-def _halo(theme: Theme, width: float) -> list[AbstractPathEffect]:
-    return [withStroke(linewidth=width, foreground=tone(theme.background))]
-
-
 def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
     for part in shapely.get_parts(area):
         if isinstance(part, Polygon):
@@ -150,7 +150,11 @@ def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
     if gap is None:
         return
     colour, points = tone(theme.final), np.array(gap.between)
-    style: dict[str, Any] = {"zorder": 5, "clip_on": False, "path_effects": _halo(theme, 4.2)}
+    style: dict[str, Any] = {
+        "zorder": 5,
+        "clip_on": False,
+        "path_effects": [withStroke(linewidth=4.2, foreground=tone(theme.background))],
+    }
     axes.plot(*points.T, color=colour, linewidth=2.0, **style)
     ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
     if np.hypot(*(ends[1] - ends[0])) < _RING:

@@ -111,8 +111,9 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             shapes.outlines.append(Outline(dark, room.labels))
     free = None if main is None else main.free
     if free is None and shapes.outlines:
-        free, words = surrounding(shapes)
-        shapes.notes.append(words)
+        found = surrounding(shapes)
+        free = found.area
+        shapes.notes.append(f"the boundary is {found.words}")
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
     name = world.root.text("name") or path.stem
     return foreign_map(shapes, name, "A world of Stage, imported.", solid=True, world=free)

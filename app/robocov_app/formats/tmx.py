@@ -72,22 +72,19 @@ class _Layer(NamedTuple):
     wall: bool
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
-    return _Map(path, root, Shapes(root.where, options)).read()
-
-
 class _Map:
     """Reads a map: its tilesets and layers."""
 
-    def __init__(self, path: Path, root: Element, shapes: Shapes) -> None:
-        self.path, self.root, self.shapes, self.options = path, root, shapes, shapes.options
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        self.path, self.options = path, options
+        self.root = root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
+        self.shapes = shapes = Shapes(root.where, options)
         self.tiles_read = self.parts = 0
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
             root.refuse(f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
         self.tile = np.array([_whole(root, name, 1) for name in ("tilewidth", "tileheight")], float)
-        cell, scale = self.options.cell, self.options.scale
+        cell, scale = options.cell, options.scale
         if cell is not None and scale is not None:
             raise ParameterError("--cell, --scale: both say how large a tile is, but one of them was wanted")
         if cell is None and scale is None:
@@ -369,6 +366,7 @@ def _whole(element: Element, name: str, least: int, default: str = "") -> int:
 
 IMPORTER = Importer(
     "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",),
-    lambda path, head: _ROOT.search(head) is not None and b"tilewidth" in head, _read,
+    lambda path, head: _ROOT.search(head) is not None and b"tilewidth" in head,
+    lambda path, options: _Map(path, options).read(),
     options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
 )  # fmt: skip

@@ -28,10 +28,7 @@ _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of SVG, or of a format without namespaces, with its file and line; others are left out.
-
-    Names are without namespaces; `pieces` are its text, if that means something.
-    """
+    """An element of SVG or of no namespace, named without; `pieces` of text, where that means something."""
 
     tag: str
     attributes: dict[str, str]

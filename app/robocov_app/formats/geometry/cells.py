@@ -83,7 +83,7 @@ class Grid:
 
 
 def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
-    """Return a grid that meets the cells of which the map was made, if any; ParameterError at more than `most`."""
+    """Return a grid over the boundary, which meets the cells that it was made of; at `most` so many cells."""
     cell = CELL if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
     # to a thousandth of a cell, so that a wall on the last line of cells needs no more of them

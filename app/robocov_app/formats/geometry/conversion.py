@@ -10,21 +10,8 @@ import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import (
-    START_GAP,
-    CircleObstacle,
-    DiscStart,
-    Environment,
-    Gap,
-    Obstacle,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    StartSpec,
-    UniformStart,
-    WallObstacle,
-    narrowest_gap,
-)
+from robocov import environment as env
+from robocov.environment import Environment, Ring
 from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
@@ -56,7 +43,7 @@ _SOON, _MOST_VERTICES = 10_000, 20_000
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
 # circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds
 MOST_PRIMITIVES = 5_000
-_Obstacle = TypeVar("_Obstacle", bound=Obstacle)
+_Obstacle = TypeVar("_Obstacle", bound=env.Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
 # squares that are looked at more closely, at each size, and sides that rays cross to tell which are inside
@@ -105,10 +92,7 @@ class Shaping(Options):
 
 
 def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
-    """Return the environment that `foreign` stands for, and what was done to it.
-
-    Raises MapError when nothing is free, no place is wide enough for a robot, or the map breaks another rule.
-    """
+    """Return the environment that `foreign` stands for, and what was done; MapError where it is no map."""
     return _Shaper(foreign, shaping, where).shaped()
 
 
@@ -122,7 +106,7 @@ class _Shaper:
         self.others: list[tuple[float, float]] = []
         self.specks = foreign.specks if shaping.specks is None else shaping.specks
         # how far from walls a robot starts, m: the rules of maps want room for the usual one
-        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + START_GAP)
+        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + env.START_GAP)
         grid = _GRID if foreign.cell is None else min(_GRID, foreign.cell / 100)
         self.digits = -math.floor(math.log10(grid) + 1e-9)
 
@@ -329,13 +313,13 @@ class _Shaper:
                 widest = max(widest, roomiest(part, self.clearance / 50, self.clearance)[1])
             if widest >= self.clearance:
                 return
-        wanted, most = self.clearance / (1 + START_GAP), widest / (1 + START_GAP)
+        wanted, most = self.clearance / (1 + env.START_GAP), widest / (1 + env.START_GAP)
         raise MapError(
             f"{self.where}: no place is wide enough for a robot of radius {wanted:g} m "
             f"(the widest is for one of {most:.3g} m): is the scale right?"
         )
 
-    def _obstacles(self, solid: list[Polygon]) -> list[PolygonObstacle]:
+    def _obstacles(self, solid: list[Polygon]) -> list[env.PolygonObstacle]:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
         kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= SMALLEST]
         if len(kept) < len(solid):
@@ -343,7 +327,8 @@ class _Shaper:
             self.dropped.append(f"{what} thinner than {SMALLEST * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
         return [
-            PolygonObstacle(self._ring(part.exterior), (*map(self._ring, part.interiors),)) for part in kept
+            env.PolygonObstacle(self._ring(part.exterior), (*map(self._ring, part.interiors),))
+            for part in kept
         ]
 
     def _ring(self, ring: BaseGeometry) -> Ring:
@@ -354,17 +339,17 @@ class _Shaper:
         first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
         return tuple((float(x), float(y)) for x, y in np.roll(points, -first, axis=0))
 
-    def _starts(self, free: MultiPolygon) -> dict[str, StartSpec]:
+    def _starts(self, free: MultiPolygon) -> dict[str, env.StartSpec]:
         """Return the starts: a disc at the roomiest place, everywhere, and where the file places robots."""
         clearance, robots, part = self.clearance, self.foreign.robots, free.geoms[0]
         # what is finer than this does not move a start by much
         (x, y), room = roomiest(part, max(0.01, math.sqrt(part.area) / 500))
         # the disc holds centres: one robot's radius stays between it and the walls
         radius = min(room - clearance, 2.0)
-        starts: dict[str, StartSpec] = {"uniform": UniformStart()}
+        starts: dict[str, env.StartSpec] = {"uniform": env.UniformStart()}
         if radius >= 0.02:
-            disc = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
-            both: dict[str, StartSpec] = {"room": disc, **starts}
+            disc = env.DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+            both: dict[str, env.StartSpec] = {"room": disc, **starts}
             starts = both if self.shaping.default_start == "room" else dict(reversed(both.items()))
         if robots:
             given = np.array(list(dict.fromkeys(robots))[:_MOST_ROBOTS])
@@ -373,7 +358,7 @@ class _Shaper:
             for k in np.flatnonzero(fits).tolist():
                 fits[k] = (np.hypot(*(given[:k][fits[:k]] - given[k]).T) >= 2 * clearance).all()
             if fits.any():
-                starts["robots"] = PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
+                starts["robots"] = env.PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
             rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
             many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
             self.notes.append(f'start "robots": {many} of robots in the file{rest}')
@@ -460,21 +445,21 @@ def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obst
     def ring(points: Ring) -> Ring:
         return tuple((number(x), number(y)) for x, y in points)
 
-    if isinstance(obstacle, CircleObstacle):
+    if isinstance(obstacle, env.CircleObstacle):
         return replace(obstacle, center=ring((obstacle.center,))[0], radius=number(obstacle.radius))
-    if isinstance(obstacle, WallObstacle):
+    if isinstance(obstacle, env.WallObstacle):
         return replace(obstacle, points=ring(obstacle.points), width=number(obstacle.width))
-    assert isinstance(obstacle, PolygonObstacle)
+    assert isinstance(obstacle, env.PolygonObstacle)
     return replace(obstacle, vertices=ring(obstacle.vertices), holes=tuple(map(ring, obstacle.holes)))
 
 
 def _points(primitive: Primitive) -> np.ndarray:
-    return np.array([primitive.center] if isinstance(primitive, CircleObstacle) else primitive.points)
+    return np.array([primitive.center] if isinstance(primitive, env.CircleObstacle) else primitive.points)
 
 
 def _fits(primitive: Primitive) -> bool:
     points = _points(primitive)
-    if isinstance(primitive, CircleObstacle):
+    if isinstance(primitive, env.CircleObstacle):
         sizes = [primitive.radius]
     else:
         sizes = [primitive.width, np.ptp(points, axis=0).max()]
@@ -493,7 +478,7 @@ class Comparison:
     lost: BaseGeometry
     opened: BaseGeometry
     region: BaseGeometry
-    gap: Gap | None
+    gap: env.Gap | None
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -511,7 +496,7 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
         lost=_changed(before, after, report.tolerance),
         opened=_changed(after, before, report.tolerance),
         region=shapely.GeometryCollection(everything).convex_hull,
-        gap=narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
+        gap=env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
     )
 
 

@@ -40,10 +40,7 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
 def arcs(
     centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MOST_POINTS
 ) -> tuple[Array, IntArray]:
-    """Return points and counts as `beziers` for n elliptic arcs: centre + u cos(angle) + v sin(angle).
-
-    `begin`, `sweep`, (n,) rad: first angle, and how far it goes on, either way.
-    """
+    """Return points and counts as `beziers` for arcs centre + u cos(a) + v sin(a), a from `begin` on, rad."""
     # the longer half axis: the greater singular value of [u v]
     square, area = (u**2 + v**2).sum(axis=1), u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     radius = np.sqrt((square + np.sqrt(np.maximum(square**2 - 4.0 * area**2, 0.0))) / 2.0)
@@ -63,10 +60,7 @@ def arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance
 
 
 def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
-    """Return points of any smooth curve, (k, 2): steps are halved until their middles are near their chords.
-
-    `curve` takes parameters to points; it is smooth between one of the growing `breaks` and the next.
-    """
+    """Return points of a curve, smooth between growing `breaks`: steps are halved until they are near."""
     part = np.arange(_FIRST) / _FIRST
     t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])
     points = curve(t)

@@ -10,7 +10,7 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
 from robocov.environment import GRID
 from robocov.errors import MapError
 
@@ -40,27 +40,23 @@ class Crossings:
         """Count how often edges cross, not how they meet; MapError at more than `MAX_CROSSINGS`."""
         edges = shapely.linestrings(edges_of(lines))
         n = len(edges)
+        estimate = 0.0
         if n <= _FEW:
             one, other = np.triu_indices(n, 1)
-            self._add(float(shapely.crosses(edges[one], edges[other]).sum()))
-            return
-        tree = shapely.STRtree(edges)
-        order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
-        crossings = work = seen = 0
-        estimate = 0.0
-        for begin in range(0, len(order), _TOGETHER):
-            some = order[begin : begin + _TOGETHER]
-            one, other = tree.query(edges[some])
-            work += len(one)
-            seen += len(some)
-            crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
-            estimate = crossings * n / seen / 2  # each is seen from both of its edges
-            if work > _WORK or (crossings > _CERTAIN and self.count + estimate > MAX_CROSSINGS):
-                break
-        self._add(estimate)
-
-    def _add(self, count: float) -> None:
-        self.count += count
+            estimate = float(shapely.crosses(edges[one], edges[other]).sum())
+        else:
+            tree = shapely.STRtree(edges)
+            order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
+            crossings = work = 0
+            for begin in range(0, len(order), _TOGETHER):
+                some = order[begin : begin + _TOGETHER]
+                one, other = tree.query(edges[some])
+                work += len(one)
+                crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
+                estimate = crossings * n / (begin + len(some)) / 2  # each is seen from both of its edges
+                if work > _WORK or (crossings > _CERTAIN and self.count + estimate > MAX_CROSSINGS):
+                    break
+        self.count += estimate
         if self.count > MAX_CROSSINGS:
             raise MapError(
                 f"{self.where}: its lines cross each other some {self.count:.1g} times, but at most "
@@ -145,17 +141,16 @@ def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     edges = edges_of(lines)
     tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
     most = max(_RAYS // len(edges), 1)
-    parts = [_windings(inside[k : k + most], edges, tree) for k in range(0, len(inside), most)]
-    winding, crossings = (np.concatenate(part) for part in zip(*parts, strict=True))
-    chosen = crossings % 2 == 1 if rule == "evenodd" else winding != 0
+    chosen = [_is_filled(inside[k : k + most], edges, tree, rule) for k in range(0, len(inside), most)]
+    faces = faces[np.concatenate(chosen)]
     try:
-        return polygons_of(shapely.coverage_union_all(faces[chosen]))
+        return polygons_of(shapely.coverage_union_all(faces))
     except shapely.GEOSException:  # faces so thin that rounding has folded them over others
-        return polygons_of(shapely.union_all(faces[chosen], grid_size=GRID))
+        return polygons_of(shapely.union_all(faces, grid_size=GRID))
 
 
-def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array, Array]:
-    """Return how often edges wind around (m, 2) points, and how many a ray to the right crosses."""
+def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
+    """Return which (m, 2) points edges wind around, or, by evenodd, cross a ray to the right oddly often."""
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     which, near = tree.query(shapely.linestrings(np.stack([points, far], axis=1)))
     p, a, b = points[which], edges[near, 0], edges[near, 1]
@@ -163,8 +158,9 @@ def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array
     down = (b[:, 1] <= p[:, 1]) & (p[:, 1] < a[:, 1])
     left = (b[:, 0] - a[:, 0]) * (p[:, 1] - a[:, 1]) - (p[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     sign = np.where(up & (left > 0), 1, np.where(down & (left < 0), -1, 0))
-    winding, crossings = (np.bincount(which, turn, len(points)) for turn in (sign, np.abs(sign)))
-    return winding.astype(float), crossings.astype(float)
+    if rule == "evenodd":
+        return np.bincount(which, np.abs(sign), len(points)) % 2 == 1
+    return np.bincount(which, sign, len(points)) != 0
 
 
 def made_valid(area: BaseGeometry) -> BaseGeometry:

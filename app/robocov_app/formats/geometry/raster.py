@@ -6,6 +6,7 @@ the outline joins them by a neck: touching in a point is neither open nor closed
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -60,8 +61,11 @@ def foreign_map(
     for value in corners.ravel().tolist():
         require_coordinate(value, f"{where}: a corner of the grid")
     number = [int(np.count_nonzero(cells == kind)) for kind in (FREE, BLOCKED, UNKNOWN)]
-    told = [*notes, _counts(number, rows, columns, cell, called, unknown)]
-    dropped: list[str] = []
+    share = [_share(each, cells.size) for each in number]
+    told = f"{columns} x {rows} cells of {cell:.6g} m: {share[FREE]} free, {share[BLOCKED]} blocked"
+    if number[UNKNOWN]:
+        taken = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
+        told += f", {share[UNKNOWN]} {called}, {taken}"
     upward = cells[::-1]
     free = upward == FREE
     if unknown == "free":
@@ -69,43 +73,39 @@ def foreign_map(
     if not free.any():
         hint = f" (--unknown free takes {called} cells as free)" if number[UNKNOWN] else ""
         raise MapError(f"{where}: no cell is free, but some were wanted{hint}")
-    boundary: Polygon | None = None
+    boundary, dropped = None, []
     if unknown == "cut" and number[UNKNOWN]:
-        known = upward != UNKNOWN
-        island, count = ndimage.label(known, structure=_TOUCHING)
+        island, count = ndimage.label(upward != UNKNOWN, structure=_TOUCHING)
         area = np.bincount(island[free], minlength=count + 1)
         main = island == int(area.argmax())
-        lost = int(area.sum() - area.max())
-        if lost:
+        if lost := int(area.sum() - area.max()):
             what = square_metres(lost * cell * cell, 3)
             dropped.append(f"{what} of free space on other islands of known cells")
         free &= main
         # around the known cells and a rim, without holes
         wide = ndimage.binary_dilation(np.pad(main, RIM), structure=_TOUCHING, iterations=RIM)
-        around = Polygon(_traced(wide, where).geoms[0].exterior)
-        boundary = shapely.transform(around, lambda points: placed(points - RIM))
-    area = shapely.transform(_traced(free, where), placed)
+        around = _traced(wide, where, lambda points: placed(points - RIM))
+        boundary = Polygon(around.geoms[0].exterior)
+    outline = _traced(free, where, placed)
     return ForeignMap(
         name=name,
         description=description,
-        free=area,
+        free=outline,
         boundary=boundary,
-        vertices_read=vertices_of(area),
+        vertices_read=vertices_of(outline),
         cell=cell,
         specks=noise * cell * cell,
         repaired=repaired,
         dropped=tuple(dropped),
-        notes=tuple(told),
+        notes=(*notes, told),
     )
 
 
 def free_area(free: BoolArray, cell: Point, origin: Point, where: str) -> MultiPolygon:
-    """Return free cells, (rows, columns), the top row first, of a size in m, as polygons; MapError where none is."""
+    """Return free cells, (rows, columns), the top row first, as polygons, m; MapError where none is."""
     if not free.any():
         raise MapError(f"{where}: no cell is free, but some were wanted")
-    outline = _traced(free[::-1], where)
-    area: MultiPolygon = shapely.transform(outline, lambda points: _placed(points, cell, origin))
-    return area
+    return _traced(free[::-1], where, lambda points: _placed(points, cell, origin))
 
 
 def vertices_of(area: MultiPolygon) -> int:
@@ -120,23 +120,13 @@ def _placed(points: Array, cell: float | Point, origin: Point, yaw: float = 0.0)
     return np.column_stack([x + origin[0], y + origin[1]])
 
 
-def _traced(cells: BoolArray, where: str) -> MultiPolygon:
-    """Return the outline of the cells; only the part of the grid that they fill is looked at."""
+def _traced(cells: BoolArray, where: str, placed: Callable[[Array], Array]) -> MultiPolygon:
+    """Return the outline of the cells, placed; only the part of the grid that they fill is looked at."""
     row, column = np.flatnonzero(cells.any(axis=1)), np.flatnonzero(cells.any(axis=0))
     corner = np.array([column[0], row[0]], float)
     part = traced(cells[row[0] : row[-1] + 1, column[0] : column[-1] + 1], where)
-    outline: MultiPolygon = shapely.transform(part, lambda points: points + corner)
+    outline: MultiPolygon = shapely.transform(part, lambda points: placed(points + corner))
     return outline
-
-
-def _counts(number: list[int], rows: int, columns: int, cell: float, called: str, unknown: str) -> str:
-    total = rows * columns
-    words = f"{columns} x {rows} cells of {cell:.6g} m: {_share(number[FREE], total)} free"
-    words += f", {_share(number[BLOCKED], total)} blocked"
-    if number[UNKNOWN]:
-        taken = {"obstacle": "taken as obstacles", "free": "taken as free", "cut": "cut away"}[unknown]
-        words += f", {_share(number[UNKNOWN], total)} {called}, {taken}"
-    return words
 
 
 def _share(number: int, total: int) -> str:

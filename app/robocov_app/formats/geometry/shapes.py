@@ -350,7 +350,7 @@ def foreign_map(
         others = boundary is not None and len(shapes.outlines) > len(boundary.outlines)
         solid = not shapes.outlines or others
     if solid:
-        boundary = boundary or _walled(shapes) or _rectangle(shapes)
+        boundary = boundary or surrounding(shapes)
         area = boundary.area
     else:
         area = _together([o.area for o in shapes.outlines if not boundary or o not in boundary.outlines])
@@ -410,12 +410,6 @@ def foreign_map(
     )
 
 
-def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
-    """Return what the shapes enclose as walls, else a rectangle around them, m; and that in words."""
-    found = _walled(shapes) or _rectangle(shapes)
-    return found.area, f"the boundary is {found.words}"
-
-
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
     x, y, right, top = bounds
     if max(right - x, top - y) > most:
@@ -461,20 +455,18 @@ def _filled(outline: Outline) -> float:
     return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
 
 
-def _walled(shapes: Shapes) -> _Enclosure | None:
-    solid = _together([*shapes.areas, *(line.solid for line in shapes.lines)])
+def surrounding(shapes: Shapes) -> _Enclosure:
+    """Return what the shapes enclose as walls, else a rectangle around them."""
+    solids = [*shapes.areas, *(line.solid for line in shapes.lines)]
+    solid = _together(solids)
     fills = [Polygon(part.exterior) for part in solid.geoms]
-    if not fills:  # what there is is thinner than the grid
-        return None
-    k = int(np.argmax([fill.area for fill in fills]))
-    if solid.geoms[k].area > (1.0 - _MOST) * fills[k].area or not _holds(fills[k], list(solid.geoms)):
-        return None
-    return _Enclosure(MultiPolygon([fills[k]]), f"the outer edge of the walls, around {fills[k].area:.4g} m²")
-
-
-def _rectangle(shapes: Shapes) -> _Enclosure:
+    if fills:  # else what there is is thinner than the grid
+        k = int(np.argmax([fill.area for fill in fills]))
+        fill, area = fills[k], fills[k].area
+        if solid.geoms[k].area <= (1.0 - _MOST) * area and _holds(fill, list(solid.geoms)):
+            return _Enclosure(MultiPolygon([fill]), f"the outer edge of the walls, around {area:.4g} m²")
     around = AROUND if shapes.options.around is None else shapes.options.around
-    x, y, right, top = shapely.total_bounds([*shapes.areas, *(line.solid for line in shapes.lines)])
+    x, y, right, top = shapely.total_bounds(solids)
     box = shapely.box(x - around, y - around, right + around, top + around)
     words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
     return _Enclosure(MultiPolygon([box]), words)

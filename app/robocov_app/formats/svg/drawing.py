@@ -36,16 +36,7 @@ from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.svg import path as paths
-from robocov_app.formats.svg.path import (
-    Style,
-    StyleSheet,
-    affine,
-    composed,
-    inherited,
-    length,
-    numbers,
-    stretch,
-)
+from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
 from robocov_app.render.theme import DARK, LIGHT, Theme
 
@@ -91,7 +82,8 @@ def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, flo
     """Return the matrix from the root's units to metres, and the size of its viewport in these units."""
     box = _view_box(given)
     whole = {"width": box[2] if box else 300.0, "height": box[3] if box else 150.0}
-    width, height = (_extent(given.get(name, "100%").strip(), size) for name, size in whole.items())
+    sizes = {name: given.get(name, "100%").strip() for name in whole}
+    width, height = (length("100%" if sizes[k] == "auto" else sizes[k], whole[k]) for k in whole)
     box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"{width:g} x {height:g} px, but a size was wanted")
@@ -104,10 +96,6 @@ def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, flo
     if len(origin) != 2:
         raise ValueError(f"data-origin {given['data-origin'][:30]!r}, but two numbers were wanted")
     return composed(affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
-
-
-def _extent(text: str, whole: float) -> float:
-    return whole if text == "auto" else length(text, whole)
 
 
 def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None:
@@ -131,10 +119,10 @@ def _labels(element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Matrix from an element's units to metres, (3, 3); inherited style; labels, the innermost first; viewport."""
+    """Matrix from an element's units to metres, (3, 3); style; labels, the innermost first; viewport."""
 
     matrix: Array
-    style: Style
+    style: paths.Style
     labels: tuple[str, ...]
     width: float
     height: float
@@ -144,6 +132,9 @@ class _Place:
     def diagonal(self) -> float:
         """Reference length of a percentage in no direction (SVG 2, section 8.9)."""
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
+
+    def radius(self, element: Element) -> float:
+        return length(element.attributes.get("r", "0"), self.diagonal)
 
     def lengths(self, element: Element, *names: str) -> list[float]:
         """Return lengths along x or y; what is missing is 0."""
@@ -160,7 +151,7 @@ class _Drawing:
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
         self.root, self.shapes = root, shapes
-        self.sheet = StyleSheet(root.where)
+        self.sheet = paths.StyleSheet(root.where)
         self.named: dict[str, Element] = {}
         self.draws = paths.MOST_DRAWS
         self.dashed = self.clipped = 0
@@ -172,7 +163,7 @@ class _Drawing:
 
     def draw(self, matrix: Array, width: float, height: float) -> None:
         self._require_few()
-        style = inherited(paths.INHERITED, self.sheet.of(self.root))
+        style = paths.inherited(paths.INHERITED, self.sheet.of(self.root))
         for child in self.root.children:
             self._draw(child, _Place(matrix, style, _labels(self.root), width, height))
 
@@ -235,7 +226,7 @@ class _Drawing:
             place = replace(
                 outer,
                 matrix=composed(outer.matrix, paths.transform(own.get("transform", ""))),
-                style=inherited(outer.style, own),
+                style=paths.inherited(outer.style, own),
                 labels=_labels(element, outer=outer.labels),
                 depth=outer.depth + 1,
             )
@@ -260,7 +251,7 @@ class _Drawing:
                 return [], place
             if target.tag not in ("symbol", "svg"):
                 return [target], place
-            style = inherited(place.style, self.sheet.of(target))
+            style = paths.inherited(place.style, self.sheet.of(target))
             place = replace(place, style=style, labels=_labels(target, inner=place.labels))
             size = {name: text for name, text in given.items() if name in ("width", "height")}
             element, given = target, target.attributes | size
@@ -287,7 +278,7 @@ class _Drawing:
         least, most = stretch(place.matrix)
         if filled and element.tag == "circle" and most - least <= 1e-9 * most:
             (centre,) = moved(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
-            radius = _radius(element, place) * most
+            radius = place.radius(element) * most
             if radius > 0.0:
                 self.shapes.add_circle(centre, radius, place.labels, at=at)
                 return
@@ -347,7 +338,7 @@ class _Drawing:
             case "rect":
                 return [(ring, True) for ring in _rectangle(element, place, tolerance)]
             case "circle":
-                radii = [_radius(element, place)] * 2
+                radii = [place.radius(element)] * 2
             case _:
                 radii = place.lengths(element, "rx", "ry")
                 radii = [radii["rx" not in given], radii["ry" in given]]
@@ -355,10 +346,6 @@ class _Drawing:
             return []
         centre, (u, v) = np.array(place.lengths(element, "cx", "cy")), np.diag(radii)
         return [(arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
-
-
-def _radius(element: Element, place: _Place) -> float:
-    return length(element.attributes.get("r", "0"), place.diagonal)
 
 
 def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]:

@@ -12,6 +12,7 @@ import numpy as np
 from robocov.arrays import Array, ranges
 from robocov.errors import MapError
 from robocov_app.formats.geometry.curves import arcs, beziers
+from robocov_app.formats.geometry.frames import frame
 from robocov_app.formats.xml_tree import Element
 
 # nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
@@ -94,11 +95,6 @@ def transform(text: str) -> Array:
     return matrix
 
 
-def _rotation(angle: float, x: float = 0.0, y: float = 0.0) -> Array:
-    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    return affine(e=x, f=y) @ affine(cos, sin, -sin, cos) @ affine(e=-x, f=-y)
-
-
 _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
     # how many numbers each takes, and its matrix
     "matrix": ((6,), affine),
@@ -108,7 +104,7 @@ _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
     "scale": ((1, 2), lambda x, y=None: affine(x, d=x if y is None else y)),
     "scalex": ((1,), lambda x: affine(a=x)),
     "scaley": ((1,), lambda y: affine(d=y)),
-    "rotate": ((1, 3), _rotation),
+    "rotate": ((1, 3), lambda turn, x=0.0, y=0.0: frame(x, y, math.radians(turn)) @ affine(e=-x, f=-y)),
     "skewx": ((1,), lambda angle: affine(c=math.tan(math.radians(angle)))),
     "skewy": ((1,), lambda angle: affine(b=math.tan(math.radians(angle)))),
 }
@@ -172,7 +168,7 @@ def subpaths(
 
 
 class _Pen:
-    """Pen position and path so far, as x + i y; curves become points at the end, all together, which is quicker."""
+    """Pen position and path so far, as x + i y; curves become points all together at the end, for speed."""
 
     def __init__(self) -> None:
         self.draws = 0
