@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import shapely
 from shapely import MultiPolygon
-from shapely.geometry.base import BaseGeometry
+from shapely.geometry import mapping
 
 from robocov.arrays import Array
 from robocov.environment import Environment
@@ -27,7 +27,7 @@ from robocov.files.atomic import written
 from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
 from robocov_app.formats.files import JsonFile, begins_with, is_number
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid, rings
+from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
@@ -168,37 +168,45 @@ _FINER = 6  # so many more decimals have degrees: one is about a hundred kilomet
 
 
 def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    origin = options.origin
+    origin, boundary = options.origin, environment.boundary_polygon
     digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
-    shapes: list[tuple[str, str | None, BaseGeometry]] = [("boundary", None, environment.boundary_polygon)]
-    shapes += [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
+    head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
+    if environment.description:
+        head["description"] = environment.description
+    head["units"] = "metres"
+    notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
+    plane = None
+    if origin is not None:
+        plane = _plane(environment, origin)
+        head |= {"units": "degrees", "origin": list(origin)}
+        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
     features, areas, lost, across = [], [], 0, False
-    plane = None if origin is None else _plane(environment, origin)
-    for kind, name, shape in shapes:
-        if plane is None:
-            parts = on_grid(shape, digits)
-            areas.append(MultiPolygon(parts))
-        else:
-            # rounded in metres first, as a reader finds it: what touches there still touches
-            exact = MultiPolygon(on_grid(shape, DIGITS))
-            parts = on_grid(shapely.transform(exact, plane.degrees), digits)
-            areas.append(shapely.transform(MultiPolygon(parts), plane.metres))
-            across |= any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
+    shapes = [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
+    for kind, name, shape in [("boundary", None, boundary), *shapes]:
+        # rounded in metres first, as a reader finds it: what touches there still touches
+        exact = (
+            shape if plane is None else shapely.transform(MultiPolygon(on_grid(shape, DIGITS)), plane.degrees)
+        )
+        parts = on_grid(exact, digits)
+        area = MultiPolygon(parts)
+        areas.append(area if plane is None else shapely.transform(area, plane.metres))
+        across |= plane is not None and any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
         lost += not parts
         if parts:
-            features.append(_feature(kind, name, [rings(part) for part in parts]))
-    notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
-    if origin is not None:
-        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
+            properties = {"kind": kind} if name is None else {"kind": kind, "name": name}
+            geometry = mapping(parts[0] if len(parts) == 1 else area)
+            feature = {"type": "Feature", "properties": properties, "geometry": geometry}
+            features.append(json.dumps(feature, ensure_ascii=False))
     if across:
         notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
     if lost:
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
+    members, lines = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}"), ",\n".join(features)
     with written(path) as part:
-        part.write_text(_text(environment, options, features), encoding="utf-8")
+        part.write_text(f'{members},\n "features": [\n{lines}\n]}}\n', encoding="utf-8")
+    kept = free_area(areas[0], areas[1:])
     dropped = not_held(environment, names=False)
-    area = free_area(areas[0], areas[1:])
-    return ExportReport("geojson", (path,), environment.free_area, area, dropped, tuple(notes))
+    return ExportReport("geojson", (path,), environment.free_area, kept, dropped, tuple(notes))
 
 
 def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
@@ -211,26 +219,6 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
         wanted = "a place farther from the pole was wanted"
         raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
     return plane
-
-
-def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, float]]]]) -> dict[str, Any]:
-    geometry: dict[str, Any] = {"type": "MultiPolygon", "coordinates": polygons}
-    if len(polygons) == 1:
-        geometry = {"type": "Polygon", "coordinates": polygons[0]}
-    properties = {"kind": kind} if name is None else {"kind": kind, "name": name}
-    return {"type": "Feature", "properties": properties, "geometry": geometry}
-
-
-def _text(environment: Environment, options: WriteOptions, features: list[dict[str, Any]]) -> str:
-    head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
-    if environment.description:
-        head["description"] = environment.description
-    head["units"] = "metres" if options.origin is None else "degrees"
-    if options.origin is not None:
-        head["origin"] = list(options.origin)
-    lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
-    members = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}")
-    return f'{members},\n "features": [\n{lines}\n]}}\n'
 
 
 EXPORTER = Exporter(
