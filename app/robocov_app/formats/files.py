@@ -150,6 +150,14 @@ def _exists(named: Path) -> bool:
     return False
 
 
+def number(text: str) -> float:
+    """Return the number that a text is, nan where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
 def whole_numbers(text: str | bytes, separator: str) -> NDArray[np.int64] | None:
     """Return the numbers in a text, None where there is anything else."""
     with warnings.catch_warnings(), suppress(DeprecationWarning, ValueError, OverflowError):

@@ -180,10 +180,7 @@ class _Node:
         return self.value
 
     def number(self, default: float) -> float:
-        try:
-            value = float(self.text(str(default)))
-        except ValueError:
-            value = math.nan
+        value = files.number(self.text(str(default)))
         if not abs(value) <= FARTHEST:
             self.refuse("a number within 1e7")
         return value

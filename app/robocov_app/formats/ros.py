@@ -19,7 +19,6 @@ that planners which take the unknown for passable stay inside.
 import json
 import math
 import re
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -165,10 +164,9 @@ def _text(given: dict[str, files.Value], key: str, where: str, default: str | No
 
 
 def _number(text: files.Value, where: str) -> float:
-    with suppress(ValueError):
-        if isinstance(text, str) and math.isfinite(value := float(text)):
-            return value
-    raise MapError(f"{where}: {shown(text)}, but a number was wanted")
+    if not isinstance(text, str) or not math.isfinite(value := files.number(text)):
+        raise MapError(f"{where}: {shown(text)}, but a number was wanted")
+    return value
 
 
 IMPORTER = Importer(

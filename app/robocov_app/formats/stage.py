@@ -45,6 +45,7 @@ _TOKEN = re.compile(
     r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])|(?P<strange>[\s\S])'
 )
 _MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
+_MARKS = ("(", ")", "[", "]")
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -52,9 +53,6 @@ class _Token(NamedTuple):
     kind: str
     text: str
     at: str
-
-    def is_(self, kind: str, text: str) -> bool:
-        return (self.kind, self.text) == (kind, text)
 
     def refuse(self, wanted: str) -> NoReturn:
         raise MapError(f"{self.at}: {shown(self.text)}, but {wanted} was wanted")
@@ -75,10 +73,7 @@ class _Entity:
     def numbers(self, name: str, default: tuple[float, ...]) -> Array:
         """Return the values of a property; those that are not written are as in `default`."""
         given = self.properties.get(name, [])[: len(default)]
-        try:
-            values = np.array([*map(float, given), *default[len(given) :]])
-        except ValueError:
-            values = np.array([math.nan])
+        values = np.array([*map(files.number, given), *default[len(given) :]])
         if not (np.abs(values) <= FARTHEST).all():
             raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers within 1e7 were wanted")
         return values
@@ -141,26 +136,27 @@ class _World:
 
     def _split(self, path: Path, depth: int) -> None:
         """Add the tokens of a file, and of those that it includes."""
-        text = files.content(path, MAX_BYTES).decode("utf-8", "replace")
+        world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, one_line(path), False
-        for found in _TOKEN.finditer(text):
-            token = _Token(str(found.lastgroup), found[found.lastgroup or 0], f"{name}:{line}")
+        for found in _TOKEN.finditer(world):
+            kind, text = str(found.lastgroup), found[found.lastgroup or 0]
+            token = _Token(text if kind == "mark" else kind, text, f"{name}:{line}")
             line += found[0].count("\n")
             if token.kind == "blank":
                 continue
             if token.kind == "strange":
-                strange = text[found.start() : found.start() + 20]
+                strange = world[found.start() : found.start() + 20]
                 token._replace(text=strange).refuse("a word, a number or a bracket")
             if include:
                 if token.kind != "string" or depth >= files.MAX_DEPTH:
                     token.refuse("a file to include, which does not include itself,")
                 self._split(self._named(token.text, "file", token.at), depth + 1)
-            elif not token.is_("word", "include"):
+            elif token[:2] != ("word", "include"):
                 if len(self.tokens) >= MOST_TOKENS:
                     what = f"more than {MOST_TOKENS} words and numbers"
                     raise MapError(f"{token.at}: {what}, but fewer were wanted")
                 self.tokens.append(token)
-            include = not include and token.is_("word", "include")
+            include = not include and token[:2] == ("word", "include")
 
     def _fill(self, entity: _Entity, depth: int) -> None:
         """Read the content of an entity, up to its closing bracket."""
@@ -170,16 +166,17 @@ class _World:
         while self.tokens:
             token = self.tokens.popleft()
             ahead = [*islice(self.tokens, 3), end, end, end]
-            if depth and token.is_("mark", ")"):
+            if depth and token.kind == ")":
                 return
             if token.kind != "word":
                 token.refuse("the name of a model or a property" + (", or )," if depth else ""))
-            if token.text == "define" and [after.kind for after in ahead[:3]] == ["word", "word", "mark"]:
+            macro = [after.kind for after in ahead[:2]] == ["word", "word"] and ahead[2].kind in _MARKS
+            if token.text == "define" and macro:
                 name, kind, _ = (self.tokens.popleft() for _ in range(3))
-                macro = _Entity(kind.text, token.at)
-                self._fill(macro, depth + 1)
-                self.macros.setdefault(name.text, macro)
-            elif ahead[0].is_("mark", "("):
+                whole = _Entity(kind.text, token.at)
+                self._fill(whole, depth + 1)
+                self.macros.setdefault(name.text, whole)
+            elif ahead[0].kind == "(":
                 self.tokens.popleft()
                 entity.inside.append(_Entity(token.text, token.at))
                 self._fill(entity.inside[-1], depth + 1)
@@ -191,9 +188,9 @@ class _World:
     def _values(self, name: _Token) -> list[str]:
         """Read the value of a property: a number, a text, or a list of these."""
         values = [self.tokens.popleft()] if self.tokens else [name]
-        if values[0].is_("mark", "["):
+        if values[0].kind == "[":
             values = []
-            while self.tokens and self.tokens[0].kind != "mark":
+            while self.tokens and self.tokens[0].kind not in _MARKS:
                 values.append(self.tokens.popleft())
             if not self.tokens or self.tokens.popleft().text != "]":
                 name.refuse("a ] after its values")

@@ -28,7 +28,7 @@ from robocov_app.formats import files
 from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes, folded, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
@@ -145,20 +145,19 @@ class _Map:
         self, parent: Element, labels: tuple[str, ...], offset: Array, *, wall: bool
     ) -> Iterator[_Layer]:
         """Yield the layers that are asked for, groups opened."""
-        only, skip = self.options.only, folded(self.options.skip or ())
+        shapes = self.shapes
         for element in parent.children:
             if element.tag not in ("layer", "objectgroup", "group"):
                 continue
             names = (*filter(None, map(element.attributes.get, ("name", "class"))), *labels)
-            self.shapes.labels |= {name.casefold(): name for name in names}
+            found = shapes.seen(names)
             moved = offset + [_number(element, key) for key in ("offsetx", "offsety")]
-            asked = only is not None and bool(folded(only) & folded(names))
-            says = wall or (only is None and _says_solid(element, names)) or asked
-            if skip & folded(names):
-                self.shapes.leave_out("layer", "by the names that were asked for")
+            says = wall or (_says_solid(element, names) if shapes.only is None else bool(shapes.only & found))
+            if shapes.skip & found:
+                shapes.leave_out("layer", "by the names that were asked for")
             elif element.tag == "group":
                 yield from self._layers(element, names, moved, wall=says)
-            elif element.tag == "objectgroup" or only is None or says:
+            elif element.tag == "objectgroup" or shapes.only is None or says:
                 yield _Layer(element, names, moved, says)
 
     def _grids(self, layers: list[_Layer]) -> list[tuple[_Layer, _IDs]]:
@@ -242,24 +241,24 @@ class _Map:
 
     def _add_objects(self, layers: list[_Layer], *, anything: bool) -> None:
         """Add the objects that are solid, or all; those that are called robots are places to start."""
-        only, skip = self.options.only, folded(self.options.skip or ())
+        shapes = self.shapes
         for layer in layers:
             for element in layer.element.children:
                 given = [element.attributes.get(key, "") for key in ("name", "class", "type")]
                 labels = (*filter(None, given), *layer.labels)
-                self.shapes.labels |= {label.casefold(): label for label in labels}
-                if element.tag != "object" or skip & folded(labels):
+                found = shapes.seen(labels)
+                if element.tag != "object" or shapes.skip & found:
                     continue
                 kind, points = _figure(element)
                 points = points + layer.offset
                 says = anything or layer.wall or _says_solid(element, labels)
                 if kind and any(_START.fullmatch(_plain(label)) for label in given):
                     x, y = self._metres(points.mean(axis=0)).tolist()
-                    self.shapes.robots.append((x, y))
-                elif folded(only) & folded(labels) if only is not None else says:
+                    shapes.robots.append((x, y))
+                elif says if shapes.only is None else shapes.only & found:
                     self._add(element, kind, points, labels)
                 else:
-                    self.shapes.leave_out("object", "not solid by name or property (--only NAME takes it)")
+                    shapes.leave_out("object", "not solid by name or property (--only NAME takes it)")
 
     def _add(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
         """Add an obstacle of a kind, as of `_figure`, in pixels on the map."""

@@ -54,10 +54,7 @@ class Element:
     def numbers(self, name: str, count: int | None = None, default: str | None = None) -> Array:
         """Return the numbers of an attribute, which commas or blanks separate, `count` of them."""
         text = self.attributes.get(name, default)
-        try:
-            values = np.array([float(part) for part in (text or "").replace(",", " ").split()])
-        except ValueError:
-            values = np.array([np.nan])
+        values = np.array([files.number(part) for part in (text or "").replace(",", " ").split()])
         if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
             found = "missing" if text is None else shown(text)
             wanted = {None: "numbers within 1e7 were", 1: "a number within 1e7 was"}

@@ -105,6 +105,8 @@ class Shapes:
         self.left_out: Counter[tuple[str, str]] = Counter()
         self.mended: Counter[tuple[str, str]] = Counter()
         self.labels: dict[str, str] = {}
+        self.only = None if options.only is None else set(map(str.casefold, options.only))
+        self.skip = set(map(str.casefold, options.skip or ()))
         self.robots: list[tuple[float, float]] = []
         self.notes: list[str] = []
         self.cell: float | None = None
@@ -115,13 +117,17 @@ class Shapes:
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
+        found = self.seen(labels)
+        wanted = (self.only is None or bool(self.only & found)) and not self.skip & found
+        if not wanted:
+            self.leave_out("shape", "by the names that were asked for")
+        return wanted
+
+    def seen(self, labels: Iterable[str]) -> set[str]:
+        """Return labels as they are compared, and keep what the file calls them."""
         found = {label.casefold(): label for label in labels}
         self.labels |= found
-        only, skip = self.options.only, self.options.skip
-        if (only is None or folded(only) & found.keys()) and not folded(skip or ()) & found.keys():
-            return True
-        self.leave_out("shape", "by the names that were asked for")
-        return False
+        return set(found)
 
     def add_all(self, figures: Iterable[Figure]) -> None:
         for figure in figures:
@@ -281,10 +287,6 @@ def name_of(labels: Sequence[str]) -> str | None:
     """Return what an obstacle with these labels is called in a map; layer 0 of a drawing is no name."""
     names = (one_line(label)[:LONGEST_LABEL].strip() for label in labels[:1] if label != "0")
     return next(names, None) or None
-
-
-def folded(labels: Iterable[str]) -> set[str]:
-    return {label.casefold() for label in labels}
 
 
 BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
