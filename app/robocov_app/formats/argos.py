@@ -18,7 +18,7 @@ from shapely import MultiPolygon
 from robocov.arrays import Array
 from robocov.errors import one_line, shown
 from robocov.mapfile.models import LARGEST
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.shapes import Shapes, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
@@ -27,7 +27,7 @@ MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
 _UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are tilted, in degrees
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.child("arena")
     if arena is None:
@@ -98,10 +98,3 @@ def _lengths(element: Element, name: str, count: int = 3) -> Array:
     if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
         element.refuse(f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
     return values
-
-
-IMPORTER = Importer(
-    "argos", "ARGoS: the arena of an experiment (.argos)", (".argos",),
-    lambda path, head: b"<argos-configuration" in head, _read,
-    options=frozenset({"only", "skip"}),
-)  # fmt: skip

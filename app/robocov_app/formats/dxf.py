@@ -24,7 +24,7 @@ from robocov.errors import MapError, RobocovError, one_line, shown
 from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 
@@ -39,8 +39,8 @@ UNITS = {
 }  # fmt: skip
 """Units of the header's $INSUNITS, with their metres."""
 
-_BINARY = b"AutoCAD Binary DXF"
-_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
+BINARY = b"AutoCAD Binary DXF"
+TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
 _ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
 _POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
 _BULGE = 1e-9  # edges of polylines that are bent less are straight
@@ -280,7 +280,7 @@ class DxfDrawing:
         return rings
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     _check(path, where)
     document = _document(path, where)
@@ -302,8 +302,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
 
 def _check(path: Path, where: str) -> None:
     content = files.content(path, files.MAX_TEXT_BYTES)
-    if not content.startswith(_BINARY):
-        if not _TEXT.match(content):
+    if not content.startswith(BINARY):
+        if not TEXT.match(content):
             raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")
         if sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1)) > MOST_ENTITIES:
             raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
@@ -328,12 +328,3 @@ def _document(path: Path, where: str) -> Any:
         except Exception as error:  # it raises what it likes on nonsense
             reason = one_line(error) or type(error).__name__
     raise MapError(f"{where}: no DXF that can be read: {reason[:200]}")
-
-
-IMPORTER = Importer(
-    "dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
-    lambda path, head: head.startswith(_BINARY) or _TEXT.match(head) is not None, _read,
-    options=frozenset(
-        {"scale", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip", "hatches"}
-    ),
-)  # fmt: skip

@@ -24,8 +24,8 @@ from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, one_line, place, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
-from robocov_app.formats.files import JsonFile, begins_with, is_number
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
@@ -33,11 +33,11 @@ from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
-_TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
+TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
 _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
     document, where = file.document, file.where
     shapes = Shapes(where, options)
@@ -157,17 +157,10 @@ class _Found:
         self.crs = name
 
 
-IMPORTER = Importer(
-    "geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
-    lambda path, head: begins_with(head, b"{") and _TYPE.search(head) is not None, _read,
-    options=frozenset(
-        {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
-    ),
-)  # fmt: skip
 _FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     origin, boundary = options.origin, environment.boundary_polygon
     digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
     head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
@@ -219,9 +212,3 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
         wanted = "a place farther from the pole was wanted"
         raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
     return plane
-
-
-EXPORTER = Exporter(
-    "geojson", "GeoJSON: boundary and obstacles as features, in metres or degrees", (".geojson",), _write,
-    options=frozenset({"digits", "origin"}),
-)  # fmt: skip

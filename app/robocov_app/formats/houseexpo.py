@@ -12,14 +12,14 @@ from shapely import MultiPolygon, Polygon
 from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov.mapfile.models import FARTHEST
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
-from robocov_app.formats.files import JsonFile, begins_with
+from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.files import JsonFile
 from robocov_app.formats.geometry.polygons import Crossings, enclosed
 
 _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
     document, vertices = file.document, _vertices(file)
     ring = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
@@ -64,9 +64,3 @@ def _vertices(file: JsonFile) -> Array:
         if not good or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in point):
             raise file.refused(("verts", k), point, "a point [x, y] in metres was")
     return np.array(given, dtype=float)
-
-
-IMPORTER = Importer(
-    "houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",),
-    lambda path, head: begins_with(head, b"{") and b'"verts"' in head, _read,
-)  # fmt: skip

@@ -24,7 +24,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, counted, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
@@ -35,7 +35,11 @@ _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def sniff(path: Path, head: bytes) -> bool:
+    return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     shapes = Shapes(where, options)
     root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
@@ -198,11 +202,3 @@ class _Node:
 
     def refuse(self, wanted: str) -> NoReturn:
         raise MapError(f"{self.at}: {shown(self.value)}, but {wanted} was wanted")
-
-
-IMPORTER = Importer(
-    # a .yaml is this by its content only
-    "irsim", "IR-SIM: YAML of a world, robots and obstacles", (),
-    lambda path, head: path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None, _read,
-    options=frozenset({"thickness", "anywhere", "only", "skip"}),
-)  # fmt: skip

@@ -20,11 +20,11 @@ import shapely
 from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import DEGREES, in_metres
 
-_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
 # barriers that are walls; gates, kerbs and chains are not
 _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail", "jersey_barrier"}
 _POSTS = {"bollard", "block", "tree"}
@@ -50,7 +50,7 @@ class _Thing:
         return tuple(dict.fromkeys(one_line(label) for label in found if label != "yes"))
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))
     shapes = Shapes(where, options)
@@ -188,10 +188,3 @@ def _degrees(given: dict[str, str], key: str, most: float) -> float:
     if not abs(value) <= most:
         raise ValueError(f"{key} {value:g}")
     return value
-
-
-IMPORTER = Importer(
-    "osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",),
-    lambda path, head: _ROOT.match(head) is not None, _read,
-    options=frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"}),
-)  # fmt: skip

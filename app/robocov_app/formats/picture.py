@@ -24,7 +24,7 @@ from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
 
@@ -203,7 +203,7 @@ _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     picture = read_picture(path, where)
     cell, origin = _place(picture)
@@ -242,15 +242,7 @@ def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
     return None, (0.0, 0.0)
 
 
-IMPORTER = Importer(
-    "picture", "picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
-    (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
-    lambda path, head: is_picture(head), _read,
-    options=frozenset({"cell", "unknown", "threshold", "invert"}),
-)  # fmt: skip
-
-
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     from PIL import Image, PngImagePlugin
 
     grid = grid_over(environment, options.cell)
@@ -261,9 +253,3 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     with written(path) as part:
         Image.fromarray(free[::-1]).save(part, format="PNG", pnginfo=texts)
     return grid_report("picture", (path,), environment, grid, free)
-
-
-EXPORTER = Exporter(
-    "picture", "picture: PNG in black and white, with its scale and place", (".png",), _write,
-    options=frozenset({"cell"}),
-)  # fmt: skip

@@ -13,7 +13,7 @@ from typing import Any
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.files import JsonFile, name_of_map, require_shapes
 from robocov_app.formats.geometry.shapes import Shapes, foreign_map
 
@@ -21,7 +21,11 @@ _LISTS = re.compile(rb"(?:\xef\xbb\xbf)?\s*\[\s*(?:\[\s*){0,3}-?[\d.]")
 _FLAT = re.compile(rb'"vertices"\s*:\s*\[\s*-?[\d.]')
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def sniff(path: Path, head: bytes) -> bool:
+    return path.suffix.lower() == ".json" and bool(_LISTS.match(head) or _FLAT.search(head))
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
     shapes = Shapes(file.where, options)
     scale = 1.0 if options.scale is None else options.scale
@@ -76,10 +80,3 @@ def _polygons(file: JsonFile, shapes: Shapes) -> list[list[Array]]:
         case 4:
             return [polygon(rings, (k,)) for k, rings in enumerate(document)]
     raise file.refused((), document, "a list of rings [[x, y], ...] was")
-
-
-IMPORTER = Importer(
-    "rings", "lists of rings (JSON as earcut takes it): outline and holes", (".json",),
-    lambda path, head: path.suffix.lower() == ".json" and bool(_LISTS.match(head) or _FLAT.search(head)),
-    _read, options=frozenset({"scale", "outlines", "around"}),
-)  # fmt: skip

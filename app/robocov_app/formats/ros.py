@@ -29,7 +29,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, OutputError, ParameterError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, Cells, foreign_map
 from robocov_app.formats.picture import Brightness, read_picture
@@ -42,11 +42,11 @@ _NOISE = 1.5  # in maps that robots made single cells are noise
 _SAVED_UNKNOWN = 205  # what savers write for unknown cells, of 255
 
 
-def _sniff(path: Path, head: bytes) -> bool:
+def sniff(path: Path, head: bytes) -> bool:
     return path.suffix.lower() in (".yaml", ".yml") and b"image" in head and b"resolution" in head
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     given = files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where)
     mode = _text(given, "mode", where, "trinary").lower()
@@ -169,23 +169,19 @@ def _number(text: files.Value, where: str) -> float:
     return value
 
 
-IMPORTER = Importer(
-    "ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), _sniff, _read,
-    options=frozenset({"unknown", "threshold", "anywhere"}),
-)  # fmt: skip
 _WHITE = 254  # what map_saver writes for free cells; occupied ones are 0
 # of scale and raw a cell's occupancy is the part of so many by so many of its places that is solid
 _FINER = 4
 
 
-def _files(path: Path, options: WriteOptions) -> tuple[Path, ...]:
+def files_of(path: Path, options: WriteOptions) -> tuple[Path, ...]:
     image = options.image or ("png" if options.mode == "scale" else "pgm")
     return (path, path.with_suffix(f".{image}"))
 
 
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     mode = options.mode or "trinary"
-    _, image = _files(path, options)
+    _, image = files_of(path, options)
     if image == path:
         raise OutputError(f"{one_line(path)}: the name of the picture, but one for the YAML was wanted")
     text_name = _quoted(image.name, path)
@@ -243,9 +239,3 @@ def _quoted(name: str, path: Path) -> str:
     except UnicodeEncodeError:
         raise OutputError(f"{one_line(path)}: {shown(name)}: no name that UTF-8 can hold") from None
     return name if re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) else json.dumps(name)
-
-
-EXPORTER = Exporter(
-    "ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), _write,
-    options=frozenset({"cell", "mode", "image"}), files=_files,
-)  # fmt: skip

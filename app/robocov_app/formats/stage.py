@@ -29,7 +29,7 @@ from robocov.arrays import Array
 from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.raster import free_area, vertices_of
@@ -44,7 +44,7 @@ _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
     r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])|(?P<strange>[\s\S])'
 )
-_MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
+MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
 _MARKS = ("(", ")", "[", "]")
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -92,7 +92,7 @@ class _Room:
     cell: float | None = None
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)
     world.place(world.root.inside, np.eye(3))
@@ -312,10 +312,3 @@ def _blocks(entity: _Entity) -> list[Array]:
         if count != len(points):
             raise MapError(f"{entity.at}: {len(points)} points, but {count:g}, as it says, were wanted")
     return [np.array([points[k] for k in sorted(points)]) for points in rings.values()]
-
-
-IMPORTER = Importer(
-    "stage", "Stage: .world with its includes and bitmaps", (".world",),
-    lambda path, head: path.suffix.lower() == ".world" and _MODELS.search(head) is not None, _read,
-    options=frozenset({"anywhere", "around", "only", "skip"}),
-)  # fmt: skip

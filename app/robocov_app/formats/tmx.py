@@ -25,7 +25,7 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.frames import frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
@@ -38,7 +38,7 @@ CELL = 1.0  # width of a tile in metres where none is given: the format has only
 # bits of a global tile ID: the three flips, and the tile
 _FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
 _RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-_ROOT = re.compile(rb"<map[\s>]")
+ROOT = re.compile(rb"<map[\s>]")
 _SOLID = re.compile(
     r"(is|has|ge)?(collid(e|es|er|ers|able)|collisions?|(map)?walls?|solids?|block(s|ed|ing)?|obstacles?)"
     r"(layer|tiles?|objects?)?"
@@ -70,6 +70,10 @@ class _Layer(NamedTuple):
     labels: tuple[str, ...]
     offset: Array
     wall: bool
+
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    return _Map(path, options).read()
 
 
 class _Map:
@@ -361,11 +365,3 @@ def _whole(element: Element, name: str, least: int, default: str = "") -> int:
     if not re.fullmatch(r"-?[0-9]{1,10}", text) or not least <= int(text) < 2**32:
         element.refuse(f"{name} {shown(text)}, but a whole number from {least} was wanted")
     return int(text)
-
-
-IMPORTER = Importer(
-    "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",),
-    lambda path, head: _ROOT.search(head) is not None and b"tilewidth" in head,
-    lambda path, options: _Map(path, options).read(),
-    options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
-)  # fmt: skip

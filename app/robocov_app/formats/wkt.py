@@ -22,7 +22,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
@@ -202,14 +202,14 @@ class WktText:
         raise MapError(f"{self.where}:{line}:{column}: {what}")
 
 
-_BEGIN = re.compile(
+BEGIN = re.compile(
     rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
     % b"|".join(kind.encode() for kind in (*KINDS, *CURVED)),
     re.IGNORECASE,
 )
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
@@ -220,14 +220,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     return foreign_map(shapes, name_of_map(path), "Imported from WKT.", solid=False, accessible=True)
 
 
-IMPORTER = Importer(
-    "wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
-    (".wkt", ".ewkt"), lambda path, head: _BEGIN.match(head) is not None, _read,
-    options=frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"}),
-)  # fmt: skip
-
-
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     digits = DIGITS if options.digits is None else options.digits
     free = on_grid(environment.free, digits)
     parts = [_text(part, digits) for part in free]
@@ -246,9 +239,3 @@ def _text(polygon: Polygon, digits: int) -> str:
     points = [[f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring] for ring in rings(polygon)]
     parts = [f"({', '.join(ring)})" for ring in points]
     return f"({', '.join(parts)})"
-
-
-EXPORTER = Exporter(
-    "wkt", "well-known text (JuPedSim): the free space as polygons with holes", (".wkt",), _write,
-    options=frozenset({"digits"}),
-)  # fmt: skip

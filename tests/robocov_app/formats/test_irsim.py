@@ -11,8 +11,9 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
-from robocov_app.formats.irsim import IMPORTER
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+
+IMPORTER = IMPORTERS["irsim"]
 
 WORLD = "world:\n  height: 6  # along y\n  width: 10\n  offset: [-1, 2]\n  step_time: 0.1\n"
 SPACE = box(-1, 2, 9, 8)

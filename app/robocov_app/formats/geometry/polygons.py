@@ -158,9 +158,8 @@ def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -
     down = (b[:, 1] <= p[:, 1]) & (p[:, 1] < a[:, 1])
     left = (b[:, 0] - a[:, 0]) * (p[:, 1] - a[:, 1]) - (p[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     sign = np.where(up & (left > 0), 1, np.where(down & (left < 0), -1, 0))
-    if rule == "evenodd":
-        return np.bincount(which, np.abs(sign), len(points)) % 2 == 1
-    return np.bincount(which, sign, len(points)) != 0
+    turns = np.bincount(which, np.abs(sign) if rule == "evenodd" else sign, len(points))
+    return np.asarray(turns % 2 == 1 if rule == "evenodd" else turns != 0)
 
 
 def made_valid(area: BaseGeometry) -> BaseGeometry:

@@ -27,7 +27,7 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.files.atomic import written
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.conversion import with_numbers
@@ -42,7 +42,7 @@ from robocov_app.render.theme import DARK, LIGHT, Theme
 
 DIGITS = 3  # decimals of millimetres by default: as fine as the free space is known at true scale
 _MARGIN = 0.03  # of the longer side, around a map that is written
-_ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
+ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
 _SMALLEST = 1.0  # a drawing smaller than this, in metres, at its own scale is a picture of something larger
 _GROUPS = ("g", "a", "switch", "svg", "use")
 _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -53,7 +53,7 @@ _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "roun
 _EVEN = 1.0 + 1e-6
 
 
-def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     root = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
     shapes = Shapes(root.where, options)
     drawing = _Drawing(root, shapes)
@@ -368,13 +368,6 @@ def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]
     return [np.concatenate(parts)]
 
 
-IMPORTER = Importer(
-    "svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
-    lambda path, head: _ROOT.search(head) is not None or path.suffix.lower() == ".svgz", read_svg,
-    options=frozenset({"scale", "thickness", "outlines", "boundary", "around", "only", "skip"}),
-)  # fmt: skip
-
-
 @dataclass(frozen=True)
 class _Pen:
     """Writes shapes in millimetres of the drawing, y down."""
@@ -406,7 +399,7 @@ class _Pen:
         return f"<{kind}><title>{title}</title></{kind.split(' ', 1)[0]}>" if title else f"<{kind}/>"
 
 
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     scale = 0.001 if options.scale is None else options.scale
     pen = _Pen(scale, DIGITS if options.digits is None else options.digits)
     boundary = np.asarray(environment.boundary, dtype=float)
@@ -477,9 +470,3 @@ def _colours(theme: Theme) -> str:
 
 def _plain(text: str) -> str:
     return escape("".join(char if char.isprintable() else " " for char in text))
-
-
-EXPORTER = Exporter(
-    "svg", "SVG at true scale: boundary and obstacles by their ids", (".svg",), _write,
-    options=frozenset({"digits", "scale"}),
-)  # fmt: skip
