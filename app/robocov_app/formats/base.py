@@ -126,8 +126,8 @@ class Options:
         given = [each.name for each in fields(self) if getattr(self, each.name) != each.default]
         if strange := [name for name in given if name not in chosen.options]:
             words = ", ".join(f"--{each}" for each in sorted(chosen.options)) or "none"
-            what = f"no option of the format {chosen.name}, whose options are: {words}"
-            raise ParameterError(f"--{strange[0]}: {what}")
+            known = f"no option of the format {chosen.name}, whose options are: {words}"
+            raise ParameterError(f"--{strange[0]}: {known}")
 
 
 @dataclass(frozen=True)

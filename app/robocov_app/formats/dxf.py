@@ -113,6 +113,7 @@ class DxfDrawing:
 
     def _require_few(self, space: Iterable[Any]) -> None:
         """Count what will be drawn, blocks and all, without drawing it: a few kB may stand for billions."""
+        where, deepest = self.where, files.MAX_DEPTH
         counted: dict[str, int] = {}
         inside: list[str] = []
 
@@ -122,11 +123,10 @@ class DxfDrawing:
         def count_insert(insert: Any) -> int:
             name = str(insert.dxf.get("name", "")).casefold()
             if name in inside:
-                what = f"block {shown(name)} is inserted within itself, but an end was wanted"
-                raise MapError(f"{self.where}: {what}")
-            if len(inside) >= files.MAX_DEPTH:
-                what = f"blocks nested deeper than {files.MAX_DEPTH}"
-                raise MapError(f"{self.where}: {what}, but less was wanted")
+                what = "is inserted within itself, but an end was wanted"
+                raise MapError(f"{where}: block {shown(name)} {what}")
+            if len(inside) >= deepest:
+                raise MapError(f"{where}: blocks nested deeper than {deepest}, but less was wanted")
             if name not in counted:
                 block = self.document.blocks.get(name)
                 inside.append(name)
@@ -138,8 +138,8 @@ class DxfDrawing:
         total = count(space)
         if total > MOST_DRAWN:
             # of blocks in blocks it may be too many for a float
-            what = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
-            raise MapError(f"{self.where}: {what}, but at most {MOST_DRAWN} were wanted")
+            found = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
+            raise MapError(f"{where}: {found}, but at most {MOST_DRAWN} were wanted")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
         """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""

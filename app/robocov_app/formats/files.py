@@ -110,11 +110,10 @@ _LONG = 400  # longest name of a file, in characters
 def named_file(
     path: Path, name: str, what: str, at: str, notes: list[str], *, anywhere: bool = False
 ) -> Path:
-    """Return the file that the one at `path` names.
+    """Return the file that the one at `path` names, a `what`, at the place `at`.
 
     It must be in the file's folder or below, unless it may be `anywhere`. Programs write where it was when it
-    was saved, often from the root, and it may have moved with the file: one of the same name beside it is as
-    good, which `notes` then say. `what`, `at`: what kind of file it is, and the place that names it.
+    was saved, and it may have moved with the file: one of the same name beside it is as good, as `notes` say.
     """
     if not name:
         raise MapError(f"{at}: empty, but the name of a {what} was wanted")

@@ -38,10 +38,9 @@ def in_metres(
 ) -> tuple[list[Figure], list[str]]:
     """Return figures with coordinates in metres, and what was done to them, in words.
 
-    `options`: ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
-    `crs`: the reference system that the file names, as ``EPSG:25832`` or an OGC URN. `globe`: whether
-    coordinates without one are degrees where that makes a map of at most 10 km. `origin`, longitude and
-    latitude: where the file says that [0, 0] m is; by default the middle of what is there.
+    `options`: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: of the
+    file, as ``EPSG:25832`` or an OGC URN. `globe`: coordinates without one are degrees where that makes a map
+    of at most 10 km. `origin`: longitude and latitude of [0, 0] m, by default of the middle.
     """
     if not figures:
         return [], []

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from shapely import MultiPolygon, Polygon
 
-from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats.base import ForeignMap, ReadOptions
@@ -21,12 +20,21 @@ _MIN_HOLE = 1e-4  # holes smaller than this, in m², come of rounding
 
 def read(path: Path, options: ReadOptions) -> ForeignMap:
     file = JsonFile(path)
-    document, vertices = file.document, _vertices(file)
+    document = file.document
+    if not isinstance(document, dict) or "verts" not in document:
+        raise MapError(f'{file.where}: not a HouseExpo plan, but an object with "verts" was wanted')
+    given = document["verts"]
+    if not isinstance(given, list) or len(given) < 3:
+        raise file.refused(("verts",), given, "a list of at least 3 points [x, y] was")
+    for k, point in enumerate(given):
+        good = isinstance(point, list) and len(point) == 2
+        if not good or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in point):
+            raise file.refused(("verts", k), point, "a point [x, y] in metres was")
+    vertices = np.array(given, dtype=float)
     ring = vertices[(vertices != np.roll(vertices, 1, axis=0)).any(axis=1)]
     repeated = len(vertices) - len(ring)
     if len(ring) < 3:
-        wanted = "at least 3 were wanted"
-        raise MapError(f"{file.where}: verts: {len(ring)} different points, but {wanted}")
+        raise MapError(f"{file.where}: verts: {len(ring)} different points, but at least 3 were wanted")
     area, reason, _ = enclosed([ring], crossings=Crossings(file.where))
     if area.is_empty:
         raise MapError(f"{file.where}: verts: area 0 m², but an outline with an area was wanted")
@@ -39,8 +47,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         Polygon(part.exterior, [hole.exterior for hole in some if hole.area >= _MIN_HOLE])
         for part, some in zip(area.geoms, holes, strict=True)
     ]
-    given, rooms = document.get("id"), document.get("room_num")
-    name = given if isinstance(given, str) and given else path.stem
+    called, rooms = document.get("id"), document.get("room_num")
+    name = called if isinstance(called, str) and called else path.stem
     many = f" of {rooms} rooms" if type(rooms) is int and rooms > 1 else ""
     return ForeignMap(
         name=f"HouseExpo {one_line(name)[:60]}",
@@ -51,16 +59,3 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
         repaired=tuple(repaired),
         dropped=tuple(dropped),
     )
-
-
-def _vertices(file: JsonFile) -> Array:
-    if not isinstance(file.document, dict) or "verts" not in file.document:
-        raise MapError(f'{file.where}: not a HouseExpo plan, but an object with "verts" was wanted')
-    given = file.document["verts"]
-    if not isinstance(given, list) or len(given) < 3:
-        raise file.refused(("verts",), given, "a list of at least 3 points [x, y] was")
-    for k, point in enumerate(given):
-        good = isinstance(point, list) and len(point) == 2
-        if not good or not all(type(value) in (int, float) and abs(value) <= FARTHEST for value in point):
-            raise file.refused(("verts", k), point, "a point [x, y] in metres was")
-    return np.array(given, dtype=float)

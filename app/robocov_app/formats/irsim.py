@@ -79,8 +79,8 @@ def read(path: Path, options: ReadOptions) -> ForeignMap:
                     figures = group["shape"].items(one=True) or [group["shape"]]
                     _draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), shapes, labels)
     if moving:
-        many = counted(moving, "obstacle")
-        shapes.notes.append(f"{many} with kinematics taken as standing where the file has them")
+        words = "with kinematics taken as standing where the file has them"
+        shapes.notes.append(f"{counted(moving, 'obstacle')} {words}")
     name = world["name"].text() or path.stem
     return foreign_map(shapes, name, "A world of IR-SIM, imported.", solid=True, world=free)
 

@@ -50,9 +50,8 @@ _MOST_OF_JPEG = 512
 class Brightness:
     """A picture without its colours, the top row first.
 
-    `level`, (rows, columns): from 0, black, to `full`, white: of colours the sum of red, green and blue.
-    `alpha`, (rows, columns): from 0, transparent, to 255, opaque; None where there is no such thing. `texts`:
-    what a PNG says of itself. `lossy`: whether pixels may have changed when saved, as in a JPEG.
+    `level`, (rows, columns): from 0, black, to `full`, white: the sum of red, green and blue. `alpha`: to
+    255, opaque. `texts`: what a PNG says of itself. `lossy`: whether saving may change pixels, as in a JPEG.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]

@@ -178,8 +178,8 @@ class _Map:
             self.root.refuse(f"a layer of another size, but one of {right} x {bottom} tiles was wanted")
         self.shape = bottom - top, right - left
         if math.prod(self.shape) > MOST_TILES or math.prod(self.shape) * len(given) > MOST_READ:
-            what = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
-            self.root.refuse(f"{what}, but fewer were wanted")
+            found = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
+            self.root.refuse(f"{found}, but fewer were wanted")
         grids = []
         for layer, some in given:
             grid = np.zeros(self.shape, np.uint32)

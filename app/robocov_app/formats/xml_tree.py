@@ -70,10 +70,9 @@ class Element:
 
 
 def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> Element:
-    """Return the root of the XML file at `path`, which has the tag `root`.
+    """Return the `root` of an XML file, which messages call a `kind`; `texts`: tags whose text counts.
 
-    `kind`: what messages call the format. `texts`: tags of elements whose text means something. Refused are
-    entities that stand for other files, other entities or too much.
+    Refused are entities that stand for other files, other entities or too much.
     """
     where = one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)

@@ -96,11 +96,10 @@ def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELL
 
 
 def free_cells(environment: Environment, grid: Grid) -> BoolArray:
-    """Return which cells of `grid` are free, (rows, columns), the lowest row first.
+    """Return which cells of `grid` are free, (rows, columns), the lowest row first; ParameterError if none.
 
-    A cell is free if its centre is, and if nothing solid would be lost: no wall is too thin, and no pillar
-    too small, to block a cell: where robots drive from side to side of cells they drive on the map. Raises
-    ParameterError when none is.
+    A cell is free if its centre is, and nothing solid is lost: no wall is too thin, and no pillar too small,
+    to block a cell: where robots drive from side to side of cells they drive on the map.
     """
     free = grid.covered(environment.free) & ~grid.between(environment.free)
     # what is smaller than a cell may lie between all lines of centres
@@ -181,12 +180,6 @@ def grid_report(
     dropped: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> ExportReport:
-    return ExportReport(
-        name,
-        files,
-        environment.free_area,
-        float(np.count_nonzero(free)) * grid.cell**2,
-        dropped=(*dropped, *not_held(environment)),
-        notes=notes,
-        warnings=lost_passages(environment, grid, free),
-    )
+    area = float(np.count_nonzero(free)) * grid.cell**2
+    dropped, lost = (*dropped, *not_held(environment)), lost_passages(environment, grid, free)
+    return ExportReport(name, files, environment.free_area, area, dropped, notes, lost)

@@ -132,8 +132,8 @@ class _Shaper:
             base = filled(simplified(MultiPolygon([outer]), tolerance, cell, self.radius).free)
         free = rounded(simple.free, digits)
         if free.is_empty:
-            few = f"{read.area:.3g} m² are free, but more was wanted: is the scale right?"
-            raise MapError(f"{self.where}: {few}")
+            few = f"{read.area:.3g} m² are free, but more was wanted"
+            raise MapError(f"{self.where}: {few}: is the scale right?")
         self._require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT)
         moved, by = moved_walls(before, free)
         if by >= 1e-3:
@@ -217,6 +217,7 @@ class _Shaper:
 
     def _kept(self, free: MultiPolygon) -> list[Polygon]:
         parts, robots, shaping = np.array(free.geoms, dtype=object), self.foreign.robots, self.shaping
+        drop, note = self.dropped.append, self.notes.append
         area = shapely.area(parts)
         if shaping.keep == "all":
             stays = area >= max(self.specks, min(CRUMB, area[0]))
@@ -236,8 +237,7 @@ class _Shaper:
             most = int(np.argmax([shapely.contains(part, places).sum() for part in parts])) if robots else 0
             stays = np.arange(len(parts)) == most
             if most:
-                what = "the part of the free space with most robots"
-                self.notes.append(f"{what} stays, which is not the largest")
+                note("the part of the free space with most robots stays, which is not the largest")
         kept: list[Polygon] = parts[stays].tolist()
         left: list[Polygon] = parts[~stays].tolist()
         if not kept:
@@ -247,8 +247,7 @@ class _Shaper:
             )
         if left:
             largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
-            what = counted(len(left), "separate part")
-            self.dropped.append(f"{what} of the free space, {_squared(left)}{largest}")
+            drop(f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
             share = area[stays].sum() / area.sum()
             if share < _LITTLE or left[0].area / area.sum() > _CONSIDERABLE:
                 self.others = [_place_in(part) for part in left[:_OFFERED]]
@@ -257,15 +256,15 @@ class _Shaper:
                     for (x, y), part in zip(self.others, left, strict=False)
                 )
                 stay = f"{'only ' if share < _LITTLE else ''}{100 * share:.2g} % of the free area stays"
-                self.notes.append(f"{stay}: {choices} keeps another part, --keep all every part")
+                note(f"{stay}: {choices} keeps another part, --keep all every part")
         if len(kept) > 1:
-            what = f"the free space is of {len(kept)} separate parts"
-            self.notes.append(f"{what}: robots cannot pass between them")
+            note(f"the free space is of {len(kept)} separate parts: robots cannot pass between them")
         return kept
 
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
         cell, least = self.foreign.cell, self.specks
         crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
+        drop, note = self.dropped.append, self.notes.append
         result, specks, crumbs, tiny = [], [], [], 0
         for part in parts:
             holes = np.array([Polygon(hole) for hole in part.interiors], dtype=object)
@@ -278,13 +277,11 @@ class _Shaper:
             result.append(part if stays.all() else Polygon(part.exterior, rings))
         if specks:
             few = f"{counted(len(specks), 'obstacle')} smaller than {least:.3g} m²"
-            self.dropped.append(f"{few}, {_squared(specks)} (--specks 0 keeps them)")
+            drop(f"{few}, {_squared(specks)} (--specks 0 keeps them)")
         if crumbs:
-            what = f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}"
-            self.dropped.append(f"{what}, which come of rounding")
+            drop(f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}, which come of rounding")
         if tiny >= _MANY and least < _TINY:
-            few = f"{tiny} obstacles are smaller than {_TINY:g} m²"
-            self.notes.append(f"{few} (--specks {_TINY:g} drops them)")
+            note(f"{tiny} obstacles are smaller than {_TINY:g} m² (--specks {_TINY:g} drops them)")
         return result
 
     def _tolerance(self) -> float:
@@ -323,8 +320,8 @@ class _Shaper:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
         kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= SMALLEST]
         if len(kept) < len(solid):
-            what = counted(len(solid) - len(kept), "obstacle")
-            self.dropped.append(f"{what} thinner than {SMALLEST * 1000:g} mm")
+            thin = counted(len(solid) - len(kept), "obstacle")
+            self.dropped.append(f"{thin} thinner than {SMALLEST * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
         return [
             env.PolygonObstacle(self._ring(part.exterior), (*map(self._ring, part.interiors),))
@@ -518,8 +515,7 @@ def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
 def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[tuple[float, float], float]:
     """Return the place farthest from the walls, and how far that is, m; or any that is far `enough`.
 
-    Squares that may hold a place better by `tolerance` are cut into four, `_SQUARES` of the most promising:
-    where there are more, as in a long hall, another place may be a bit better.
+    Squares that may hold one better by `tolerance` are cut into four, the `_SQUARES` most promising of them.
     """
     sides = shapely.linestrings(sides_of(free))
     walls = STRtree(sides)

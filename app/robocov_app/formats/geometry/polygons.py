@@ -78,11 +78,10 @@ def sides_of(area: BaseGeometry) -> Array:
 def enclosed(
     rings: Sequence[Array], rule: Rule = "holes", crossings: Crossings | None = None
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
-    """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
+    """Return the valid area that rings, (k, 2) m, closed or not, enclose, the largest part first.
 
-    `rings`, (k, 2) m: closed or not. `crossings`: of the file so far; MapError when they are too many.
-    Returns the area, the largest part first; where rings of a polygon with holes meet, in words; and how many
-    holes take nothing out of it, by the reason.
+    Also where rings of a polygon with holes meet, in words, and how many holes take nothing out of it, by the
+    reason. `crossings`: of the file so far; MapError when they are too many.
     """
     crossings = Crossings() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
@@ -97,7 +96,14 @@ def enclosed(
     crossings.add(lines)
     if rule != "holes":
         return _filled(lines, rule), None, {}
-    area = _mended(rings, lost)
+    areas = [made_valid(Polygon(ring)) for ring in rings]
+    # of rings that run along themselves the parts may share an edge
+    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
+    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
+    lost["without an area"] += len(areas) - 1 - len(holes)
+    shapely.prepare(outer)
+    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
+    area = polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
     return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
 
 
@@ -119,18 +125,6 @@ def _has_three(ring: Array) -> bool:
     """Return whether there are three different points in a ring; ten times as fast as to sort them."""
     others = ring[(ring != ring[:1]).any(axis=1)]
     return bool((others != others[:1]).any())
-
-
-def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
-    """Return the area of a polygon that is not valid: of the outer ring, without those of the holes."""
-    areas = [made_valid(Polygon(ring)) for ring in rings]
-    # of rings that run along themselves the parts may share an edge
-    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
-    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
-    lost["without an area"] += len(areas) - 1 - len(holes)
-    shapely.prepare(outer)
-    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
-    return polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
 
 
 def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
@@ -199,10 +193,10 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
 def bounded(
     free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
 ) -> tuple[Polygon, list[Polygon]]:
-    """Return a boundary around `free`, whose coordinates have so many `digits`, and what is solid in it.
+    """Return a boundary around `free`, with coordinates of so many `digits`, and what is solid in it.
 
-    It is `given`, m, without holes, or else the outline of `free`, or of several parts the convex hull; or
-    the `hull` of that; with so much `margin`, m, around it.
+    It is `given`, m, without holes, or the outline of `free`, or of several parts the convex hull; or the
+    `hull` of that; with so much `margin`, m, around it.
     """
     parts = list(free.geoms)
     if given is not None:

@@ -47,10 +47,10 @@ def foreign_map(
 ) -> ForeignMap:
     """Return `cells`, (rows, columns), as a map.
 
-    `cell`, m: side of a cell. `origin`, m: lower left corner of the lower left one, about which the grid is
-    turned by `yaw`, rad. `unknown`: what unknown cells are, which the report calls `called`; with ``cut`` the
-    map ends around the known ones. `noise`: obstacles of fewer cells are noise. Raises MapError when no cell
-    is free, or the grid is too rough or too far away.
+    `cell`, m: side of one. `origin`, m: lower left corner of the grid, about which it is turned by `yaw`,
+    rad. `unknown`: what unknown cells are, which the report calls `called`; with ``cut`` the map ends around
+    the known ones. `noise`: obstacles of fewer cells are noise. MapError where no cell is free, or the grid
+    too rough.
     """
     rows, columns = cells.shape
 
@@ -140,9 +140,8 @@ def _share(number: int, total: int) -> str:
 def traced(free: BoolArray, where: str) -> MultiPolygon:
     """Return the union of the free cells, (rows, columns), one polygon for each of their connected parts.
 
-    Cell ``free[row, column]`` is the unit square whose lower left corner is (column, row). Every vertex is a
-    true corner, none lies within a straight wall, and no two rings touch: necks join obstacles that touch at
-    a corner. Raises MapError when there are more than `files.MAX_VERTICES`.
+    Cell ``free[row, column]`` is the unit square from (column, row) on. Every vertex is a true corner, and no
+    two rings touch: necks join obstacles that do. Raises MapError at more than `files.MAX_VERTICES`.
     """
     column, row, west, north, neck, north_east = _corners(free, where)
     if not len(row):
@@ -173,11 +172,10 @@ def traced(free: BoolArray, where: str) -> MultiPolygon:
 
 
 def _corners(free: BoolArray, where: str) -> list[Any]:
-    """Return column and row of each corner of the outline, row by row, and how the outline goes there, (k,).
+    """Return column and row of each corner of the outline, row by row, and how that goes there, (k,) each.
 
-    Whether its sides go west and north, how long its neck is, and whether the cell north-east of it is free.
-    Where two corners meet in a neck, each is one of a free cell, and the one with the side to the west stands
-    first.
+    Whether its sides go west and north, how long its neck is, whether the cell north-east is free. Of two in
+    one place the one with the side to the west stands first.
     """
     found = []
     count = 0
@@ -208,8 +206,7 @@ def _corners(free: BoolArray, where: str) -> list[Any]:
 def _rings(vertical: IntArray, outer: BoolArray) -> tuple[IntArray, IntArray]:
     """Return the corners ring by ring, and where each begins: at its first corner.
 
-    The free cells are on the left: from there an `outer` ring goes along its horizontal side, a hole along
-    the vertical one, to the corner `vertical`.
+    From there an `outer` ring goes along its horizontal side, a hole along the vertical one.
     """
     beyond, levels = vertical.tolist(), outer.tolist()
     fresh = bytearray(b"\x01") * len(beyond)

@@ -29,8 +29,7 @@ _DIGITS = 9
 class Figure:
     """A geometry of a file, before it is known what its coordinates are; `at` is its place, for messages.
 
-    `rule`: what the rings of a polygon enclose; see `polygons.enclosed`. `width`, m: of a line, where the
-    file says it.
+    `rule`: as of `polygons.enclosed`. `width`, m: of a line, where the file says it.
     """
 
     kind: Kind
@@ -52,10 +51,10 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An open or closed line, (k, 2) m, that is a wall; `cap` and `join` are shapely's words.
+    """A line, (k, 2) m, open or closed, that is a wall; `cap` and `join` are shapely's words.
 
-    `stretched`, (points, width, matrix) or None: a pen that is no circle: (k, 2) points and a width in other
-    units, and the (3, 3) matrix that makes them metres.
+    `stretched`: of a pen that is no circle, (k, 2) points, a width and the (3, 3) matrix that makes them
+    metres.
     """
 
     points: Array
@@ -91,9 +90,9 @@ class Line:
 class Shapes:
     """Shapes that a reader has found in the file `where`: checked, counted, chosen by name.
 
-    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: how many of which things are no part
-    of the map, and why, or had to be put right, and how. `labels`: as they are compared and as they are
-    written. `robots`, `notes`, `cell`: as of a `ForeignMap`.
+    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: counts of what is no part of the map
+    or was put right, and why. `labels`: as compared and as written. `robots`, `notes`, `cell`: of a
+    `ForeignMap`.
     """
 
     def __init__(self, where: str, options: ReadOptions) -> None:

@@ -116,8 +116,7 @@ class Outline(Rings):
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
     """Return `free`, m, valid, with fewer vertices; walls move by the tolerance, m, at most.
 
-    `cell`, m: side of the cells that it is the outline of. `radius`, m: of a robot: where it passes, it still
-    does.
+    `cell`, m: side of the cells that it is the outline of. `radius`, m: robots pass wherever they passed.
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)
@@ -164,11 +163,10 @@ def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
 
 
 class _Check:
-    """Validity checks of a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
+    """Checks of a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
 
-    `allowed`, (k,) m: the tolerance at each. `width`, m: of a robot. `found` counts what is wrong where that
-    is still the whole tolerance. `side`, (k,): the side of the drawing that stands for each vertex of the
-    outline, by its first vertex.
+    `allowed`, (k,) m: the tolerance at each; `found` counts what is wrong where that is still the whole one.
+    `width`, m: of a robot. `side`, (k,): the drawing's side that stands for each vertex, by its first one.
     """
 
     def __init__(
@@ -330,10 +328,10 @@ def _kept(path: Rings, allowed: Array, stays: BoolArray, most: Array) -> tuple[I
 
 
 def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Rings:
-    """Return `drawing` with the sides that stand for stairs in the middle of these, and corners whole.
+    """Return `drawing` with corners whole, and sides that stand for stairs in the middle of these.
 
-    Such a side becomes the line of least squares of the middles that it stands for, and its ends go
-    where it meets its neighbours. A short side between two long ones that meet nearby is a corner.
+    Such a side becomes the line of least squares of the middles that it stands for; it ends where that meets
+    its neighbours. A short side between two long ones that meet nearby is a corner.
     """
     points, after, before, length = drawing.points, drawing.after, drawing.before, drawing.lengths
     chord = drawing.sides / np.maximum(length, 1e-300)[:, None]
@@ -405,8 +403,8 @@ def with_necks(outline: Outline, drawing: Rings) -> Rings:
 def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
     """Return `drawing` with rings of the area that they had, where they lost or won much of it.
 
-    All sides of such a ring move by the same distance, of at most half the tolerance at its vertices. Small
-    round things need it: with few corners, each on their rim, they get smaller.
+    All sides of one move by the same distance, of at most half the tolerance. Small round things need it:
+    with few corners, each on their rim, they get smaller.
     """
     points, was, now = drawing.points, outline.areas, drawing.areas
     some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))

@@ -190,11 +190,9 @@ class _Drawing:
             if element not in counted:
                 inside.add(element)
                 target = self._target(element)
-                elements, shapes = 1, int(element.tag in _SHAPES)
-                for each in [*element.children, *([] if target is None else [target])]:
-                    more = count(each, depth + 1)
-                    elements, shapes = elements + more[0], shapes + more[1]
-                counted[element] = elements, shapes
+                drawn = [*element.children, *([] if target is None else [target])]
+                parts = [(1, int(element.tag in _SHAPES)), *(count(each, depth + 1) for each in drawn)]
+                counted[element] = sum(part[0] for part in parts), sum(part[1] for part in parts)
                 inside.discard(element)
             return counted[element]
 
