@@ -1,14 +1,12 @@
 """Foreign map formats, read and written.
 
-A format is one module with an `Importer`, an `Exporter` or both. What is read is a `ForeignMap`: what is
-free, as the file has it; `robocov_app.formats.geometry.conversion` makes the `Environment` of it, in the same
-way for all.
+A format is one module that reads, writes or does both, and a line in the tables here. What is read is a
+`ForeignMap`: what is free, as the file has it; `robocov_app.formats.geometry.conversion` makes the
+`Environment` of it, in the same way for all.
 """
 
-from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
 from robocov.environment import Environment
 from robocov.errors import MapError, ParameterError, counted, one_line, unknown_name
@@ -46,43 +44,80 @@ __all__ = [
     "ReadOptions", "Shaping", "WriteOptions", "detect", "export_map", "exporter", "import_map", "importer",
     "read_map", "shaped",
 ]  # fmt: skip
-
-_Format = TypeVar("_Format", Importer, Exporter)
-
-# the first whose `sniff` says yes has it: the surest come first
-_SURE = (irsim, ros, movingai, stage, argos, tmx, picture, osm, svg, dxf, wkt, geojson)
-
-IMPORTERS: dict[str, Importer] = {each.IMPORTER.name: each.IMPORTER for each in (*_SURE, houseexpo, rings)}
-"""The formats that can be read, by name."""
-
-_EXPORT = (ros, movingai, picture, svg, wkt, geojson)
-
-EXPORTERS: dict[str, Exporter] = {each.EXPORTER.name: each.EXPORTER for each in _EXPORT}
-"""The formats that can be written, by name."""
+_DRAWN = ("thickness", "pillar", "outlines", "boundary", "around", "only", "skip")  # options of drawings
+# the first whose `sniff` says yes has a file: the surest come first
+IMPORTERS: dict[str, Importer] = {each.name: each for each in (
+    # a .yaml is this by its content only
+    Importer("irsim", "IR-SIM: YAML of a world, robots and obstacles", (), irsim.sniff, irsim.read,
+             frozenset({"thickness", "anywhere", "only", "skip"})),
+    Importer("ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), ros.sniff, ros.read,
+             frozenset({"unknown", "threshold", "anywhere"})),
+    Importer("movingai", "MovingAI grid: .map", (".map",), movingai.sniff, movingai.read,
+             frozenset({"cell", "trees", "water"})),
+    Importer("stage", "Stage: .world with its includes and bitmaps", (".world",),
+             lambda path, head: path.suffix.lower() == ".world" and stage.MODELS.search(head) is not None,
+             stage.read, frozenset({"anywhere", "around", "only", "skip"})),
+    Importer("argos", "ARGoS: the arena of an experiment (.argos)", (".argos",),
+             lambda path, head: b"<argos-configuration" in head, argos.read, frozenset({"only", "skip"})),
+    Importer("tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",),
+             lambda path, head: tmx.ROOT.search(head) is not None and b"tilewidth" in head, tmx.read,
+             frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"})),
+    Importer("picture", "picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
+             (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
+             lambda path, head: picture.is_picture(head), picture.read,
+             frozenset({"cell", "unknown", "threshold", "invert"})),
+    Importer("osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",),
+             lambda path, head: osm.ROOT.match(head) is not None, osm.read,
+             frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"})),
+    Importer("svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
+             lambda path, head: svg.ROOT.search(head) is not None or path.suffix.lower() == ".svgz", svg.read,
+             frozenset({"scale", "thickness", "outlines", "boundary", "around", "only", "skip"})),
+    Importer("dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
+             lambda path, head: head.startswith(dxf.BINARY) or dxf.TEXT.match(head) is not None, dxf.read,
+             frozenset({"scale", *_DRAWN, "hatches"})),
+    Importer("wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
+             (".wkt", ".ewkt"), lambda path, head: wkt.BEGIN.match(head) is not None, wkt.read,
+             frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"})),
+    Importer("geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
+             lambda path, head: files.begins_with(head, b"{") and geojson.TYPE.search(head) is not None,
+             geojson.read, frozenset({"scale", "units", *_DRAWN})),
+    Importer("houseexpo", "HouseExpo floor plans (JSON with verts in metres)", (".json",),
+             lambda path, head: files.begins_with(head, b"{") and b'"verts"' in head, houseexpo.read),
+    Importer("rings", "lists of rings (JSON as earcut takes it): outline and holes", (".json",),
+             rings.sniff, rings.read, frozenset({"scale", "outlines", "around"})),
+)}  # fmt: skip
+# the formats that can be written
+EXPORTERS: dict[str, Exporter] = {each.name: each for each in (
+    Exporter("ros", "ROS map_server: YAML with a PGM or PNG", (".yaml", ".yml"), ros.write,
+             frozenset({"cell", "mode", "image"}), ros.files_of),
+    Exporter("movingai", "MovingAI grid: .map", (".map",), movingai.write, frozenset({"cell"})),
+    Exporter("picture", "picture: PNG in black and white, with its scale and place", (".png",), picture.write,
+             frozenset({"cell"})),
+    Exporter("svg", "SVG at true scale: boundary and obstacles by their ids", (".svg",), svg.write,
+             frozenset({"digits", "scale"})),
+    Exporter("wkt", "well-known text (JuPedSim): the free space as polygons with holes", (".wkt",), wkt.write,
+             frozenset({"digits"})),
+    Exporter("geojson", "GeoJSON: boundary and obstacles as features, in metres or degrees", (".geojson",),
+             geojson.write, frozenset({"digits", "origin"})),
+)}  # fmt: skip
 
 
 def importer(name: str) -> Importer:
-    """Return the format called `name`; the ParameterError where there is none names the nearest."""
-    return _named(IMPORTERS, name)
-
-
-def _named(formats: dict[str, _Format], name: str) -> _Format:
-    if name not in formats:
-        raise ParameterError(unknown_name("format", name, formats))
-    return formats[name]
+    if name not in IMPORTERS:
+        raise ParameterError(unknown_name("format", name, IMPORTERS))
+    return IMPORTERS[name]
 
 
 def detect(path: str | Path) -> Importer:
     """Return the format of the file at `path`: by its content, or else by its suffix."""
     path = Path(path)
     head = files.head(path)
-    kind = named_kind(path, head)
-    if kind is not None:
+    if (kind := named_kind(path, head)) is not None:
         raise MapError(f"{one_line(path)}: {one_line(kind)}")
     for candidate in IMPORTERS.values():
         if candidate.sniff(path, head):
             return candidate
-    named = [candidate for candidate in IMPORTERS.values() if path.suffix.lower() in candidate.suffixes]
+    named = [each for each in IMPORTERS.values() if path.suffix.lower() in each.suffixes]
     if len(named) == 1:  # its reader says best what is missing
         return named[0]
     wanted = f"one of {', '.join(IMPORTERS)} was wanted"
@@ -115,24 +150,16 @@ def read_map(
     """Return the foreign map at `path` as it was read; parameters and errors are those of `import_map`."""
     path = Path(path)
     chosen = detect(path) if format is None else importer(format)
-    _require_known(options.given(), chosen.options, chosen.name)
+    options.require_known(chosen)
     return chosen.read(path, options)
 
 
-def _require_known(given: Collection[str], known: Collection[str], name: str) -> None:
-    strange = [each for each in given if each not in known]
-    if strange:
-        words = ", ".join(f"--{each}" for each in sorted(known)) or "none"
-        raise ParameterError(f"--{strange[0]}: no option of the format {name}, whose options are: {words}")
-
-
 def exporter(path: str | Path, name: str | None = None) -> Exporter:
-    """Return the format called `name`, or else that of the suffix of `path`."""
-    if name is not None:
-        return _named(EXPORTERS, name)
+    if name is not None and name not in EXPORTERS:
+        raise ParameterError(unknown_name("format", name, EXPORTERS))
     suffix = Path(path).suffix.lower()
     for candidate in EXPORTERS.values():
-        if suffix in candidate.suffixes:
+        if candidate.name == name or (name is None and suffix in candidate.suffixes):
             return candidate
     known = ", ".join(suffix for candidate in EXPORTERS.values() for suffix in candidate.suffixes)
     raise ParameterError(f"{one_line(path)}: unknown format, but a file ending in one of {known} was wanted")
@@ -152,7 +179,7 @@ def export_map(
     """
     path = Path(path)
     chosen = exporter(path, format)
-    _require_known(options.given(), chosen.options, chosen.name)
+    options.require_known(chosen)
     report = chosen.write(environment, path, options)
     dropped = list(report.dropped)
     if environment.density is not None:

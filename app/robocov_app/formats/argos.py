@@ -2,6 +2,10 @@
 
 C. Pinciroli et al., ARGoS: a modular, parallel, multi-engine simulator for multi-robot systems, Swarm
 Intelligence 6 (2012), 271-295.
+
+Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places are
+a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is distributed at
+random is left out and counted: only ARGoS can tell from the seed where it puts it.
 """
 
 import math
@@ -14,7 +18,8 @@ from shapely import MultiPolygon
 from robocov.arrays import Array
 from robocov.errors import one_line, shown
 from robocov.mapfile.models import LARGEST
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.shapes import Shapes, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
@@ -22,55 +27,46 @@ MOST_PLACED = 4_000  # entities that a file places in a grid or at one place
 _UPRIGHT = 1e-6  # bodies that are turned about other axes than z by more are tilted, in degrees
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the arena of an experiment.
-
-    Boxes and cylinders are obstacles, whether they can be moved or not; other bodies are robots, whose places
-    are a start. Of what is distributed, the methods ``grid`` and ``constant`` are followed; what is
-    distributed at random is left out and counted: only ARGoS can tell from the seed where it puts it.
-    """
-    root, where = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    root = read_xml_tree(path, "argos-configuration", "an experiment of ARGoS")
     arena = root.child("arena")
     if arena is None:
-        root.refuse(where, "no <arena>, but one was wanted")
-    shapes = Shapes(where, options)
-    size = _lengths(arena, "size", where)[:2]
-    corner = arena.numbers(where, "center", count=3, default="0,0,0")[:2] - size / 2
+        root.refuse("no <arena>, but one was wanted")
+    shapes = Shapes(root.where, options)
+    size = _lengths(arena, "size")[:2]
+    corner = arena.numbers("center", count=3, default="0,0,0")[:2] - size / 2
     world = MultiPolygon([shapely.box(*corner, *(corner + size))])
     for child in arena.children:
         if child.tag == "distribute":
             _distribute(child, shapes)
         elif (body := child.child("body")) is not None:
-            position = body.numbers(where, "position", count=3, default="0,0,0")
-            _place(child, position, body.numbers(where, "orientation", count=3, default="0,0,0"), shapes)
-    text = "An arena of ARGoS, imported."
-    return foreign_map(shapes, IMPORTER.name, path.stem, text, solid=True, world=world)
+            position = body.numbers("position", count=3, default="0,0,0")
+            _place(child, position, body.numbers("orientation", count=3, default="0,0,0"), shapes)
+    return foreign_map(shapes, path.stem, "An arena of ARGoS, imported.", solid=True, world=world)
 
 
 def _distribute(element: Element, shapes: Shapes) -> None:
-    """Place what ARGoS would, where that is no matter of chance."""
-    where = shapes.where
     parts = {tag: element.child(tag) for tag in ("position", "orientation", "entity")}
     position, orientation, entity = parts.values()
     if position is None or orientation is None or entity is None or not entity.children:
-        element.refuse(where, "<position>, <orientation> and <entity> with something in it were wanted")
-    quantity = int(entity.numbers(where, "quantity", count=1)[0])
+        element.refuse("<position>, <orientation> and <entity> with something in it were wanted")
+    quantity = int(entity.numbers("quantity", count=1)[0])
     thing = entity.children[0]
     methods = [part.attributes.get("method", "") for part in (position, orientation)]
     if methods[0] not in ("grid", "constant") or methods[1] != "constant":
         shapes.leave_out(one_line(thing.tag)[:30], "that ARGoS places at random", max(quantity, 0))
         return
     if not 0 <= quantity <= MOST_PLACED:
-        entity.refuse(where, f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
-    turn = orientation.numbers(where, "values", count=3)
+        entity.refuse(f"quantity {quantity}, but a number from 0 to {MOST_PLACED} was wanted")
+    turn = orientation.numbers("values", count=3)
     if methods[0] == "constant":
-        places = [position.numbers(where, "values", count=3)] * quantity
+        places = [position.numbers("values", count=3)] * quantity
     else:
-        layout = position.numbers(where, "layout", count=3).astype(int)
+        layout = position.numbers("layout", count=3).astype(int)
         if not (layout > 0).all() or math.prod(layout.tolist()) < quantity:
-            position.refuse(where, f"layout {layout.tolist()}, but one for {quantity} was wanted")
-        gaps = position.numbers(where, "distances", count=3)
-        first = position.numbers(where, "center", count=3) + (layout - 1) * gaps / 2
+            position.refuse(f"layout {layout.tolist()}, but one for {quantity} was wanted")
+        gaps = position.numbers("distances", count=3)
+        first = position.numbers("center", count=3) + (layout - 1) * gaps / 2
         k = np.arange(quantity)
         steps = [k % layout[0], k // layout[0] % layout[1], k // (layout[0] * layout[1])]
         places = [*(first - np.column_stack(steps) * gaps)]
@@ -80,7 +76,7 @@ def _distribute(element: Element, shapes: Shapes) -> None:
 
 def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> None:
     """Add a body at a position, m, turned about z, y, x, degrees."""
-    where, tag = shapes.where, element.tag
+    tag = element.tag
     labels = [element.attributes.get("id", tag), tag]
     if not shapes.wants(labels):
         return
@@ -89,24 +85,16 @@ def _place(element: Element, position: Array, turn: Array, shapes: Shapes) -> No
     elif (np.abs((turn[1:] + 90) % 180 - 90) > _UPRIGHT).any():
         shapes.leave_out(tag, "that is tilted")
     elif tag == "box":
-        x, y = _lengths(element, "size", where)[:2] / 2
-        cos, sin = math.cos(math.radians(turn[0])), math.sin(math.radians(turn[0]))
-        ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) @ np.array([[cos, sin], [-sin, cos]])
-        shapes.add_outline([ring + position[:2]], labels, at=f"line {element.line}")
+        ring = UNIT_SQUARE * _lengths(element, "size")[:2]
+        place = frame(position[0], position[1], math.radians(turn[0]))
+        shapes.add_outline([moved(place, ring)], labels, at=f"line {element.line}")
     else:
-        radius = float(_lengths(element, "radius", where, count=1)[0])
+        radius = float(_lengths(element, "radius", count=1)[0])
         shapes.add_circle(position[:2], radius, labels, at=f"line {element.line}")
 
 
-def _lengths(element: Element, name: str, where: str, count: int = 3) -> Array:
-    values = element.numbers(where, name, count=count)
+def _lengths(element: Element, name: str, count: int = 3) -> Array:
+    values = element.numbers(name, count=count)
     if not (values[:2].min() >= 1e-6 and values[:2].max() <= LARGEST):
-        element.refuse(where, f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
+        element.refuse(f"{name} {shown(element.attributes[name])}, but lengths above 0 were wanted")
     return values
-
-
-IMPORTER = Importer(
-    "argos", "ARGoS: the arena of an experiment (.argos)", (".argos",),
-    lambda path, head: b"<argos-configuration" in head, _read,
-    options=frozenset({"only", "skip"}),
-)  # fmt: skip

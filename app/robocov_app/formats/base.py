@@ -1,7 +1,9 @@
 """Interface of a map format: reader, options, and reports of what became of a map."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -28,8 +30,8 @@ class ForeignMap:
 
     name: str
     description: str
-    format: str
     free: MultiPolygon
+    format: str = ""
     boundary: Polygon | None = None
     vertices_read: int = 0
     cell: float | None = None
@@ -42,32 +44,31 @@ class ForeignMap:
     notes: tuple[str, ...] = ()
 
 
+def square_metres(area: float, digits: int = 4) -> str:
+    """Return an area with so many digits, and never as a power of ten."""
+    return f"{area:.0f} m²" if area >= 1000 else f"{area:.{digits}g} m²"
+
+
 _KEYS = {name: f"{name}_m" for name in ("size", "tolerance", "moved")} | {"others": "other_parts_m"}
 _KEYS |= {name: f"{name}_m2" for name in ("area", "area_read", "area_kept", "area_written", "moved_area")}
 
 
-def document_of(report: Any) -> dict[str, Any]:
-    """Return a report, a dataclass, as a JSON document, with units in the key names."""
-    given = {_KEYS.get(each.name, each.name): getattr(report, each.name) for each in fields(report)}
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in given.items()}
+@dataclass(frozen=True)
+class _Report:
+    def _told(self, *kinds: str) -> list[str]:
+        return [f"{kind.removesuffix('s')}: {line}" for kind in kinds for line in getattr(self, kind)]
 
-
-def told(**lines: Iterable[str]) -> list[str]:
-    """Return lines, each after the word for its kind."""
-    return [f"{kind}: {line}" for kind, some in lines.items() for line in some]
-
-
-def square_metres(area: float, digits: int = 4) -> str:
-    """Return an area with so many digits, and never as a power of ten.
-
-    >>> square_metres(30083.2), square_metres(0.123456)
-    ('30083 m²', '0.1235 m²')
-    """
-    return f"{area:.0f} m²" if area >= 1000 else f"{area:.{digits}g} m²"
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as a JSON document, with units in the key names."""
+        document = {_KEYS.get(each.name, each.name): getattr(self, each.name) for each in fields(self)}
+        for key, value in document.items():
+            if isinstance(value, tuple):
+                document[key] = [str(each) if isinstance(each, Path) else each for each in value]
+        return document
 
 
 @dataclass(frozen=True)
-class ImportReport:
+class ImportReport(_Report):
     """Report on an imported map, so that nothing is repaired in silence; lengths in m, areas in m².
 
     `changed`: on purpose (simplified, grown). `size`: of the boundary. `tolerance`: by how much walls were
@@ -94,28 +95,43 @@ class ImportReport:
     notes: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """Return the report for people, one fact a line."""
         return [
             f"{self.format}: {self.vertices_read} vertices read, {self.vertices_kept} kept; "
             f"free area {square_metres(self.area_read)} read, {square_metres(self.area_kept)} kept",
             f"{self.size[0]:.4g} x {self.size[1]:.4g} m, {counted(self.obstacles, 'obstacle')}",
-            *told(repaired=self.repaired, dropped=self.dropped, changed=self.changed, note=self.notes),
+            *self._told("repaired", "dropped", "changed", "notes"),
         ]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the report as a JSON document, with units in the key names."""
-        return document_of(self)
+
+_LENGTH = (1e-6, 1e4, "m")
 
 
 @dataclass(frozen=True)
-class _Options:
-    def given(self) -> tuple[str, ...]:
-        """Return the names of the options that are not as by default."""
-        return tuple(each.name for each in fields(self) if getattr(self, each.name) != each.default)
+class Options:
+    """Parameters, each with a default."""
+
+    def require(self, **ranges: tuple[float, float, str]) -> None:
+        """Raise ParameterError where a value is out of its range, or none of the words of its type."""
+        for name, hint in get_type_hints(type(self)).items():
+            value = getattr(self, name)
+            kinds = (hint, *get_args(hint))
+            words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
+            if value is not None and name in ranges:
+                checked(name, value, *ranges[name])
+            if value is not None and words and value not in words:
+                raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(words)} was wanted")
+
+    def require_known(self, chosen: Importer | Exporter) -> None:
+        """Raise ParameterError where something is given that means nothing to a format."""
+        given = [each.name for each in fields(self) if getattr(self, each.name) != each.default]
+        if strange := [name for name in given if name not in chosen.options]:
+            words = ", ".join(f"--{each}" for each in sorted(chosen.options)) or "none"
+            known = f"no option of the format {chosen.name}, whose options are: {words}"
+            raise ParameterError(f"--{strange[0]}: {known}")
 
 
 @dataclass(frozen=True)
-class ReadOptions(_Options):
+class ReadOptions(Options):
     """What a file does not say of itself; what is not given is as its format has it."""
 
     cell: float | None = None
@@ -155,8 +171,8 @@ class ReadOptions(_Options):
     """Hatches are areas, as outlines are."""
 
     def __post_init__(self) -> None:
-        lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), (1e-6, 1e4, "m"))
-        check_options(self, lengths | {"threshold": (0.0, 1.0, "")})
+        lengths = dict.fromkeys(("cell", "scale", "thickness", "pillar", "around"), _LENGTH)
+        self.require(threshold=(0.0, 1.0, ""), **lengths)
 
 
 @dataclass(frozen=True)
@@ -164,7 +180,7 @@ class Importer:
     """A foreign format: its name as in ``--format``, a title for people, suffixes in lower case.
 
     ``sniff(path, head)``: whether a file that begins with these bytes (`files.HEAD` of them, or all) is of
-    it; cheap, and never raises. ``read(path, options)``: the map in it; a MapError of one line on whatever it
+    it; cheap, and never raises. ``reader(path, options)``: the map in it; a one-line MapError on whatever it
     cannot use, within a second and 200 MB. `options`: those of `ReadOptions` that mean something here.
     """
 
@@ -172,12 +188,15 @@ class Importer:
     title: str
     suffixes: tuple[str, ...]
     sniff: Callable[[Path, bytes], bool]
-    read: Callable[[Path, ReadOptions], ForeignMap]
+    reader: Callable[[Path, ReadOptions], ForeignMap]
     options: frozenset[str] = frozenset()
+
+    def read(self, path: Path, options: ReadOptions) -> ForeignMap:
+        return replace(self.reader(path, options), format=self.name)
 
 
 @dataclass(frozen=True)
-class WriteOptions(_Options):
+class WriteOptions(Options):
     """How a map is written; what is not given is as its format has it."""
 
     cell: float | None = None
@@ -194,27 +213,14 @@ class WriteOptions(_Options):
     """Longitude and latitude of [0, 0] m: GeoJSON in degrees. Needs pyproj: robocov[geo]."""
 
     def __post_init__(self) -> None:
-        length = (1e-6, 1e4, "m")
-        check_options(self, {"cell": length, "scale": length, "digits": (0, 12, "")})
+        self.require(cell=_LENGTH, scale=_LENGTH, digits=(0, 12, ""))
         if self.origin is not None and not (abs(self.origin[0]) <= 180.0 and abs(self.origin[1]) <= 89.0):
             wanted = "a longitude from -180 to 180 and a latitude from -89 to 89 were wanted"
             raise ParameterError(f"origin: {shown(self.origin)}, but {wanted}")
 
 
-def check_options(options: object, ranges: Mapping[str, tuple[float, float, str]]) -> None:
-    """Raise ParameterError where a field of a dataclass is out of its range, or none of its words."""
-    for name, hint in get_type_hints(type(options)).items():
-        value = getattr(options, name)
-        if value is not None and name in ranges:
-            checked(name, value, *ranges[name])
-        kinds = (hint, *get_args(hint))
-        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
-        if words and value is not None and value not in words:
-            raise ParameterError(f"{name}: {shown(value)}, but one of {', '.join(words)} was wanted")
-
-
 @dataclass(frozen=True)
-class ExportReport:
+class ExportReport(_Report):
     """What came of a map in a foreign format: files (that asked for first), free areas in m², and words.
 
     `dropped`: what the format cannot hold. `warnings`: where robots cannot drive any more.
@@ -229,17 +235,12 @@ class ExportReport:
     warnings: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
-        """Return the report for people, one fact a line."""
         area, of_it = square_metres(self.area), square_metres(self.area_written)
         return [
             f"{self.format}: free area {area}, written {of_it}",
-            *told(dropped=self.dropped, note=self.notes),
+            *self._told("dropped", "notes"),
             f"saved in {', '.join(str(file) for file in self.files)}",
         ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the report as a JSON document, with units in the key names."""
-        return document_of(self) | {"files": [str(file) for file in self.files]}
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,12 @@
-"""DXF drawings."""
+"""DXF drawings.
+
+Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for the
+boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option ``thickness``.
+Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out wherever they are
+inserted. Layers that are off or frozen, texts, dimensions and what has a third dimension are left out; so are
+hatches without the option ``hatches``. Curves become lines that stay within a millimetre. The option
+``scale`` overrules the unit of the header; one of them is needed.
+"""
 
 import logging
 import math
@@ -16,14 +24,13 @@ from robocov.errors import MapError, RobocovError, one_line, shown
 from robocov.extras import extra
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.curves import MOST_POINTS, TOLERANCE, sampled
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 
 MOST_LINES = 8_000_000  # of text: a line of the drawing takes about 24, a vertex 4
 MOST_ENTITIES = 50_000  # in the file, on any layer: ezdxf takes an eighth of a millisecond and 5 kB for each
 MOST_DRAWN = 200_000  # that are drawn, blocks and all
-
 UNITS = {
     1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 0.001),
     5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1000.0), 9: ("mils", 2.54e-5),
@@ -32,11 +39,10 @@ UNITS = {
 }  # fmt: skip
 """Units of the header's $INSUNITS, with their metres."""
 
-_BINARY = b"AutoCAD Binary DXF"
-_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
+BINARY = b"AutoCAD Binary DXF"
+TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION\b")
 _ENTITY = re.compile(rb"\n[ \t]*0[ \t]*\r?\n[ \t]*[A-Z]")
 _POINT = re.compile(rb"\n[ \t]*10[ \t]*\r?\n")
-
 _BULGE = 1e-9  # edges of polylines that are bent less are straight
 _FRAME = 16  # flag of a vertex that only shapes the spline of an old polyline
 _LEVEL = 1.0 - 1e-9  # upward part of the direction, of length 1, that a circle is seen from as one
@@ -44,10 +50,7 @@ _CLOSED = 1e-9  # curves whose ends are nearer, in parts of their coordinates, a
 
 
 def polyline(points: Array, bulges: Array, tolerance: float) -> Array:
-    """Return points of a polyline, (k, 2); the bulge of each point is of the edge after it.
-
-    A bulge is the tangent of a quarter of the angle that the edge is an arc over, positive to the left.
-    """
+    """Return points of a polyline, (k, 2); the bulge of an edge after one is tan(angle / 4), to the left."""
     arcs = extra("ezdxf.math", "dxf")
     drawn = [points[:1]]
     left = float(MOST_POINTS)
@@ -98,12 +101,10 @@ class DxfDrawing:
         self.tolerance = TOLERANCE / scale
         self.drawn = 0
         self.curved = False
-        self._hidden = {
-            str(layer.dxf.name).casefold() for layer in document.layers if layer.is_off() or layer.is_frozen()
-        }
+        hidden = (layer for layer in document.layers if layer.is_off() or layer.is_frozen())
+        self._hidden = {str(layer.dxf.name).casefold() for layer in hidden}
 
     def draw(self) -> None:
-        """Add all that is drawn, and a word about it."""
         space = self.document.modelspace()
         self._require_few(space)
         self._draw(space, "0", ())
@@ -112,6 +113,7 @@ class DxfDrawing:
 
     def _require_few(self, space: Iterable[Any]) -> None:
         """Count what will be drawn, blocks and all, without drawing it: a few kB may stand for billions."""
+        where, deepest = self.where, files.MAX_DEPTH
         counted: dict[str, int] = {}
         inside: list[str] = []
 
@@ -121,11 +123,10 @@ class DxfDrawing:
         def count_insert(insert: Any) -> int:
             name = str(insert.dxf.get("name", "")).casefold()
             if name in inside:
-                what = f"block {shown(name)} is inserted within itself, but an end was wanted"
-                raise MapError(f"{self.where}: {what}")
-            if len(inside) >= files.MAX_DEPTH:
-                what = f"blocks nested deeper than {files.MAX_DEPTH}"
-                raise MapError(f"{self.where}: {what}, but less was wanted")
+                what = "is inserted within itself, but an end was wanted"
+                raise MapError(f"{where}: block {shown(name)} {what}")
+            if len(inside) >= deepest:
+                raise MapError(f"{where}: blocks nested deeper than {deepest}, but less was wanted")
             if name not in counted:
                 block = self.document.blocks.get(name)
                 inside.append(name)
@@ -137,8 +138,8 @@ class DxfDrawing:
         total = count(space)
         if total > MOST_DRAWN:
             # of blocks in blocks it may be too many for a float
-            what = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
-            raise MapError(f"{self.where}: {what}, but at most {MOST_DRAWN} were wanted")
+            found = f"{min(total, 10**300):.3g} entities to be drawn, blocks and all"
+            raise MapError(f"{where}: {found}, but at most {MOST_DRAWN} were wanted")
 
     def _draw(self, entities: Iterable[Any], layer: str, blocks: tuple[str, ...]) -> None:
         """Add entities; those on layer 0 of a block are on the layer that it is inserted on."""
@@ -147,7 +148,8 @@ class DxfDrawing:
             if self.drawn > MOST_DRAWN:
                 raise MapError(f"{self.where}: more than {MOST_DRAWN} entities, but fewer were wanted")
             try:
-                self._one(entity, layer, blocks)
+                own = str(entity.dxf.get("layer", "0"))
+                self._one(entity, layer if own == "0" and blocks else own, blocks)
             except RobocovError:
                 raise
             except Exception as error:  # of ezdxf, which raises what it likes on nonsense
@@ -155,52 +157,45 @@ class DxfDrawing:
                 self.shapes.leave_out("damaged shape", f"({kind}: {type(error).__name__})")
 
     def _one(self, entity: Any, layer: str, blocks: tuple[str, ...]) -> None:
-        """Add an entity, or what a block holds; see `_draw`."""
-        own = str(entity.dxf.get("layer", "0"))
-        own = layer if own == "0" and blocks else own
-        kind = entity.dxftype()
-        if own.casefold() in self._hidden or entity.dxf.get("invisible", 0):
-            self.shapes.leave_out("shape", "hidden, or on layers that are off")
-        elif kind == "INSERT":
-            self._insert(entity, own, blocks)
-        elif kind == "MLINE":
-            self._draw(entity.virtual_entities(), own, blocks)
-        elif self.shapes.wants(labels := (own, *reversed(blocks))):
-            self._add(kind, entity, labels)
-
-    def _insert(self, insert: Any, layer: str, blocks: tuple[str, ...]) -> None:
-        block = insert.block()
-        if block is None or block.block.is_xref:
-            self.shapes.leave_out("block", "missing from the file")
-            return
-        for single in insert.multi_insert() if insert.mcount > 1 else (insert,):
-            self._draw(single.virtual_entities(), layer, (*blocks, str(insert.dxf.name)))
-
-    def _add(self, kind: str, entity: Any, labels: tuple[str, ...]) -> None:
+        """Add an entity, or what a block holds."""
+        shapes, kind, labels = self.shapes, entity.dxftype(), (layer, *reversed(blocks))
         at = one_line(f"{kind} {entity.dxf.handle}" if entity.dxf.get("handle") else kind)[:60]
-        if kind == "LINE":
-            ends = self._metres([entity.dxf.start, entity.dxf.end])
-            self.shapes.add_line(Line(ends, self.shapes.thickness, labels), at=at)
+        if layer.casefold() in self._hidden or entity.dxf.get("invisible", 0):
+            shapes.leave_out("shape", "hidden, or on layers that are off")
+        elif kind == "INSERT":
+            block = entity.block()
+            if block is None or block.block.is_xref:
+                shapes.leave_out("block", "missing from the file")
+                return
+            for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
+                self._draw(single.virtual_entities(), layer, (*blocks, str(entity.dxf.name)))
+        elif kind == "MLINE":
+            self._draw(entity.virtual_entities(), layer, blocks)
+        elif not shapes.wants(labels):
+            return
         elif kind == "POINT":
-            self.shapes.add_point(self._metres([entity.dxf.location])[0], at=at)
-        elif kind in ("CIRCLE", "ARC"):
-            self._arc(kind, entity, labels, at)
-        elif kind == "ELLIPSE":
-            self._require_near(flat([entity.dxf.center, entity.dxf.major_axis]))
-            self._curve(flat(list(entity.flattening(self.tolerance))), labels, at)
-        elif kind == "SPLINE":
-            self._require_near(flat([*entity.control_points, *entity.fit_points]))
-            self._curve(spline(entity, self.tolerance), labels, at)
-        elif kind in ("LWPOLYLINE", "POLYLINE"):
-            self._polyline(kind, entity, labels, at)
+            shapes.add_point(self._metres([entity.dxf.location])[0], at=at)
         elif kind in ("SOLID", "TRACE"):
-            self.shapes.add_outline([self._metres(entity.wcs_vertices())], labels, rule="evenodd", at=at)
-        elif kind == "HATCH" and self.shapes.options.hatches:
-            self._hatch(entity, labels, at)
+            shapes.add_outline([self._metres(entity.wcs_vertices())], labels, rule="evenodd", at=at)
+        elif kind == "HATCH" and shapes.options.hatches:
+            shapes.add_outline(self._hatch(entity), labels, rule="evenodd", at=at)
         elif kind == "HATCH":
-            self.shapes.leave_out("HATCH", "(--hatches takes them as areas)")
+            shapes.leave_out("HATCH", "(--hatches takes them as areas)")
+        elif kind == "CIRCLE" and entity.dxf.radius and abs(entity.ocs().uz.z) > _LEVEL:
+            radius = self._radius(entity)
+            self.curved = True
+            (middle,) = self._metres([entity.ocs().to_wcs(entity.dxf.center)])
+            shapes.add_circle(middle, radius * self.scale, labels, at=at)
+        elif kind in ("LWPOLYLINE", "POLYLINE"):
+            self._polyline(entity, labels, at)
+        elif kind == "LINE":
+            self._line(self._metres([entity.dxf.start, entity.dxf.end]), labels, at)
+        elif (curve := self._curve(kind, entity)) is not None:
+            self.curved = True
+            self._require_near(curve)
+            self._line(curve * self.scale, labels, at)
         else:
-            self.shapes.leave_out(one_line(kind)[:40])
+            shapes.leave_out(one_line(kind)[:40])
 
     def _metres(self, points: Sequence[Any]) -> Array:
         """Return points of the drawing as (k, 2) m; third coordinates are told of."""
@@ -213,10 +208,22 @@ class DxfDrawing:
         if not (np.abs(points) * self.scale <= FARTHEST).all():
             raise MapError(f"{self.where}: a curve beyond {FARTHEST:.0f} m, but a nearer one was wanted")
 
-    def _curve(self, points: Array, labels: tuple[str, ...], at: str) -> None:
-        self.curved = True
-        self._require_near(points)
-        self._line(points * self.scale, labels, at)
+    def _radius(self, entity: Any) -> float:
+        radius = abs(float(entity.dxf.radius))
+        self._require_near(np.array([*flat([entity.dxf.center]), [radius, radius]]))
+        return radius
+
+    def _curve(self, kind: str, entity: Any) -> Array | None:
+        """Return points of a curve, (k, 2); None of what is none."""
+        if kind in ("CIRCLE", "ARC"):
+            return flat(list(entity.flattening(min(self.tolerance, self._radius(entity) / 8))))
+        if kind == "ELLIPSE":
+            self._require_near(flat([entity.dxf.center, entity.dxf.major_axis]))
+            return flat(list(entity.flattening(self.tolerance)))
+        if kind == "SPLINE":
+            self._require_near(flat([*entity.control_points, *entity.fit_points]))
+            return spline(entity, self.tolerance)
+        return None
 
     def _line(self, points: Array, labels: tuple[str, ...], at: str, width: float = 0.0) -> None:
         """Add (k, 2) m: an outline where they close and have no width, else a wall."""
@@ -231,30 +238,23 @@ class DxfDrawing:
         drawn = width * self.scale if width > 0.0 and given is None else self.shapes.thickness
         self.shapes.add_line(Line(points, drawn, labels), at=at)
 
-    def _arc(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        centre, radius = entity.dxf.center, abs(float(entity.dxf.radius))
-        self._require_near(np.array([[centre[0], centre[1]], [radius, radius]]))
-        if kind == "CIRCLE" and radius > 0.0 and abs(entity.ocs().uz.z) > _LEVEL:
-            self.curved = True
-            (middle,) = self._metres([entity.ocs().to_wcs(centre)])
-            self.shapes.add_circle(middle, radius * self.scale, labels, at=at)
-            return
-        self._curve(flat(list(entity.flattening(min(self.tolerance, radius / 8)))), labels, at)
-
-    def _polyline(self, kind: str, entity: Any, labels: tuple[str, ...], at: str) -> None:
+    def _polyline(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
         """Add a polyline with its bulges: columns are x, y, bulge and the widths at both ends of an edge."""
-        plane, height = entity.ocs(), 0.0
-        if kind == "LWPOLYLINE":
-            rows = np.array(entity.get_points("xybse"), dtype=float).reshape(-1, 5)
-            closed, width = bool(entity.closed), float(entity.dxf.get("const_width", 0.0))
-            height = float(entity.dxf.get("elevation", 0.0))
+        plane, height, dxf = entity.ocs(), 0.0, entity.dxf
+        if entity.dxftype() == "LWPOLYLINE":
+            rows = entity.get_points("xybse")
+            closed, width = bool(entity.closed), float(dxf.get("const_width", 0.0))
+            height = float(dxf.get("elevation", 0.0))
         elif entity.is_2d_polyline or entity.is_3d_polyline:
-            rows = _rows(entity)
-            closed, width = bool(entity.is_closed), float(entity.dxf.get("default_start_width", 0.0))
+            parts = [each.dxf for each in entity.vertices if not int(each.dxf.get("flags", 0)) & _FRAME]
+            more = ("bulge", "start_width", "end_width")
+            rows = [(*part.location.vec2, *(float(part.get(key, 0.0)) for key in more)) for part in parts]
+            closed, width = bool(entity.is_closed), float(dxf.get("default_start_width", 0.0))
             plane = plane if entity.is_2d_polyline else None
         else:
             self.shapes.leave_out("mesh")
             return
+        rows = np.array(rows, dtype=float).reshape(-1, 5)
         if closed:
             rows = np.concatenate([rows, rows[:1]])
         if len(rows) < 2:
@@ -269,38 +269,18 @@ class DxfDrawing:
         width = max(width, float(rows[:, 3:].max()))
         self._line(points * self.scale, labels, at, width)
 
-    def _hatch(self, entity: Any, labels: tuple[str, ...], at: str) -> None:
-        """Add the area within the boundary paths of a hatch, as ezdxf approximates them."""
+    def _hatch(self, entity: Any) -> list[Array]:
+        """Return the boundary paths of a hatch, as ezdxf approximates them."""
         from ezdxf.path import from_hatch
 
         rings = []
         for path in from_hatch(entity):
             self._require_near(flat(path.control_vertices()))
             rings.append(self._metres(list(path.flattening(self.tolerance))))
-        self.shapes.add_outline(rings, labels, rule="evenodd", at=at)
+        return rings
 
 
-def _rows(entity: Any) -> Array:
-    """Return the vertices of an old polyline as rows of x, y, bulge, and widths; not its spline's frame."""
-    found = []
-    for vertex in entity.vertices:
-        place = vertex.dxf.location
-        if not int(vertex.dxf.get("flags", 0)) & _FRAME:
-            others = (float(vertex.dxf.get(key, 0.0)) for key in ("bulge", "start_width", "end_width"))
-            found.append((place.x, place.y, *others))
-    return np.array(found, dtype=float).reshape(-1, 5)
-
-
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that the model space of a DXF file draws.
-
-    Closed outlines (polylines, circles, ellipses, closed splines, filled quadrilaterals) are solid, but for
-    the boundary; lines, arcs and open polylines are walls as wide as they are drawn, or as the option
-    ``thickness``. Names are those of layers and blocks: see `shapes.foreign_map`. Blocks are carried out
-    wherever they are inserted. Layers that are off or frozen, texts, dimensions and what has a third
-    dimension are left out; so are hatches without the option ``hatches``. Curves become lines that stay
-    within a millimetre. The option ``scale`` overrules the unit of the header; one of them is needed.
-    """
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     _check(path, where)
     document = _document(path, where)
@@ -317,14 +297,13 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     DxfDrawing(document, shapes, scale).draw()
     shapes.join_lines()
     files.require_shapes(len(shapes.lines) + len(shapes.outlines), where)
-    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), "Imported from DXF.", solid=True)
+    return foreign_map(shapes, files.name_of_map(path), "Imported from DXF.", solid=True)
 
 
 def _check(path: Path, where: str) -> None:
-    """Refuse what would take long, before ezdxf sees it."""
     content = files.content(path, files.MAX_TEXT_BYTES)
-    if not content.startswith(_BINARY):
-        if not _TEXT.match(content):
+    if not content.startswith(BINARY):
+        if not TEXT.match(content):
             raise MapError(f"{where}: begins with {content[:20]!r}, but a DXF with sections was wanted")
         if sum(1 for _ in islice(_ENTITY.finditer(content), MOST_ENTITIES + 1)) > MOST_ENTITIES:
             raise MapError(f"{where}: more than {MOST_ENTITIES} entities, but fewer layers were wanted")
@@ -349,12 +328,3 @@ def _document(path: Path, where: str) -> Any:
         except Exception as error:  # it raises what it likes on nonsense
             reason = one_line(error) or type(error).__name__
     raise MapError(f"{where}: no DXF that can be read: {reason[:200]}")
-
-
-IMPORTER = Importer(
-    "dxf", "DXF drawings (with ezdxf): closed outlines, lines as walls, blocks", (".dxf",),
-    lambda path, head: head.startswith(_BINARY) or _TEXT.match(head) is not None, _read,
-    options=frozenset(
-        {"scale", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip", "hatches"}
-    ),
-)  # fmt: skip

@@ -6,17 +6,20 @@ anything but text: what a value is, who asks for it decides.
 
 import codecs
 import stat
+import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path, PureWindowsPath
 from typing import Any, TypeAlias
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from robocov.arrays import Array
 from robocov.errors import JsonPath as Steps
-from robocov.errors import MapError, Mistake, one_line, shown, shown_json
+from robocov.errors import MapError, Mistake, one_line, reason, shown, shown_json
 from robocov.files.strictjson import located, parse
 from robocov.mapfile.models import FARTHEST, LARGEST
 
@@ -43,8 +46,7 @@ def head(path: Path, most: int = HEAD) -> bytes:
     except FileNotFoundError:
         raise MapError(f"{where}: no such file") from None
     except (OSError, ValueError) as error:
-        reason = one_line(getattr(error, "strerror", None) or error)
-        raise MapError(f"{where}: cannot be read: {reason}") from None
+        raise MapError(f"{where}: cannot be read: {reason(error)}") from None
 
 
 def content(path: Path, most: int = MAX_BYTES) -> bytes:
@@ -56,7 +58,6 @@ def content(path: Path, most: int = MAX_BYTES) -> bytes:
 
 
 def require_cells(width: int, height: int, where: str) -> None:
-    """Check the size of a raster as its header gives it: from 1 x 1 to `MAX_CELLS`."""
     if width < 1 or height < 1:
         raise MapError(f"{where}: {width} x {height} cells, but at least 1 x 1 was wanted")
     if width * height > MAX_CELLS:
@@ -65,29 +66,23 @@ def require_cells(width: int, height: int, where: str) -> None:
 
 
 def require_vertices(count: int, where: str) -> None:
-    """Check the number of vertices of a map, or the least that it can be: at most `MAX_VERTICES`."""
     if count > MAX_VERTICES:
         raise MapError(f"{where}: some {count} vertices, but at most {MAX_VERTICES} were wanted")
 
 
 def require_shapes(count: int, where: str) -> None:
-    """Check the number of shapes of a drawing: at most `MAX_SHAPES`."""
     if count > MAX_SHAPES:
         raise MapError(f"{where}: {count:.6g} shapes, but at most {MAX_SHAPES} were wanted")
 
 
 def require_length(value: float, where: str, smallest: float = 1e-6, largest: float = LARGEST) -> None:
-    """Check a length in metres: a cell, a thickness, a unit."""
     if not smallest <= value <= largest:
-        wanted = f"a number from {smallest:g} to {largest:g} (m) was wanted"
+        wanted = f"a number from {smallest:.10g} to {largest:.10g} (m) was wanted"
         raise MapError(f"{where}: {shown(value)}, but {wanted}")
 
 
 def require_coordinate(value: float, where: str) -> None:
-    """Check a coordinate in metres: within `FARTHEST`."""
-    if not abs(value) <= FARTHEST:
-        wanted = f"a number from {-FARTHEST:.0f} to {FARTHEST:.0f} (m) was wanted"
-        raise MapError(f"{where}: {shown(value)}, but {wanted}")
+    require_length(value, where, -FARTHEST, FARTHEST)
 
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
@@ -106,19 +101,19 @@ def read_text(path: Path, separator: bytes) -> tuple[str, str]:
 
 
 def name_of_map(path: Path) -> str:
-    """Return what a map in a file is called that gives no name."""
     return one_line(path.stem)[:60] or "map"
 
 
 _LONG = 400  # longest name of a file, in characters
 
 
-def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> tuple[Path, str | None]:
-    """Return the file that the one at `path` names, and what was put right about it.
+def named_file(
+    path: Path, name: str, what: str, at: str, notes: list[str], *, anywhere: bool = False
+) -> Path:
+    """Return the file that the one at `path` names, a `what`, at the place `at`.
 
-    It must be in the file's folder or below. Programs write where it was when it was saved, often from the
-    root, and it may have moved with the file: one of the same name beside it is as good. `anywhere`: whether
-    it may be outside of that folder. `at`, `what`: the place that names it, and what kind of file it is.
+    It must be in the file's folder or below, unless it may be `anywhere`. Programs write where it was when it
+    was saved, and it may have moved with the file: one of the same name beside it is as good, as `notes` say.
     """
     if not name:
         raise MapError(f"{at}: empty, but the name of a {what} was wanted")
@@ -130,14 +125,16 @@ def named_file(path: Path, name: str, *, anywhere: bool, at: str, what: str) -> 
         allowed = anywhere or _inside(named, path.parent)
         if not (allowed and _exists(named)) and beside.is_file() and _inside(beside, path.parent):
             key = at.rpartition(": ")[2]
-            return beside, f"{key}: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
+            note = f"{key}: {shown(name)} is not there, {shown(beside.name)} beside the file taken"
+            notes += [] if note in notes else [note]
+            return beside
     except (OSError, ValueError, RuntimeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
-        raise MapError(f"{at}: {shown(name)}: {reason}") from None
+        why = error.strerror if isinstance(error, OSError) and error.strerror else "no name of a file"
+        raise MapError(f"{at}: {shown(name)}: {why}") from None
     if not allowed:
         wanted = f"a {what} in it was wanted (--anywhere allows it)"
         raise MapError(f"{at}: {shown(name)} is outside of the file's folder, but {wanted}")
-    return named, None
+    return named
 
 
 def _inside(named: Path, folder: Path) -> bool:
@@ -146,55 +143,59 @@ def _inside(named: Path, folder: Path) -> bool:
 
 def _exists(named: Path) -> bool:
     """Return whether there is such a file; an OSError where that cannot be known, as from a name too long."""
-    try:
+    with suppress(FileNotFoundError, NotADirectoryError):
         named.stat()
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    return True
+        return True
+    return False
 
 
-_BEFORE = b"\xef\xbb\xbf \t\r\n"
+def number(text: str) -> float:
+    """Return the number that a text is, nan where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return np.nan
+
+
+def whole_numbers(text: str | bytes, separator: str) -> NDArray[np.int64] | None:
+    """Return the numbers in a text, None where there is anything else."""
+    with warnings.catch_warnings(), suppress(DeprecationWarning, ValueError, OverflowError):
+        warnings.simplefilter("error", DeprecationWarning)
+        return np.fromstring(text, dtype=np.int64, sep=separator) if text.strip() else np.empty(0, np.int64)
+    return None
 
 
 def begins_with(head: bytes, bracket: bytes) -> bool:
-    """Return whether a file that begins with `head` begins with that bracket, spaces apart."""
-    return head.lstrip(_BEFORE)[:1] == bracket
+    return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == bracket
 
 
-def read_json(path: Path) -> tuple[Any, bytes, str]:
-    """Return what the JSON file at `path` holds, its content, and what messages call it."""
-    where = one_line(path)
-    data = content(path, MAX_TEXT_BYTES)
-    # each point is a list of two or three: to count takes a moment, to parse minutes
-    require_vertices(max(data.count(b"["), data.count(b",") // 3), where)
-    return parse(data, where), data, where
+class JsonFile:
+    """The `document` in a JSON file, what messages call the file, and errors with lines and columns."""
 
+    def __init__(self, path: Path) -> None:
+        self.where = one_line(path)
+        self._content = content(path, MAX_TEXT_BYTES)
+        # each point is a list of two or three: to count takes a moment, to parse minutes
+        require_vertices(max(self._content.count(b"["), self._content.count(b",") // 3), self.where)
+        self.document: Any = parse(self._content, self.where)
 
-@contextmanager
-def located_errors(content: bytes, where: str) -> Iterator[None]:
-    """Give a context in which errors about the document in `content` get lines and columns."""
-    try:
-        yield
-    except MapError as error:
-        raise located(error, content, where) from None
+    def refused(self, at: Steps, value: object, wanted: str) -> MapError:
+        """Return the error of a value at a place: what is there, what was wanted."""
+        mistake = Mistake.at(at, f"{shown_json(value)}, but {wanted} wanted")
+        return located(MapError.of(self.where, [mistake]), self._content, self.where)
 
-
-def positions(value: Any, at: Steps, where: str, *, least: int, dimensions: tuple[int, int]) -> Array:
-    """Return the points of a JSON list as (k, d); missing dimensions are nan.
-
-    At least so many points, each of at least and at most so many `dimensions`; d is the most that there are.
-    """
-    if not isinstance(value, list) or len(value) < least:
-        points = "point" if least == 1 else "points"
-        raise refused(where, at, value, f"a list of at least {least} {points} [x, y] was wanted")
-    low, high = dimensions
-    for k, point in enumerate(value):
-        if not (isinstance(point, list) and low <= len(point) <= high and all(map(is_number, point))):
-            raise refused(where, (*at, k), point, "a point [x, y] of finite numbers was wanted")
-    wide = max(map(len, value), default=low)
-    if min(map(len, value), default=low) < wide:
-        value = [[*point, *[np.nan] * (wide - len(point))] for point in value]
-    return np.array(value, dtype=float).reshape(-1, wide)
+    def positions(self, value: Any, at: Steps, least: int, fewest: int, most: int) -> Array:
+        """Return the points of a list as (k, d), d from `fewest` to `most`; missing dimensions are nan."""
+        if not isinstance(value, list) or len(value) < least:
+            points = "point" if least == 1 else "points"
+            raise self.refused(at, value, f"a list of at least {least} {points} [x, y] was")
+        for k, point in enumerate(value):
+            if not (isinstance(point, list) and fewest <= len(point) <= most and all(map(is_number, point))):
+                raise self.refused((*at, k), point, "a point [x, y] of finite numbers was")
+        wide = max(map(len, value))
+        if min(map(len, value)) < wide:
+            value = [[*point, *[np.nan] * (wide - len(point))] for point in value]
+        return np.array(value, dtype=float)
 
 
 def is_number(value: object) -> bool:
@@ -202,86 +203,63 @@ def is_number(value: object) -> bool:
     return type(value) in (int, float) and -1e100 < value < 1e100  # type: ignore[operator]
 
 
-def refused(where: str, at: Steps, value: object, wanted: str) -> MapError:
-    """Return the error of a value at a place: what is there, what was wanted."""
-    return MapError.of(where, [Mistake.at(at, f"{shown_json(value)}, but {wanted}")])
-
-
+# text as it is written, or a list or a mapping of values
 Value: TypeAlias = "str | list[Value] | dict[str, Value]"
-"""Text as it is written, or a list or a mapping of values."""
-
 MAX_YAML_BYTES = 262_144  # which take a second to read: a map has 200, a world some thousand
 DEEPEST = 12  # deepest nesting of lists and mappings
 
 
 def parse_yaml(text: bytes, where: str) -> dict[str, Value]:
-    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice.
-
-    >>> parse_yaml(b"image: a.pgm\\norigin: [0, 1.5, 0]", "map.yaml")
-    {'image': 'a.pgm', 'origin': ['0', '1.5', '0']}
-    """
+    """Return the mapping in a text of UTF-8, without tags, anchors, aliases and keys that stand twice."""
     if len(text) > MAX_YAML_BYTES:
         raise MapError(f"{where}: larger than {MAX_YAML_BYTES // 1024} kB, but the YAML of a map was wanted")
     try:
         decoded = text.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MapError(f"{where}: byte {error.start}: not UTF-8, but YAML in UTF-8 was wanted") from None
+    result: Any = {}
     try:
-        return _mapping(decoded, where)
+        events = _events(decoded, where)
+        for event, line in events:
+            if isinstance(event, yaml.DocumentStartEvent) and result:
+                raise MapError(f"{line}: a second document, but one was wanted")
+            if isinstance(event, yaml.SequenceStartEvent | yaml.ScalarEvent):
+                found = shown(event.value) if isinstance(event, yaml.ScalarEvent) else "a list"
+                raise MapError(f"{line}: {found}, but a mapping (name: value) was wanted")
+            if isinstance(event, yaml.MappingStartEvent):
+                result = _value(event, line, events)
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark is not None else ""
         raise MapError(f"{where}: {line}not YAML: {one_line(error.problem or error.context)}") from None
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise MapError(f"{where}: not YAML: {one_line(error)[:200]}") from None
+    return result  # type: ignore[no-any-return]
 
 
-def _mapping(text: str, where: str) -> dict[str, Value]:
-    result: dict[str, Value] = {}
-    # the collections that are open, each with the name that waits for its value
-    path: list[tuple[list[Value] | dict[str, Value], str | None]] = []
-    # the events come as they are read: a bomb is refused at its first fuse
+def _events(text: str, where: str) -> Iterator[tuple[Any, str]]:
+    """Yield events as they are read, with their lines: a bomb is refused at its first fuse."""
     for event in yaml.parse(text, Loader=yaml.BaseLoader):
         line = f"{where}: line {event.start_mark.line + 1 if event.start_mark else 0}"
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
             raise MapError(f"{line}: an anchor or alias, but a plain value was wanted")
-        tag = getattr(event, "tag", None)
-        if tag is not None:
+        if (tag := getattr(event, "tag", None)) is not None:
             raise MapError(f"{line}: the tag {shown(tag)}, but a plain value was wanted")
-        if isinstance(event, yaml.DocumentStartEvent) and result:
-            raise MapError(f"{line}: a second document, but one was wanted")
-        if isinstance(event, yaml.CollectionEndEvent):
-            path.pop()
-            continue
-        if not isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent):
-            continue
-        value: Value = {} if isinstance(event, yaml.MappingStartEvent) else []
-        if isinstance(event, yaml.ScalarEvent):
-            value = event.value
-        if not path:
-            if not isinstance(value, dict):
-                found = "a list" if isinstance(value, list) else shown(value)
-                raise MapError(f"{line}: {found}, but a mapping (name: value) was wanted")
-            result = value
-        else:
-            _put(path, value, line)
-        if not isinstance(value, str):
-            path.append((value, None))
-        if len(path) > DEEPEST:
-            raise MapError(f"{line}: nested too deeply, but at most {DEEPEST} levels were wanted")
-    return result
+        yield event, line
 
 
-def _put(path: list[tuple[list[Value] | dict[str, Value], str | None]], value: Value, line: str) -> None:
-    """Put a value into the innermost collection that is open: an item, a name, or what a name stands for."""
-    inside, key = path[-1]
-    if isinstance(inside, list):
-        inside.append(value)
-    elif key is not None:
-        inside[key] = value
-        path[-1] = (inside, None)
-    elif not isinstance(value, str):
-        raise MapError(f"{line}: a name that is a collection, but a word was wanted")
-    elif value in inside:
-        raise MapError(f"{line}: {one_line(value)}: given twice, but once was wanted")
-    else:
-        path[-1] = (inside, value)
+def _value(event: Any, line: str, events: Iterator[tuple[Any, str]], depth: int = 1) -> Value:
+    if isinstance(event, yaml.ScalarEvent):
+        return event.value
+    if depth > DEEPEST:
+        raise MapError(f"{line}: nested too deeply, but at most {DEEPEST} levels were wanted")
+    inside = takewhile(lambda item: not isinstance(item[0], yaml.CollectionEndEvent), events)
+    if isinstance(event, yaml.SequenceStartEvent):
+        return [_value(*item, events, depth + 1) for item in inside]
+    found: dict[str, Value] = {}
+    for name, at in inside:
+        if not isinstance(name, yaml.ScalarEvent):
+            raise MapError(f"{at}: a name that is a collection, but a word was wanted")
+        if name.value in found:
+            raise MapError(f"{at}: {one_line(name.value)}: given twice, but once was wanted")
+        found[name.value] = _value(*next(events), events, depth + 1)
+    return found

@@ -1,4 +1,11 @@
-"""GeoJSON (RFC 7946), in degrees or metres."""
+"""GeoJSON (RFC 7946), in degrees or metres.
+
+What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind`` and
+``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and are
+projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of the
+older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export` writes;
+the option overrules both.
+"""
 
 import json
 import re
@@ -9,7 +16,7 @@ from typing import Any
 import numpy as np
 import shapely
 from shapely import MultiPolygon
-from shapely.geometry.base import BaseGeometry
+from shapely.geometry import mapping
 
 from robocov.arrays import Array
 from robocov.environment import Environment
@@ -17,77 +24,78 @@ from robocov.errors import JsonPath as Steps
 from robocov.errors import ParameterError, RobocovError, one_line, place, shown
 from robocov.extras import extra
 from robocov.files.atomic import written
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
-from robocov_app.formats.files import begins_with, is_number, located_errors, positions, read_json, refused
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
+from robocov_app.formats.files import JsonFile, is_number
 from robocov_app.formats.geometry.cells import not_held
-from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid, rings
-from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Kind, Shapes, foreign_map
+from robocov_app.formats.geometry.polygons import DIGITS, free_area, on_grid
+from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import LocalPlane, in_metres
 
 _PLURAL = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _GEOMETRIES = ("Point", "LineString", "Polygon", *_PLURAL, "GeometryCollection")
-_TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
+TYPE = re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|%s)"' % "|".join(_GEOMETRIES).encode())
 _NAMES = ("name", "kind", "id")  # properties of a feature that name its shapes; its own id does too
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that a FeatureCollection, a Feature or a geometry stands for.
-
-    What polygons and lines are is found out as in `shapes.foreign_map`; the properties ``name``, ``kind``
-    and ``id`` of a feature name its shapes. Coordinates are longitude and latitude (RFC 7946, section 4) and
-    are projected to metres, if that makes a map of at most 10 km; else they are metres. The member ``crs`` of
-    the older standard is obeyed, as is a member ``units`` (``metres`` or ``degrees``), which `robocov export`
-    writes; the option overrules both.
-    """
-    document, content, where = read_json(path)
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    file = JsonFile(path)
+    document, where = file.document, file.where
     shapes = Shapes(where, options)
-    found = _Found(where, shapes)
-    with located_errors(content, where):
-        found.read(document)
-        units = document.get("units")
-        if units is not None and options.units is None:
-            if units not in ("metres", "degrees"):
-                raise refused(where, ("units",), units, "metres or degrees was wanted")
-            options = replace(options, units=units)
-        origin = _origin(document, where)
-    figures, shapes.notes = in_metres(found.figures, options, where, crs=found.crs, globe=True, origin=origin)
+    found = _Found(file, shapes)
+    found.read()
+    units, origin = document.get("units"), document.get("origin")
+    if units not in (None, "metres", "degrees") and options.units is None:
+        raise file.refused(("units",), units, "metres or degrees was")
+    if origin is not None:
+        good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
+        if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
+            raise file.refused(("origin",), origin, "longitude and latitude in degrees were")
+        origin = float(origin[0]), float(origin[1])
+    figures, shapes.notes = in_metres(
+        found.figures,
+        replace(options, units=options.units or units),
+        where,
+        crs=found.crs,
+        globe=True,
+        origin=origin,
+    )
     shapes.add_all(figures)
-    named = document.get("name")
-    name = named if isinstance(named, str) and named.strip() else path.stem
-    text = document.get("description")
+    named, text = document.get("name"), document.get("description")
+    name = one_line(named if isinstance(named, str) and named.strip() else path.stem)[:80]
     text = one_line(text)[:1000] if isinstance(text, str) else "Imported from GeoJSON."
-    return foreign_map(shapes, IMPORTER.name, one_line(name)[:80] or "map", text, solid=False)
+    return foreign_map(shapes, name or "map", text, solid=False)
 
 
 class _Found:
-    def __init__(self, where: str, shapes: Shapes) -> None:
-        self.where, self.shapes = where, shapes
+    def __init__(self, file: JsonFile, shapes: Shapes) -> None:
+        self.file, self.shapes = file, shapes
         self.figures: list[Figure] = []
         self.crs: str | None = None
 
-    def read(self, document: Any) -> None:
+    def read(self) -> None:
+        document = self.file.document
         kind = document.get("type") if isinstance(document, dict) else None
         if kind == "FeatureCollection":
             features = document.get("features")
             if not isinstance(features, list):
-                raise refused(self.where, ("features",), features, "a list of features was wanted")
+                raise self.file.refused(("features",), features, "a list of features was")
             self._see_system(document, ())
             for k, feature in enumerate(features):
                 self._feature(feature, ("features", k))
         elif kind == "Feature":
             self._feature(document, ())
         elif kind == "Topology":
-            raise refused(self.where, ("type",), kind, "GeoJSON, not TopoJSON, was wanted")
+            raise self.file.refused(("type",), kind, "GeoJSON, not TopoJSON, was")
         else:
             self._geometry(document, (), ())
 
     def _feature(self, feature: Any, at: Steps) -> None:
         if not isinstance(feature, dict) or feature.get("type") != "Feature":
-            raise refused(self.where, at, feature, "a Feature was wanted")
+            raise self.file.refused(at, feature, "a Feature was")
         self._see_system(feature, at)
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
-            raise refused(self.where, (*at, "properties"), properties, "an object was wanted")
+            raise self.file.refused((*at, "properties"), properties, "an object was")
         given = [*(properties.get(name) for name in _NAMES), feature.get("id")]
         labels = [one_line(label).strip() for label in given if type(label) in (str, int)]
         kind = properties.get("kind")
@@ -96,55 +104,44 @@ class _Found:
         if feature.get("geometry") is None:
             self.shapes.leave_out("feature", "without a geometry")
         else:
-            names = tuple(dict.fromkeys(label for label in labels if label))
+            names = tuple(dict.fromkeys(filter(None, labels)))
             self._geometry(feature["geometry"], (*at, "geometry"), names)
 
     def _geometry(self, geometry: Any, at: Steps, labels: tuple[str, ...]) -> None:
         kind = geometry.get("type") if isinstance(geometry, dict) else None
         if kind not in _GEOMETRIES:
-            value = geometry if kind is None else kind
-            place = at if kind is None else (*at, "type")
-            raise refused(self.where, place, value, f"one of {', '.join(_GEOMETRIES)} was wanted")
+            value, where = (geometry, at) if kind is None else (kind, (*at, "type"))
+            raise self.file.refused(where, value, f"one of {', '.join(_GEOMETRIES)} was")
         self._see_system(geometry, at)
-        if kind == "GeometryCollection":
-            parts = geometry.get("geometries")
-            if not isinstance(parts, list):
-                raise refused(self.where, (*at, "geometries"), parts, "a list of geometries was wanted")
-            for k, part in enumerate(parts):
-                self._geometry(part, (*at, "geometries", k), labels)
+        if kind != "GeometryCollection":
+            self._coordinates(kind, geometry.get("coordinates"), (*at, "coordinates"), labels)
             return
-        value, place = geometry.get("coordinates"), (*at, "coordinates")
-        if kind not in _PLURAL:
-            self._coordinates(kind, value, place, labels)
-            return
-        if not isinstance(value, list):
-            raise refused(self.where, place, value, "a list was wanted")
-        for k, part in enumerate(value):
-            self._coordinates(_PLURAL[kind], part, (*place, k), labels)
+        parts = geometry.get("geometries")
+        if not isinstance(parts, list):
+            raise self.file.refused((*at, "geometries"), parts, "a list of geometries was")
+        for k, part in enumerate(parts):
+            self._geometry(part, (*at, "geometries", k), labels)
 
     def _coordinates(self, kind: str, value: Any, at: Steps, labels: tuple[str, ...]) -> None:
-        if value == []:
+        if kind in _PLURAL:
+            if not isinstance(value, list):
+                raise self.file.refused(at, value, "a list was")
+            for k, part in enumerate(value):
+                self._coordinates(_PLURAL[kind], part, (*at, k), labels)
+        elif value == []:
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "Point":
-            self._keep("point", [self._points([value], at, 1)], labels, at)
+            self.figures.append(Figure("point", (self._points([value], at, 1),), labels, place(at)))
         elif kind == "LineString":
-            self._keep("line", [self._points(value, at, 2)], labels, at)
+            self.figures.append(Figure("line", (self._points(value, at, 2),), labels, place(at)))
         elif not isinstance(value, list):
-            raise refused(self.where, at, value, "a list of rings was wanted")
+            raise self.file.refused(at, value, "a list of rings was")
         else:
             rings = [self._points(ring, (*at, k), 1) for k, ring in enumerate(value)]
-            unclosed = sum(bool((ring[0] != ring[-1]).any()) for ring in rings)
-            if unclosed:
-                self.shapes.mended["ring", "closed: the last point was not the first"] += unclosed
-            self._keep("polygon", rings, labels, at)
-
-    def _keep(self, kind: Kind, rings: list[Array], labels: tuple[str, ...], at: Steps) -> None:
-        self.figures.append(Figure(kind, tuple(rings), labels, place(at)))
+            self.figures.append(self.shapes.polygon(rings, labels, place(at)))
 
     def _points(self, value: Any, at: Steps, least: int) -> Array:
-        points = positions(value, at, self.where, least=least, dimensions=(2, 4))
-        self.shapes.leave_heights(points[:, 2:3])
-        return points[:, :2]
+        return self.shapes.flat(self.file.positions(value, at, least, 2, 4))
 
     def _see_system(self, holder: dict[str, Any], at: Steps) -> None:
         """Keep the reference system that an object names, as GeoJSON did before RFC 7946."""
@@ -154,68 +151,55 @@ class _Found:
         properties = given.get("properties") if isinstance(given, dict) else None
         name = properties.get("name") if isinstance(properties, dict) else None
         if not isinstance(name, str):
-            raise refused(self.where, (*at, "crs"), given, "the name of a reference system was wanted")
+            raise self.file.refused((*at, "crs"), given, "the name of a reference system was")
         if self.crs not in (None, name):
-            wanted = f"the same system as before, {self.crs}, was wanted"
-            raise refused(self.where, (*at, "crs"), given, wanted)
+            raise self.file.refused((*at, "crs"), given, f"the same system as before, {self.crs}, was")
         self.crs = name
-
-
-def _origin(document: dict[str, Any], where: str) -> tuple[float, float] | None:
-    """Return longitude and latitude of [0, 0] m where the file gives them."""
-    origin = document.get("origin")
-    if origin is None:
-        return None
-    good = isinstance(origin, list) and len(origin) == 2 and all(map(is_number, origin))
-    if not good or not (abs(origin[0]) <= 360.0 and abs(origin[1]) <= 90.0):
-        raise refused(where, ("origin",), origin, "longitude and latitude in degrees were wanted")
-    return float(origin[0]), float(origin[1])
-
-
-IMPORTER = Importer(
-    "geojson", "GeoJSON, in degrees (with pyproj) or metres: polygons, lines, points", (".geojson",),
-    lambda path, head: begins_with(head, b"{") and _TYPE.search(head) is not None, _read,
-    options=frozenset(
-        {"scale", "units", "thickness", "pillar", "outlines", "boundary", "around", "only", "skip"}
-    ),
-)  # fmt: skip
 
 
 _FINER = 6  # so many more decimals have degrees: one is about a hundred kilometres
 
 
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
-    origin = options.origin
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+    origin, boundary = options.origin, environment.boundary_polygon
     digits = DIGITS + (_FINER if origin else 0) if options.digits is None else options.digits
-    shapes: list[tuple[str, str | None, BaseGeometry]] = [("boundary", None, environment.boundary_polygon)]
-    shapes += [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
+    head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
+    if environment.description:
+        head["description"] = environment.description
+    head["units"] = "metres"
+    notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
+    plane = None
+    if origin is not None:
+        plane = _plane(environment, origin)
+        head |= {"units": "degrees", "origin": list(origin)}
+        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
     features, areas, lost, across = [], [], 0, False
-    plane = None if origin is None else _plane(environment, origin)
-    for kind, name, shape in shapes:
-        if plane is None:
-            parts = on_grid(shape, digits)
-            areas.append(MultiPolygon(parts))
-        else:
-            # rounded in metres first, as a reader finds it: what touches there still touches
-            exact = MultiPolygon(on_grid(shape, DIGITS))
-            parts = on_grid(shapely.transform(exact, plane.degrees), digits)
-            areas.append(shapely.transform(MultiPolygon(parts), plane.metres))
-            across |= any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
+    shapes = [("obstacle", obstacle.name, obstacle.polygon) for obstacle in environment.obstacles]
+    for kind, name, shape in [("boundary", None, boundary), *shapes]:
+        # rounded in metres first, as a reader finds it: what touches there still touches
+        exact = (
+            shape if plane is None else shapely.transform(MultiPolygon(on_grid(shape, DIGITS)), plane.degrees)
+        )
+        parts = on_grid(exact, digits)
+        area = MultiPolygon(parts)
+        areas.append(area if plane is None else shapely.transform(area, plane.metres))
+        across |= plane is not None and any(max(map(abs, part.bounds[::2])) > 180.0 for part in parts)
         lost += not parts
         if parts:
-            features.append(_feature(kind, name, [rings(part) for part in parts]))
-    notes = [f"in metres, {digits} decimals; other programs take GeoJSON for degrees (--origin makes them)"]
-    if origin is not None:
-        notes = [f"in degrees about longitude {origin[0]:.10g}, latitude {origin[1]:.10g}"]
+            properties = {"kind": kind} if name is None else {"kind": kind, "name": name}
+            geometry = mapping(parts[0] if len(parts) == 1 else area)
+            feature = {"type": "Feature", "properties": properties, "geometry": geometry}
+            features.append(json.dumps(feature, ensure_ascii=False))
     if across:
         notes.append("longitudes go on beyond 180 degrees: shapes are not cut at the antimeridian")
     if lost:
         notes.append(f"{lost} shapes are nothing with {digits} decimals")
+    members, lines = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}"), ",\n".join(features)
     with written(path) as part:
-        part.write_text(_text(environment, options, features), encoding="utf-8")
-    dropped = tuple(thing for thing in not_held(environment) if not thing.startswith("names"))
-    area = free_area(areas[0], areas[1:])
-    return ExportReport("geojson", (path,), environment.free_area, area, dropped, tuple(notes))
+        part.write_text(f'{members},\n "features": [\n{lines}\n]}}\n', encoding="utf-8")
+    kept = free_area(areas[0], areas[1:])
+    dropped = not_held(environment, names=False)
+    return ExportReport("geojson", (path,), environment.free_area, kept, dropped, tuple(notes))
 
 
 def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
@@ -228,30 +212,3 @@ def _plane(environment: Environment, origin: tuple[float, float]) -> LocalPlane:
         wanted = "a place farther from the pole was wanted"
         raise ParameterError(f"origin: {shown(origin)}: longitudes run all around on the map, but {wanted}")
     return plane
-
-
-def _feature(kind: str, name: str | None, polygons: list[list[list[tuple[float, float]]]]) -> dict[str, Any]:
-    geometry: dict[str, Any] = {"type": "MultiPolygon", "coordinates": polygons}
-    if len(polygons) == 1:
-        geometry = {"type": "Polygon", "coordinates": polygons[0]}
-    properties = {"kind": kind} if name is None else {"kind": kind, "name": name}
-    return {"type": "Feature", "properties": properties, "geometry": geometry}
-
-
-def _text(environment: Environment, options: WriteOptions, features: list[dict[str, Any]]) -> str:
-    """Return the document, a feature on a line."""
-    head: dict[str, Any] = {"type": "FeatureCollection", "name": environment.name}
-    if environment.description:
-        head["description"] = environment.description
-    head["units"] = "metres" if options.origin is None else "degrees"
-    if options.origin is not None:
-        head["origin"] = list(options.origin)
-    lines = ",\n".join(json.dumps(feature, ensure_ascii=False) for feature in features)
-    members = json.dumps(head, ensure_ascii=False, indent=1).removesuffix("\n}")
-    return f'{members},\n "features": [\n{lines}\n]}}\n'
-
-
-EXPORTER = Exporter(
-    "geojson", "GeoJSON: boundary and obstacles as features, in metres or degrees", (".geojson",), _write,
-    options=frozenset({"digits", "origin"}),
-)  # fmt: skip

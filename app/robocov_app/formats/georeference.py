@@ -1,10 +1,10 @@
 """Coordinates on the globe, as metres about a place: what a robot's map is in."""
 
-import itertools
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -38,10 +38,9 @@ def in_metres(
 ) -> tuple[list[Figure], list[str]]:
     """Return figures with coordinates in metres, and what was done to them, in words.
 
-    `options`: ``units`` overrules what the file says; ``scale`` is metres a unit where it says nothing.
-    `crs`: the reference system that the file names, as ``EPSG:25832`` or an OGC URN. `globe`: whether
-    coordinates without one are degrees where that makes a map of at most 10 km. `origin`, longitude and
-    latitude: where the file says that [0, 0] m is; by default the middle of what is there.
+    `options`: ``units`` overrules the file; ``scale`` is metres a unit where it says nothing. `crs`: of the
+    file, as ``EPSG:25832`` or an OGC URN. `globe`: coordinates without one are degrees where that makes a map
+    of at most 10 km. `origin`: longitude and latitude of [0, 0] m, by default of the middle.
     """
     if not figures:
         return [], []
@@ -59,28 +58,19 @@ def in_metres(
 
 
 def _points(figures: Sequence[Figure]) -> Array:
-    """Return the points of all figures, one after the other, (k, 2)."""
-    rings = [ring for figure in figures for ring in figure.rings]
-    return np.concatenate(rings) if rings else np.empty((0, 2))
+    return np.concatenate([ring for figure in figures for ring in figure.rings])
 
 
 def _with_points(figures: Sequence[Figure], points: Array) -> list[Figure]:
-    """Return figures with these points instead of theirs."""
-    moved, begin = [], 0
-    for figure in figures:
-        cuts = begin + np.cumsum([0, *map(len, figure.rings)])
-        rings = tuple(points[a:b] for a, b in itertools.pairwise(cuts.tolist()))
-        moved.append(replace(figure, rings=rings))
-        begin = cuts[-1]
-    return moved
+    ends = np.cumsum([len(ring) for figure in figures for ring in figure.rings])
+    rings = iter(np.split(points, ends[:-1]))
+    return [replace(figure, rings=tuple(islice(rings, len(figure.rings)))) for figure in figures]
 
 
 def _on_globe(figures: Sequence[Figure], possible: bool) -> bool:
     """Return whether coordinates are degrees of a place, not metres of a plan: a plan is metres wide."""
-    if not possible or not figures:
-        return False
     points = _points(figures)
-    if not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
+    if not possible or not (np.abs(points) <= [360.0, 90.0]).all():  # some go on beyond the antimeridian
         return False
     width, height = np.ptp(_unwrapped(points, points[0, 0]), axis=0)
     shrunk = math.cos(math.radians(float(np.abs(points[:, 1]).max())))
@@ -94,10 +84,7 @@ def _unwrapped(points: Array, about: float) -> Array:
 
 
 def _authority(crs: str, where: str) -> str:
-    """Return a name of a reference system as AUTHORITY:CODE.
-
-    Only codes are looked up: definitions in full may name files.
-    """
+    """Return a name as AUTHORITY:CODE: only codes are looked up, as definitions in full may name files."""
     match = _URN.fullmatch(crs.strip()) or _ADDRESS.fullmatch(crs.strip())
     if match is None or match[1].upper() not in _AUTHORITIES:
         wanted = f"a code as EPSG:25832 was wanted ({_AS_THEY_ARE})"

@@ -2,6 +2,10 @@
 
 A YAML with the size of the ``world``, perhaps a picture of it, and groups of ``robot`` and ``obstacle``: so
 many of a shape, at given states [x, y, theta] or distributed.
+
+Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
+``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out and
+counted. The states of robots are a start.
 """
 
 from __future__ import annotations
@@ -20,7 +24,8 @@ from robocov.arrays import Array, BoolArray
 from robocov.errors import MapError, counted, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.picture import read_picture
@@ -30,13 +35,11 @@ _WORLD = re.compile(rb"^(?:world|obstacle)[ \t]*:", re.MULTILINE)
 _TRUE = ("true", "yes", "on", "1")
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of a world; one that is generated is refused.
+def sniff(path: Path, head: bytes) -> bool:
+    return path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None
 
-    Obstacles stand where they begin, also those that move there; lines are walls as wide as the option
-    ``thickness``. What collides with nothing, has a shape by chance or is distributed at random is left out
-    and counted. The states of robots are a start.
-    """
+
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     shapes = Shapes(where, options)
     root = _Node(files.parse_yaml(files.content(path, files.MAX_YAML_BYTES), where), f"{where}: ")
@@ -44,10 +47,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     size = np.array([world["width"].length(10.0), world["height"].length(10.0)])
     corner = world["offset"].numbers([0.0, 0.0])[:2]
     free = MultiPolygon([shapely.box(*corner, *(corner + size))])
-    source = world["obstacle_map"]
-    if source.given:
-        light, moved = _picture(source, world["mdownsample"], path, options)
-        shapes.notes += [] if moved is None else [moved]
+    if world["obstacle_map"].given:
+        light = _picture(world, path, shapes)
         width, height = (size / light.shape[::-1]).tolist()
         free = free_area(light, (width, height), (float(corner[0]), float(corner[1])), where)
         shapes.cell = max(width, height)
@@ -66,7 +67,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             names = group["name"].items(one=True)
             for k in range(number):
                 given = [names[min(k, len(names) - 1)].text()] if names else []
-                labels = [label for label in (*given, group["group_name"].text()) if label]
+                labels = tuple(filter(None, (*given, group["group_name"].text())))
                 x, y, turn = states[min(k, len(states) - 1)][:3]
                 if kind == "robot":
                     shapes.robots.append((float(x), float(y)))
@@ -76,29 +77,31 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
                         continue
                     moving += group["kinematics"].given
                     figures = group["shape"].items(one=True) or [group["shape"]]
-                    _draw(figures[min(k, len(figures) - 1)], _frame(x, y, turn), shapes, labels)
+                    _draw(figures[min(k, len(figures) - 1)], frame(x, y, turn), shapes, labels)
     if moving:
-        many = counted(moving, "obstacle")
-        shapes.notes.append(f"{many} with kinematics taken as standing where the file has them")
+        words = "with kinematics taken as standing where the file has them"
+        shapes.notes.append(f"{counted(moving, 'obstacle')} {words}")
     name = world["name"].text() or path.stem
-    return foreign_map(shapes, IMPORTER.name, name, "A world of IR-SIM, imported.", solid=True, world=free)
+    return foreign_map(shapes, name, "A world of IR-SIM, imported.", solid=True, world=free)
 
 
-def _picture(source: _Node, step: _Node, path: Path, options: ReadOptions) -> tuple[BoolArray, str | None]:
-    """Return which cells of the world's picture are free, the top row first, and what was put right."""
+def _picture(world: _Node, path: Path, shapes: Shapes) -> BoolArray:
+    """Return which cells of the world's picture are free, the top row first."""
+    source, step = world["obstacle_map"], world["mdownsample"]
     if isinstance(source.value, dict):
         if source["name"].text() != "image":
             name = shown(source["name"].value)
             raise MapError(f"{source.at}: {name}, which IR-SIM generates, but a picture was wanted")
         source = source["path"]
-    at, anywhere = source.at, options.anywhere
-    file, moved = files.named_file(path, source.text(), anywhere=anywhere, at=at, what="picture")
+    anywhere = shapes.options.anywhere
+    file = files.named_file(path, source.text(), "picture", source.at, shapes.notes, anywhere=anywhere)
     picture = read_picture(file, one_line(file))
     every = int(step.number(1.0))
     if every < 1:
         step.refuse("a number from 1")
     # IR-SIM counts rows from the bottom
-    return (2 * picture.level.astype(np.uint32) >= picture.full)[::-1][::every, ::every][::-1], moved
+    light = 2 * picture.level.astype(np.uint32) >= picture.full
+    return light[::-1][::every, ::every][::-1]
 
 
 def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Array] | None:
@@ -119,41 +122,31 @@ def _states(group: _Node, number: int, centre: Array, radius: float) -> list[Arr
     return [state.numbers([1.0, 1.0, 0.0]) for state in (states if nested else [group["state"]])]
 
 
-def _draw(shape: _Node, frame: Array, shapes: Shapes, labels: list[str]) -> None:
-    """Add an obstacle with its frame, a (3, 3) matrix to metres of the world."""
+def _draw(shape: _Node, around: Array, shapes: Shapes, labels: tuple[str, ...]) -> None:
     name, at = shape["name"].text("circle").lower(), shape.at.partition(": ")[2]
     shift = np.array([shape["wheelbase"].number(0.0) / 2, 0.0])
-
-    def placed(points: Array) -> Array:
-        return np.asarray(points @ frame[:2, :2].T + frame[:2, 2])
-
     if shape["random_shape"].text().lower() in _TRUE:
         shapes.leave_out("shape", "by chance")
     elif name == "circle":
         centre = shape["center"].numbers([0.0, 0.0])[:2] + shift
-        shapes.add_circle(placed(centre[None])[0], shape["radius"].length(0.2), labels, at=at)
+        shapes.add_circle(moved(around, centre[None])[0], shape["radius"].length(0.2), labels, at=at)
     elif name == "rectangle":
-        x, y = shape["length"].length(1.0) / 2, shape["width"].length(1.0) / 2
-        ring = np.array([[-x, -y], [x, -y], [x, y], [-x, y]]) + shift
-        shapes.add_outline([placed(ring)], labels, at=at)
+        size = np.array([shape["length"].length(1.0), shape["width"].length(1.0)])
+        shapes.add_outline([moved(around, UNIT_SQUARE * size + shift)], labels, at=at)
     elif name in ("polygon", "linestring"):
         points = [point.numbers([0.0, 0.0])[:2] for point in shape["vertices"].items()]
         if len(points) < (3 if name == "polygon" else 2):
             shape["vertices"].refuse("a list of points [x, y]")
+        places = moved(around, np.array(points))
         if name == "linestring":
-            shapes.add_line(Line(placed(np.array(points)), shapes.thickness, tuple(labels)), at=at)
+            shapes.add_line(Line(places, shapes.thickness, labels), at=at)
         else:
-            shapes.add_outline([placed(np.array(points))], labels, at=at, thing="polygon")
+            shapes.add_outline([places], labels, at=at, thing="polygon")
     elif name == "compound":
         for part in shape["parts"].items():
-            _draw(part, frame @ _frame(*part["pose"].numbers([0.0, 0.0, 0.0])[:3]), shapes, labels)
+            _draw(part, around @ frame(*part["pose"].numbers([0.0, 0.0, 0.0])[:3]), shapes, labels)
     else:
         shape["name"].refuse("circle, rectangle, polygon, linestring or compound")
-
-
-def _frame(x: float, y: float, turn: float) -> Array:
-    cos, sin = math.cos(turn), math.sin(turn)
-    return np.array([[cos, -sin, x], [sin, cos, y], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -191,10 +184,7 @@ class _Node:
         return self.value
 
     def number(self, default: float) -> float:
-        try:
-            value = float(self.text(str(default)))
-        except ValueError:
-            value = math.nan
+        value = files.number(self.text(str(default)))
         if not abs(value) <= FARTHEST:
             self.refuse("a number within 1e7")
         return value
@@ -212,11 +202,3 @@ class _Node:
 
     def refuse(self, wanted: str) -> NoReturn:
         raise MapError(f"{self.at}: {shown(self.value)}, but {wanted} was wanted")
-
-
-IMPORTER = Importer(
-    # a .yaml is this by its content only
-    "irsim", "IR-SIM: YAML of a world, robots and obstacles", (),
-    lambda path, head: path.suffix.lower() in (".yaml", ".yml") and _WORLD.search(head) is not None, _read,
-    options=frozenset({"thickness", "anywhere", "only", "skip"}),
-)  # fmt: skip

@@ -16,7 +16,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov_app.formats import files
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, foreign_map
 
@@ -25,12 +25,12 @@ _PASSABLE, _SOLID = b".GS", b"@O"
 _BAD = 255
 
 
-def _sniff(path: Path, head: bytes) -> bool:
+def sniff(path: Path, head: bytes) -> bool:
     words = head.removeprefix(b"\xef\xbb\xbf").split(None, 3)
     return len(words) > 2 and words[0].lower() == b"type" and words[2].lower() in (b"height", b"width")
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     data = files.content(path, files.MAX_CELLS + files.HEAD).removeprefix(b"\xef\xbb\xbf")
     columns, rows, body, line = _header(data, where)
@@ -49,15 +49,8 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         raise MapError(f"{place}: {shown(letter)}, but one of . G S @ O T W was wanted")
     cell = CELL if options.cell is None else options.cell
     notes = () if options.cell is not None else (f"no cell size was given: {CELL:g} m taken",)
-    return foreign_map(
-        cells,
-        name=path.stem,
-        description=f"A grid of {cell:g} m a cell, imported from Moving AI's format.",
-        format="movingai",
-        cell=cell,
-        where=where,
-        notes=notes,
-    )
+    text = f"A grid of {cell:g} m a cell, imported from Moving AI's format."
+    return foreign_map(cells, where, path.stem, text, cell, notes=notes)
 
 
 def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
@@ -93,7 +86,6 @@ def _header(data: bytes, where: str) -> tuple[int, int, bytes, int]:
 
 
 def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDArray[np.uint8]:
-    """Return the letters of the grid, (rows, columns) bytes, the top row first."""
     lines = body.replace(b"\r\n", b"\n").split(b"\n", rows)
     for k in range(rows):
         found = len(lines[k].rstrip(b" \t\r")) if k < len(lines) else 0
@@ -106,13 +98,7 @@ def _letters(body: bytes, columns: int, rows: int, line: int, where: str) -> NDA
     return np.frombuffer(joined, np.uint8).reshape(rows, columns)
 
 
-IMPORTER = Importer(
-    "movingai", "MovingAI grid: .map", (".map",), _sniff, _read,
-    options=frozenset({"cell", "trees", "water"}),
-)  # fmt: skip
-
-
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     grid = grid_over(environment, options.cell)
     free = free_cells(environment, grid)
     letters = np.full((grid.rows, grid.columns + 1), ord("@"), np.uint8)
@@ -124,9 +110,3 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     x, y = grid.origin
     place = f"the cell size, {grid.cell:g} m, and the lower left corner, [{x:g}, {y:g}]"
     return grid_report("movingai", (path,), environment, grid, free, dropped=(place,))
-
-
-EXPORTER = Exporter(
-    "movingai", "MovingAI grid: .map", (".map",), _write,
-    options=frozenset({"cell"}),
-)  # fmt: skip

@@ -1,4 +1,10 @@
-"""OpenStreetMap extracts: buildings and water are solid, barriers are walls, the bounds are the boundary."""
+"""OpenStreetMap extracts, in metres east and north of their middle.
+
+Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says that
+it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the option
+``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below the ground,
+roofs, and ways whose nodes the extract lacks are left out.
+"""
 
 import re
 from array import array
@@ -14,14 +20,13 @@ import shapely
 from robocov.arrays import Array
 from robocov.errors import MapError, counted, one_line
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.shapes import BOUNDARY, Figure, Shapes, foreign_map
 from robocov_app.formats.georeference import DEGREES, in_metres
 
-_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+ROOT = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>\s*)?(?:<!--.*?-->\s*)*<osm[\s>]", re.DOTALL)
+# barriers that are walls; gates, kerbs and chains are not
 _WALLS = {"wall", "city_wall", "retaining_wall", "fence", "hedge", "guard_rail", "jersey_barrier"}
-"""Barriers that are walls; gates, kerbs and chains are not."""
-
 _POSTS = {"bollard", "block", "tree"}
 _KEYS = {"area", "barrier", "building", "layer", "location", "name", "natural", "tunnel", "type", "width"}
 _KEYS |= {"waterway", "water"}
@@ -40,26 +45,12 @@ class _Thing:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Its name, and what it is: the value of the tag, and the tag."""
         found = [self.tags[key] for key in ("name", "barrier", "building", "natural") if key in self.tags]
         found += [key for key in ("barrier", "building", "natural", "waterway") if key in self.tags]
         return tuple(dict.fromkeys(one_line(label) for label in found if label != "yes"))
 
-    @property
-    def covered(self) -> bool:
-        """Whether it is below the ground."""
-        under = self.tags.get("location") == "underground" or self.tags.get("layer", "0").startswith("-")
-        return under or self.tags.get("tunnel", "no") != "no"
 
-
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that an extract of OpenStreetMap shows, in metres east and north of its middle.
-
-    Buildings, also those that relations make up of several ways, and water (unless the option ``water`` says
-    that it is free) are solid; walls, fences, hedges and the like are walls of their tag ``width``, or of the
-    option ``thickness``; bollards, blocks and trees are points. The bounds are the boundary. What is below
-    the ground, roofs, and ways whose nodes the extract lacks are left out.
-    """
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     extract = _Extract(where, files.content(path, files.MAX_TEXT_BYTES))
     shapes = Shapes(where, options)
@@ -76,7 +67,7 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     if extract.gates:
         shapes.notes.append(f"{counted(extract.gates, 'gate')} taken as closed")
     text = "Imported from OpenStreetMap, © OpenStreetMap contributors."
-    return foreign_map(shapes, IMPORTER.name, files.name_of_map(path), text, solid=True)
+    return foreign_map(shapes, files.name_of_map(path), text, solid=True)
 
 
 class _Extract:
@@ -114,7 +105,8 @@ class _Extract:
             post = thing.kind == "node" and bool(_POSTS & {tags.get("barrier"), tags.get("natural")})
             if not (built or wall or post or (wet and water)):
                 continue
-            if thing.covered:
+            under = tags.get("location") == "underground" or tags.get("layer", "0").startswith("-")
+            if under or tags.get("tunnel", "no") != "no":
                 shapes.leave_out("thing", "below the ground")
             elif thing.kind == "node":
                 if post:
@@ -196,10 +188,3 @@ def _degrees(given: dict[str, str], key: str, most: float) -> float:
     if not abs(value) <= most:
         raise ValueError(f"{key} {value:g}")
     return value
-
-
-IMPORTER = Importer(
-    "osm", "OpenStreetMap (.osm): buildings, water, walls, fences, hedges", (".osm",),
-    lambda path, head: _ROOT.match(head) is not None, _read,
-    options=frozenset({"water", "outlines", "thickness", "pillar", "boundary", "around", "only", "skip"}),
-)  # fmt: skip

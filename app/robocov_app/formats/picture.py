@@ -10,6 +10,7 @@ import json
 import re
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from robocov.errors import MapError, one_line, shown
 from robocov.files.atomic import written
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.geometry.cells import free_cells, grid_over, grid_report
 from robocov_app.formats.geometry.raster import BLOCKED, FREE, UNKNOWN, foreign_map
 
@@ -32,6 +33,7 @@ _STRIP = 512  # rows that are converted at a time, which bounds the memory
 # what separates the numbers of a PGM header: a comment runs to the end of its line
 _BLANK = re.compile(rb"(?:[ \t\r\n\v\f]|#[^\r\n]*[\r\n])+")
 _DIGITS = re.compile(rb"\d+")
+_NETPBM = re.compile(rb"P[2356][\s#]")
 # first bytes (magic numbers) of formats that Pillow reads, by its names for them
 _PILLOW = {
     "PNG": re.compile(rb"\x89PNG\r\n\x1a\n"),
@@ -48,9 +50,8 @@ _MOST_OF_JPEG = 512
 class Brightness:
     """A picture without its colours, the top row first.
 
-    `level`, (rows, columns): from 0, black, to `full`, white: of colours the sum of red, green and blue.
-    `alpha`, (rows, columns): from 0, transparent, to 255, opaque; None where there is no such thing. `texts`:
-    what a PNG says of itself. `lossy`: whether pixels may have changed when saved, as in a JPEG.
+    `level`, (rows, columns): from 0, black, to `full`, white: the sum of red, green and blue. `alpha`: to
+    255, opaque. `texts`: what a PNG says of itself. `lossy`: whether saving may change pixels, as in a JPEG.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.uint32]
@@ -61,15 +62,11 @@ class Brightness:
 
 
 def is_picture(head: bytes) -> bool:
-    """Return whether a file that begins with `head` is a picture of a kind that can be read."""
-    return any(begin.match(head) for begin in (re.compile(rb"P[2356][\s#]"), *_PILLOW.values()))
+    return any(begin.match(head) for begin in (_NETPBM, *_PILLOW.values()))
 
 
 def read_picture(path: Path, where: str) -> Brightness:
-    """Return the picture at `path`, which messages call `where`.
-
-    Raises MapError when it is none that can be read, broken, cut off, or has over `files.MAX_CELLS` pixels.
-    """
+    """Return the picture at `path`, which messages call `where`; MapError where it is broken or too large."""
     data = files.content(path)
     if data[:2] in (b"P2", b"P3", b"P5", b"P6"):
         return _netpbm(data, where)
@@ -82,8 +79,7 @@ def read_picture(path: Path, where: str) -> Brightness:
 
 def _netpbm(data: bytes, where: str) -> Brightness:
     """Return a PGM or PPM; see https://netpbm.sourceforge.net/doc/pgm.html."""
-    numbers: list[int] = []
-    at = 2
+    numbers, at = [], 2
     for name in ("width", "height", "largest value"):
         blank = _BLANK.match(data, at)
         digits = _DIGITS.match(data, blank.end()) if blank else None
@@ -98,7 +94,6 @@ def _netpbm(data: bytes, where: str) -> Brightness:
         raise MapError(f"{where}: largest value: {most}, but a number from 1 to 65535 was wanted")
     colours = 3 if data[1:2] in b"36" else 1
     count = width * height * colours
-    level: Any
     if data[1:2] in b"56":
         raw = np.dtype(np.uint8 if most < 256 else ">u2")
         # one blank ends the header, or a line end of two; what comes after the picture is not looked at
@@ -106,7 +101,7 @@ def _netpbm(data: bytes, where: str) -> Brightness:
         if len(data) - at < count * raw.itemsize:
             have = max(0, len(data) - at) // raw.itemsize
             raise MapError(f"{where}: cut off after {have // colours} of {count // colours} pixels")
-        level = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
+        level: Any = np.frombuffer(data, raw, count, at).astype(raw.newbyteorder("="), copy=False)
     else:
         level = _plain(data[at:], count, where)
     highest = int(level.max())
@@ -127,19 +122,15 @@ def _plain(text: bytes, count: int, where: str) -> NDArray[np.uint16]:
     done = at = 0
     while done < count and at < len(text):
         blank = _BLANK.search(text, at + _PIECE)
-        piece = text[at : blank.start() if blank else len(text)].strip()
+        end = blank.start() if blank else len(text)
+        numbers = files.whole_numbers(text[at:end], " ")
         at = blank.end() if blank else len(text)
-        if not piece:
-            continue
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)
-            try:
-                numbers = np.fromstring(piece, dtype=np.int64, sep=" ")[: count - done]
-            except (DeprecationWarning, ValueError, OverflowError):
-                raise MapError(f"{where}: pixels that are not whole numbers, of {count}") from None
-        low, high = int(numbers.min()), int(numbers.max())
-        if low < 0 or high > 65535:
-            worst = low if low < 0 else high
+        if numbers is None:
+            raise MapError(f"{where}: pixels that are not whole numbers, of {count}")
+        numbers = numbers[: count - done]
+        strange = numbers[(numbers < 0) | (numbers > 65535)]
+        if len(strange):
+            worst = min(strange) if min(strange) < 0 else max(strange)
             raise MapError(f"{where}: a pixel of {worst}, but a number from 0 to 65535 was wanted")
         values[done : done + len(numbers)] = numbers
         done += len(numbers)
@@ -204,17 +195,14 @@ def _converted(image: Image) -> Brightness:
     return Brightness(level, 255 * colours, alpha, texts, lossy)
 
 
+# key of the text chunk that says where the picture belongs: JSON with ``cell_m`` and ``origin_m``
 CHUNK = "robocov"
-"""Key of the text chunk that says where the picture belongs: JSON with ``cell_m`` and ``origin_m``."""
-
-TITLE = "Title"
-"""Key of the text chunk with the name of what is shown."""
-
+TITLE = "Title"  # key of the text chunk with the name of what is shown
 _NOISE = 1.5  # single cells beside dark ones come of how a JPEG is saved
 _OPAQUE = 128  # less opaque pixels count as transparent, of 255
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     where = one_line(path)
     picture = read_picture(path, where)
     cell, origin = _place(picture)
@@ -232,39 +220,28 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
         cells[picture.alpha < _OPAQUE] = UNKNOWN
     return foreign_map(
         cells,
-        name=picture.texts.get(TITLE, "").strip() or path.stem,
-        description=f"A picture of {cell:g} m a pixel, imported.",
-        format="picture",
-        cell=cell,
+        where,
+        picture.texts.get(TITLE, "").strip() or path.stem,
+        f"A picture of {cell:g} m a pixel, imported.",
+        cell,
         origin=origin,
         unknown=options.unknown or "obstacle",
         called="transparent",
         noise=_NOISE if picture.lossy else 0.0,
-        where=where,
     )
 
 
 def _place(picture: Brightness) -> tuple[float | None, tuple[float, float]]:
     """Return what the picture says of itself: metres a pixel, and its lower left corner."""
-    nothing = (None, (0.0, 0.0))
-    try:
+    with suppress(ValueError, KeyError, TypeError, RecursionError, OverflowError):
         given = json.loads(picture.texts.get(CHUNK, ""))
         cell, (x, y) = float(given["cell_m"]), map(float, given["origin_m"])
-    except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
-        return nothing
-    sane = 1e-6 <= cell <= 1e4 and abs(x) <= FARTHEST and abs(y) <= FARTHEST
-    return (cell, (x, y)) if sane else nothing
+        if 1e-6 <= cell <= 1e4 and abs(x) <= FARTHEST and abs(y) <= FARTHEST:
+            return cell, (x, y)
+    return None, (0.0, 0.0)
 
 
-IMPORTER = Importer(
-    "picture", "picture: PNG, JPEG, BMP, TIFF, PGM, PPM, dark is an obstacle",
-    (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pbm", ".pgm", ".ppm"),
-    lambda path, head: is_picture(head), _read,
-    options=frozenset({"cell", "unknown", "threshold", "invert"}),
-)  # fmt: skip
-
-
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     from PIL import Image, PngImagePlugin
 
     grid = grid_over(environment, options.cell)
@@ -275,9 +252,3 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
     with written(path) as part:
         Image.fromarray(free[::-1]).save(part, format="PNG", pnginfo=texts)
     return grid_report("picture", (path,), environment, grid, free)
-
-
-EXPORTER = Exporter(
-    "picture", "picture: PNG in black and white, with its scale and place", (".png",), _write,
-    options=frozenset({"cell"}),
-)  # fmt: skip

@@ -8,8 +8,12 @@ import numpy as np
 import shapely
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -22,28 +26,20 @@ from robocov_app.formats.geometry.conversion import Comparison, compare
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Colour, Theme, theme_named
 
+# of the page, of the arenas on it, and the least for what is written, in pixels
+# of the page, of the arenas on it, and the least for what is written, in pixels
 _WIDTH, _HEIGHT, _NARROWEST = 1600, 1000, 1040
-"""Of the page, of the arenas on it, and the least for what is written, in pixels."""
-
+# of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report
 _SCALE, _TOP, _ABOVE, _LINE = 1.3, 66.0, 34.0, 17.0
-"""Of texts and lines; then pixels at scale 1 for titles, captions, and a line of the report."""
-
 _MARK = 0.55  # opacity of what is marked
 _MOST_LINES = 12  # of the report; what is beyond is counted
 _RING = 20.0  # size of the ring around a passage that is too short to be seen, in points
 
 
-def preview(
-    foreign: ForeignMap,
-    environment: Environment,
-    report: ImportReport,
-    path: Path,
-    *,
-    theme: Theme | str = LIGHT,
-) -> None:
+def preview(foreign: ForeignMap, environment: Environment, report: ImportReport, path: Path) -> None:
     """Draw an import to a .png, .svg or .pdf: `plot_import`, saved."""
     check_figure_path(path)
-    save_figure(plot_import(foreign, environment, report, theme=theme), path)
+    save_figure(plot_import(foreign, environment, report), path)
 
 
 def plot_import(
@@ -77,9 +73,23 @@ def plot_import(
         first, second = (page.map_axes(box, *compared.bounds) for box, _ in panels)
         outside = shapely.difference(compared.region, compared.before)
         _draw(first, outside, theme.obstacle, theme.obstacle_edge)
-        _draw_edges(first, compared.before, theme)
+        # where free space ends, also where the page is what lies beyond
+        rings = shapely.get_rings(shapely.get_parts(compared.before))
+        style: Any = {"linewidths": 0.8, "clip_on": False, "zorder": 2}
+        edges = LineCollection(
+            [*map(shapely.get_coordinates, rings)], colors=tone(theme.obstacle_edge), **style
+        )
+        first.add_collection(edges, autolim=False)
         _draw(first, compared.lost, theme.trajectory, theme.trajectory, _MARK)
-        _draw_places(first, report.others, theme)
+        style = {
+            "color": tone(theme.ink),
+            "zorder": 5,
+            "path_effects": [withStroke(linewidth=3.0, foreground=tone(theme.background))],
+        }
+        for x, y in report.others:
+            first.plot([x], [y], marker="+", markersize=8.0, **style)
+            words = f"{x:.10g} {y:.10g}"
+            first.annotate(words, (x, y), (6, 6), textcoords="offset points", fontsize=SMALL, **style)
         draw_map(second, environment, theme)
         _draw(second, compared.opened, theme.start, theme.start, _MARK)
         _draw_gap(second, compared.gap, theme)
@@ -120,7 +130,6 @@ def _laid_out(
 
 
 def _indent(page: Page, name: str) -> float:
-    """Return how far from a caption's beginning its facts begin."""
     return page.text_width(name, points=TITLE, bold=True) + 12 * page.scale
 
 
@@ -128,15 +137,7 @@ def _style(fill: Colour, edge: Colour, opacity: float) -> dict[str, Any]:
     return {"facecolor": (*tone(fill), opacity), "edgecolor": tone(edge), "linewidth": 0.8}
 
 
-def _halo(theme: Theme, width: float) -> list[AbstractPathEffect]:
-    return [withStroke(linewidth=width, foreground=tone(theme.background))]
-
-
 def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: float = 1.0) -> None:
-    """Draw an area with its holes."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path as Outline
-
     for part in shapely.get_parts(area):
         if isinstance(part, Polygon):
             rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
@@ -144,21 +145,16 @@ def _draw(axes: Axes, area: BaseGeometry, fill: Colour, edge: Colour, opacity: f
             axes.add_patch(PathPatch(outline, zorder=2, **_style(fill, edge, opacity)))
 
 
-def _draw_places(axes: Axes, places: Sequence[tuple[float, float]], theme: Theme) -> None:
-    """Write where the parts are that were left out, as the option ``--inside`` takes it."""
-    style: dict[str, Any] = {"color": tone(theme.ink), "zorder": 5, "path_effects": _halo(theme, 3.0)}
-    for x, y in places:
-        axes.plot([x], [y], marker="+", markersize=8.0, **style)
-        words = f"{x:.10g} {y:.10g}"
-        axes.annotate(words, (x, y), (6, 6), textcoords="offset points", fontsize=SMALL, **style)
-
-
 def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
     """Draw the narrowest passage, in a ring that makes it found."""
     if gap is None:
         return
     colour, points = tone(theme.final), np.array(gap.between)
-    style: dict[str, Any] = {"zorder": 5, "clip_on": False, "path_effects": _halo(theme, 4.2)}
+    style: dict[str, Any] = {
+        "zorder": 5,
+        "clip_on": False,
+        "path_effects": [withStroke(linewidth=4.2, foreground=tone(theme.background))],
+    }
     axes.plot(*points.T, color=colour, linewidth=2.0, **style)
     ends = axes.transData.transform(points) * (72 / axes.figure.dpi)
     if np.hypot(*(ends[1] - ends[0])) < _RING:
@@ -166,29 +162,12 @@ def _draw_gap(axes: Axes, gap: Gap | None, theme: Theme) -> None:
         axes.plot(*points.mean(axis=0), "o", markersize=_RING, **style)
 
 
-def _draw_edges(axes: Axes, area: BaseGeometry, theme: Theme) -> None:
-    """Draw where free space ends, also where the page is what lies beyond."""
-    from matplotlib.collections import LineCollection
-
-    lines = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(area))]
-    edges = LineCollection(lines, colors=tone(theme.obstacle_edge), linewidths=0.8, clip_on=False, zorder=2)
-    axes.add_collection(edges, autolim=False)
-
-
 def _number(value: float) -> str:
-    r"""Return a number as it is read most easily: whole where it is large.
-
-    >>> _number(1761234.5), _number(35.2789)
-    ('1\u202f761\u202f234', '35.28')
-    """
+    """Return a number as it is read most easily: whole where it is large."""
     return f"{value:.4g}" if abs(value) < 9999.5 else f"{value:,.0f}".replace(",", "\u202f")
 
 
 def _handles(environment: Environment, theme: Theme, compared: Comparison) -> list[Artist]:
-    """Return the legend's entries for what is drawn."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
     handles = map_handles(environment, theme)
     for area, words, colour in (
         (compared.lost, "left out: {} m² were free", theme.trajectory),

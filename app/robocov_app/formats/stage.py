@@ -5,13 +5,19 @@ includes. A model is as large as its ``size``, whatever its bitmap or its blocks
 them is scaled to it.
 
 R. Vaughan, Massively multi-robot simulation in Stage, Swarm Intelligence 2 (2008), 189-208.
+
+Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
+(``position``) are places to start; sensors and the like are left out. The map is the largest model with a
+bitmap or a ``boundary``, if most of the others are in it.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections import deque
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -23,23 +29,23 @@ from robocov.arrays import Array
 from robocov.errors import MapError, one_line, shown
 from robocov.mapfile.models import FARTHEST
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.geometry.frames import UNIT_SQUARE, frame, moved
 from robocov_app.formats.geometry.polygons import polygons_of
 from robocov_app.formats.geometry.raster import free_area, vertices_of
 from robocov_app.formats.geometry.shapes import Outline, Shapes, foreign_map, surrounding
 from robocov_app.formats.picture import read_picture
 
 MAX_BYTES = 5_000_000  # largest file of a world, in bytes
+# words and numbers in a world and all that it includes; models and blocks that macros make of them
 MOST_TOKENS, MOST_ENTITIES = 200_000, 10_000
-"""Words and numbers in a world and all that it includes; models and blocks that macros make of them."""
-
 _DARK = 127 / 255  # pixels that are not brighter are solid
-
 _TOKEN = re.compile(
     r"(?P<blank>(?>[ \t\r\n]+|#[^\n]*)++)|(?P<word>[A-Za-z_][\w.-]*(?:\[\d+\][\w.-]*)*)"
     r'|(?P<number>[-+.\d][-+.\w]*)|"(?P<string>[^"\n]*)"|(?P<mark>[()\[\]])|(?P<strange>[\s\S])'
 )
-_MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
+MODELS = re.compile(rb"^\s*(?:define\s+\S+\s+\S+|floorplan|model|position|window)\s*\(", re.MULTILINE)
+_MARKS = ("(", ")", "[", "]")
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -67,10 +73,7 @@ class _Entity:
     def numbers(self, name: str, default: tuple[float, ...]) -> Array:
         """Return the values of a property; those that are not written are as in `default`."""
         given = self.properties.get(name, [])[: len(default)]
-        try:
-            values = np.array([*map(float, given), *default[len(given) :]])
-        except ValueError:
-            values = np.array([math.nan])
+        values = np.array([*map(files.number, given), *default[len(given) :]])
         if not (np.abs(values) <= FARTHEST).all():
             raise MapError(f"{self.at}: {name} {shown(' '.join(given))}, but numbers within 1e7 were wanted")
         return values
@@ -89,17 +92,10 @@ class _Room:
     cell: float | None = None
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map of a world.
-
-    Models are obstacles unless nothing meets them (``obstacle_return 0`` and no ``ranger_return``); robots
-    (``position``) are places to start; sensors and the like are left out. The map is the largest model with a
-    bitmap or a ``boundary``, if most of the others are in it.
-    """
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     shapes = Shapes(one_line(path), options)
     world = _World(path, shapes)
-    root = world.read()
-    world.place(root.inside, np.eye(3))
+    world.place(world.root.inside, np.eye(3))
     rooms = sorted(world.rooms, key=lambda room: -room.box.area)
     places = [*(outline.area.representative_point() for outline in shapes.outlines)]
     places += [*(room.box.centroid for room in rooms), *map(shapely.Point, shapes.robots)]
@@ -110,11 +106,12 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
             shapes.outlines.append(Outline(dark, room.labels))
     free = None if main is None else main.free
     if free is None and shapes.outlines:
-        free, words = surrounding(shapes)
-        shapes.notes.append(words)
+        found = surrounding(shapes)
+        free = found.area
+        shapes.notes.append(f"the boundary is {found.words}")
     shapes.cell = max((room.cell for room in rooms if room.cell is not None), default=None)
-    name = root.text("name") or path.stem
-    return foreign_map(shapes, IMPORTER.name, name, "A world of Stage, imported.", solid=True, world=free)
+    name = world.root.text("name") or path.stem
+    return foreign_map(shapes, name, "A world of Stage, imported.", solid=True, world=free)
 
 
 class _World:
@@ -122,93 +119,84 @@ class _World:
 
     def __init__(self, path: Path, shapes: Shapes) -> None:
         self.path, self.shapes = path, shapes
-        self.tokens: list[_Token] = []
+        self.tokens: deque[_Token] = deque()
         self.entities = self.pixels = 0
         self.macros: dict[str, _Entity] = {}
         self.bitmaps: dict[Path, tuple[MultiPolygon, int, int]] = {}
-        self.metre, self.turn = 1.0, math.pi / 180
         self.rooms: list[_Room] = []
+        self._split(path, 0)
+        self.root = _Entity("world", shapes.where)
+        self._fill(self.root, 0)
+        self.metre = _LENGTHS.get(self.root.text("unit_length", "m"), 1.0)
+        self.turn = 1.0 if self.root.text("unit_angle") == "radians" else math.pi / 180
 
-    def read(self) -> _Entity:
-        self._split(self.path, 0)
-        root = _Entity("world", self.shapes.where)
-        self._fill(root, 0, 0)
-        self.metre = _LENGTHS.get(root.text("unit_length", "m"), 1.0)
-        self.turn = 1.0 if root.text("unit_angle") == "radians" else math.pi / 180
-        return root
-
-    def _named(self, token: _Token, what: str) -> Path:
-        anywhere = self.shapes.options.anywhere
-        file, note = files.named_file(self.path, token.text, anywhere=anywhere, at=token.at, what=what)
-        self.shapes.notes += [] if note is None or note in self.shapes.notes else [note]
-        return file
+    def _named(self, name: str, what: str, at: str) -> Path:
+        notes, anywhere = self.shapes.notes, self.shapes.options.anywhere
+        return files.named_file(self.path, name, what, at, notes, anywhere=anywhere)
 
     def _split(self, path: Path, depth: int) -> None:
         """Add the tokens of a file, and of those that it includes."""
-        text = files.content(path, MAX_BYTES).decode("utf-8", "replace")
+        world = files.content(path, MAX_BYTES).decode("utf-8", "replace")
         line, name, include = 1, one_line(path), False
-        for found in _TOKEN.finditer(text):
-            kind = str(found.lastgroup)
-            token = _Token(kind, found[kind], f"{name}:{line}")
+        for found in _TOKEN.finditer(world):
+            kind, text = str(found.lastgroup), found[found.lastgroup or 0]
+            token = _Token(text if kind == "mark" else kind, text, f"{name}:{line}")
             line += found[0].count("\n")
-            if kind == "blank":
+            if token.kind == "blank":
                 continue
-            if kind == "strange":
-                strange = text[found.start() : found.start() + 20]
+            if token.kind == "strange":
+                strange = world[found.start() : found.start() + 20]
                 token._replace(text=strange).refuse("a word, a number or a bracket")
             if include:
-                if kind != "string" or depth >= files.MAX_DEPTH:
+                if token.kind != "string" or depth >= files.MAX_DEPTH:
                     token.refuse("a file to include, which does not include itself,")
-                self._split(self._named(token, "file"), depth + 1)
-                include = False
-            elif (kind, token.text) == ("word", "include"):
-                include = True
-            elif len(self.tokens) >= MOST_TOKENS:
-                what = f"more than {MOST_TOKENS} words and numbers"
-                raise MapError(f"{token.at}: {what}, but fewer were wanted")
-            else:
+                self._split(self._named(token.text, "file", token.at), depth + 1)
+            elif token[:2] != ("word", "include"):
+                if len(self.tokens) >= MOST_TOKENS:
+                    what = f"more than {MOST_TOKENS} words and numbers"
+                    raise MapError(f"{token.at}: {what}, but fewer were wanted")
                 self.tokens.append(token)
+            include = not include and token[:2] == ("word", "include")
 
-    def _fill(self, entity: _Entity, k: int, depth: int) -> int:
-        """Read the content of an entity from token `k` on; return where it ends."""
+    def _fill(self, entity: _Entity, depth: int) -> None:
+        """Read the content of an entity, up to its closing bracket."""
         end = _Token("", "the end of the file", entity.at)
         if depth > files.MAX_DEPTH:
             raise MapError(f"{entity.at}: nested deeper than {files.MAX_DEPTH}, but less was wanted")
-        while k < len(self.tokens):
-            token, *ahead = [*self.tokens[k : k + 4], end, end, end][:4]
-            if depth and (token.kind, token.text) == ("mark", ")"):
-                return k + 1
+        while self.tokens:
+            token = self.tokens.popleft()
+            ahead = [*islice(self.tokens, 3), end, end, end]
+            if depth and token.kind == ")":
+                return
             if token.kind != "word":
                 token.refuse("the name of a model or a property" + (", or )," if depth else ""))
-            if token.text == "define" and [after.kind for after in ahead] == ["word", "word", "mark"]:
-                macro = _Entity(ahead[1].text, token.at)
-                k = self._fill(macro, k + 4, depth + 1)
-                self.macros.setdefault(ahead[0].text, macro)
-            elif (ahead[0].kind, ahead[0].text) == ("mark", "("):
-                inner = _Entity(token.text, token.at)
-                k = self._fill(inner, k + 2, depth + 1)
-                entity.inside.append(inner)
+            macro = [after.kind for after in ahead[:2]] == ["word", "word"] and ahead[2].kind in _MARKS
+            if token.text == "define" and macro:
+                name, kind, _ = (self.tokens.popleft() for _ in range(3))
+                whole = _Entity(kind.text, token.at)
+                self._fill(whole, depth + 1)
+                self.macros.setdefault(name.text, whole)
+            elif ahead[0].kind == "(":
+                self.tokens.popleft()
+                entity.inside.append(_Entity(token.text, token.at))
+                self._fill(entity.inside[-1], depth + 1)
             else:
-                k = self._property(entity, k)
+                entity.properties[token.text] = self._values(token)
         if depth:
             end.refuse("a ) after what begins here")
-        return k
 
-    def _property(self, entity: _Entity, k: int) -> int:
-        """Read a property from its name at token `k` on: a number, a text, or a list of these."""
-        name, values = self.tokens[k].text, self.tokens[k + 1 : k + 2]
-        following = k + 2
-        if values and (values[0].kind, values[0].text) == ("mark", "["):
-            while following < len(self.tokens) and self.tokens[following].kind != "mark":
-                following += 1
-            values = self.tokens[k + 2 : following]
-            if self.tokens[following : following + 1] == [] or self.tokens[following].text != "]":
-                self.tokens[k].refuse("a ] after its values")
-            following += 1
-        if not all(value.kind in ("number", "string") for value in values) or following > len(self.tokens):
-            self.tokens[k].refuse("a value, or ( and ), after it")
-        entity.properties[name] = [value.text for value in values] or [""]
-        return following
+    def _values(self, name: _Token) -> list[str]:
+        """Read the value of a property: a number, a text, or a list of these."""
+        values = [self.tokens.popleft()] if self.tokens else [name]
+        if values[0].kind == "[":
+            values = []
+            while self.tokens and self.tokens[0].kind not in _MARKS:
+                values.append(self.tokens.popleft())
+            if not self.tokens or self.tokens.popleft().text != "]":
+                name.refuse("a ] after its values")
+        if not all(value.kind in ("number", "string") for value in values):
+            name.refuse("a value, or ( and ), after it")
+        return [value.text for value in values] or [""]
 
     def place(self, entities: list[_Entity], frame: Array, depth: int = 0) -> None:
         """Place models in the frame of their parent, a (3, 3) matrix to metres, and what is in them."""
@@ -226,7 +214,8 @@ class _World:
             elif entity.type == "position":
                 self.shapes.robots.append((float(here[0, 2]), float(here[1, 2])))
             else:
-                if self._met(entity):
+                seen = min(entity.number(name, 1.0) for name in ("ranger_return", "laser_return")) > 0
+                if seen or entity.number("obstacle_return", 1.0) != 0 or "bitmap" in entity.properties:
                     self._shape(entity, here @ self._pose(entity, "origin"), labels)
                 else:
                     self.shapes.leave_out("model", "that nothing meets")
@@ -251,18 +240,11 @@ class _World:
 
     def _pose(self, entity: _Entity, name: str) -> Array:
         """Return the matrix of a pose [x y z heading], or [x y heading] as Stage 2 has it."""
-        values = entity.numbers(name, (0.0, 0.0, 0.0, 0.0))
-        x, y = values[:2] * self.metre
-        turn = values[2 if len(entity.properties.get(name, [])) == 3 else 3] * self.turn
-        cos, sin = math.cos(turn), math.sin(turn)
-        return np.array([[cos, -sin, x], [sin, cos, y], [0, 0, 1]])
+        x, y, *turns = entity.numbers(name, (0.0, 0.0, 0.0, 0.0)).tolist()
+        turn = turns[0 if len(entity.properties.get(name, [])) == 3 else 1]
+        return frame(x * self.metre, y * self.metre, turn * self.turn)
 
-    def _met(self, entity: _Entity) -> bool:
-        """Return whether robots run into a model, or see it."""
-        seen = entity.number("ranger_return", 1.0) > 0 and entity.number("laser_return", 1.0) > 0
-        return seen or entity.number("obstacle_return", 1.0) != 0 or "bitmap" in entity.properties
-
-    def _shape(self, entity: _Entity, frame: Array, labels: tuple[str, ...]) -> None:
+    def _shape(self, entity: _Entity, around: Array, labels: tuple[str, ...]) -> None:
         """Add what a model covers: its bitmap, its blocks, or a box."""
         size = entity.numbers("size", (0.4, 0.4)) * self.metre
         for length in size.tolist():
@@ -270,16 +252,16 @@ class _World:
 
         def placed(points: Array) -> Array:
             """Return (n, 2) places in a box of side 1 about the origin, in metres in the world."""
-            return np.round((points * size) @ frame[:2, :2].T + frame[:2, 2], 9) + 0.0
+            return np.round(moved(around, points * size), 9) + 0.0
 
-        box = Polygon(placed(np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])))
+        box = Polygon(placed(UNIT_SQUARE))
         rings = _blocks(entity)
         for inner in entity.inside:
             block, _ = self._expanded(inner)
             rings += _blocks(block) if block.type == "block" else []
         if "bitmap" in entity.properties:
-            token = _Token("string", entity.text("bitmap"), f"{entity.at}: bitmap")
-            free, columns, rows = self._bitmap(self._named(token, "picture"))
+            file = self._named(entity.text("bitmap"), "picture", f"{entity.at}: bitmap")
+            free, columns, rows = self._bitmap(file)
             self.shapes.count(vertices_of(free))
             cell = float(max(size[0] / columns, size[1] / rows))
             self.rooms.append(_Room(box, shapely.transform(free, placed), labels, cell))
@@ -330,10 +312,3 @@ def _blocks(entity: _Entity) -> list[Array]:
         if count != len(points):
             raise MapError(f"{entity.at}: {len(points)} points, but {count:g}, as it says, were wanted")
     return [np.array([points[k] for k in sorted(points)]) for points in rings.values()]
-
-
-IMPORTER = Importer(
-    "stage", "Stage: .world with its includes and bitmaps", (".world",),
-    lambda path, head: path.suffix.lower() == ".world" and _MODELS.search(head) is not None, _read,
-    options=frozenset({"anywhere", "around", "only", "skip"}),
-)  # fmt: skip

@@ -2,17 +2,21 @@
 
 Read here, with limits, and not by pytmx or pytiled-parser: these unpack whatever size a file has, and open
 whatever other file it names.
+
+Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like) or by
+collision objects; of a layer without any such tile all, if the option ``only`` names it, or its name, class
+or a property says so. Objects are solid if they or their layer say so or are asked for, and all of them where
+nothing else is. Hidden layers count: those of walls mostly are hidden. `options`: ``cell`` is the width of a
+tile in metres, or ``scale`` that of a pixel.
 """
 
 import binascii
 import math
 import re
-import warnings
 import zlib
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,46 +25,42 @@ from robocov.arrays import Array, BoolArray
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError, counted, listed, one_line, shown
 from robocov_app.formats import files
-from robocov_app.formats.base import ForeignMap, Importer, ReadOptions
+from robocov_app.formats.base import ForeignMap, ReadOptions
+from robocov_app.formats.geometry.frames import frame, moved
 from robocov_app.formats.geometry.raster import free_area, vertices_of
-from robocov_app.formats.geometry.shapes import Line, Shapes, folded, foreign_map
+from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.xml_tree import Element, read_xml_tree
 
 MOST_TILES, MOST_READ = 4_000_000, 16_000_000  # of a map, and of all its layers together
+# collision objects of tiles, each as often as its tile is on the map, and tiles beside the grid
 MOST_PARTS = 10_000
-"""Collision objects of tiles, each as often as its tile is on the map, and tiles beside the grid."""
-
 CELL = 1.0  # width of a tile in metres where none is given: the format has only pixels
+# bits of a global tile ID: the three flips, and the tile
 _FLIPPED, _UPSIDE, _SWAPPED, _ID = 0x80000000, 0x40000000, 0x20000000, 0x0FFFFFFF
-"""Bits of a global tile ID: the three flips, and the tile."""
-
 _RECTANGLE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-_ROOT = re.compile(rb"<map[\s>]")
+ROOT = re.compile(rb"<map[\s>]")
 _SOLID = re.compile(
     r"(is|has|ge)?(collid(e|es|er|ers|able)|collisions?|(map)?walls?|solids?|block(s|ed|ing)?|obstacles?)"
     r"(layer|tiles?|objects?)?"
 )
 _DISC = CircleObstacle((0.0, 0.0), 1.0).polygon
+_NO = ("false", "0", "no")
 _START = re.compile(r"(robot|start|spawn)s?")
-
 _IDs: TypeAlias = NDArray[np.uint32]
 
 
-@dataclass(frozen=True, eq=False)
-class _Tile:
+class _Tile(NamedTuple):
     """A tile that is solid: as a whole, or in the shape of its collision objects, if it has `parts`.
 
     `size`, `offset`, px: of its picture, and how far that is drawn from the lower left of the cell.
     """
 
-    parts: tuple[Element, ...]
+    parts: list[Element]
     size: Array
     offset: Array
-    where: str
 
 
-@dataclass(frozen=True, eq=False)
-class _Layer:
+class _Layer(NamedTuple):
     """A layer of tiles or objects, with its labels and those of the groups around it; `offset` px, y down.
 
     `wall`: whether it is asked for, or says itself that it is solid.
@@ -72,42 +72,34 @@ class _Layer:
     wall: bool
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that a TMX file of Tiled draws.
-
-    Solid are the tiles that say so, by a property or class (``collides``, ``solid``, ``wall`` and the like)
-    or by collision objects; of a layer without any such tile all, if the option ``only`` names it, or its
-    name, class or a property says so. Objects are solid if they or their layer say so or are asked for, and
-    all of them where nothing else is. Hidden layers count: those of walls mostly are hidden. `options`:
-    ``cell`` is the width of a tile in metres, or ``scale`` that of a pixel.
-    """
-    root, where = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
-    return _Map(path, root, Shapes(where, options)).read()
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    return _Map(path, options).read()
 
 
 class _Map:
     """Reads a map: its tilesets and layers."""
 
-    def __init__(self, path: Path, root: Element, shapes: Shapes) -> None:
-        self.path, self.root, self.shapes, self.where = path, root, shapes, shapes.where
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        self.path, self.options = path, options
+        self.root = root = read_xml_tree(path, "map", "TMX", ("data", "chunk"))
+        self.shapes = shapes = Shapes(root.where, options)
         self.tiles_read = self.parts = 0
         orientation = root.attributes.get("orientation", "orthogonal")
         if orientation != "orthogonal":
-            root.refuse(self.where, f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
-        sides = [_whole(root, name, self.where, 1) for name in ("tilewidth", "tileheight")]
-        self.tile = np.array(sides, float)
-        options = shapes.options
-        if options.cell is not None and options.scale is not None:
+            root.refuse(f"{one_line(orientation)[:20]}, but an orthogonal map was wanted")
+        self.tile = np.array([_whole(root, name, 1) for name in ("tilewidth", "tileheight")], float)
+        cell, scale = options.cell, options.scale
+        if cell is not None and scale is not None:
             raise ParameterError("--cell, --scale: both say how large a tile is, but one of them was wanted")
-        if options.cell is None and options.scale is None:
+        if cell is None and scale is None:
             shapes.notes.append(f"no size of a tile was given: {CELL:g} m wide taken (--cell)")
-        self.pixel = options.scale or (options.cell or CELL) / float(self.tile[0])
-        files.require_length(self.pixel * float(self.tile.max()), f"{self.where}: the side of a tile")
+        self.pixel = scale or (cell or CELL) / float(self.tile[0])
+        files.require_length(self.pixel * float(self.tile.max()), f"{root.where}: the side of a tile")
         self.corner = np.zeros(2)
         self.shape = (0, 0)
 
     def read(self) -> ForeignMap:
-        shapes, tiles = self.shapes, self._tiles()
+        shapes, where, tiles = self.shapes, self.root.where, self._tiles()
         layers = [*self._layers(self.root, (), np.zeros(2), wall=False)]
         grids = self._grids([layer for layer in layers if layer.element.tag == "layer"])
         solid = np.zeros(self.shape, dtype=bool)
@@ -118,59 +110,58 @@ class _Map:
         if not (solid.any() or shapes.outlines or shapes.lines or shapes.pillars):
             names = listed([shown(layer.labels[0]) for layer in layers if layer.labels])
             raise MapError(
-                f"{self.where}: nothing is solid by properties, collision objects or names of layers, but "
+                f"{where}: nothing is solid by properties, collision objects or names of layers, but "
                 f"--only LAYER, with one of walls, was wanted then: {names or 'there is none'}"
             )
         width, height = (self.pixel * self.tile).tolist()
-        world = free_area(~solid, (width, height), (0.0, 0.0), self.where)
+        world = free_area(~solid, (width, height), (0.0, 0.0), where)
         shapes.count(vertices_of(world))
         shapes.cell = max(width, height) if solid.any() else None
-        text = "A map of Tiled, imported."
-        return foreign_map(shapes, IMPORTER.name, self.path.stem, text, solid=True, world=world)
+        return foreign_map(shapes, self.path.stem, "A map of Tiled, imported.", solid=True, world=world)
 
     def _tiles(self) -> dict[int, _Tile]:
-        """Return the tiles that are solid by their global IDs."""
+        """Return the tiles that are solid, by their global IDs."""
         found: dict[int, _Tile] = {}
-        for element in self.root.children:
-            if element.tag != "tileset":
+        for tileset in self.root.children:
+            if tileset.tag != "tileset":
                 continue
-            first, tileset, where = _whole(element, "firstgid", self.where, 1), element, self.where
-            source = element.attributes.get("source")
+            first = _whole(tileset, "firstgid", 1)
+            source = tileset.attributes.get("source")
             if source is not None:
-                at = f"{self.where}:{element.line}"
-                anywhere = self.shapes.options.anywhere
-                file, note = files.named_file(self.path, source, anywhere=anywhere, at=at, what="tileset")
-                self.shapes.notes += [] if note is None else [note]
-                tileset, where = read_xml_tree(file, "tileset", "TSX")
-            size = np.array([_number(tileset, name, where) for name in ("tilewidth", "tileheight")])
+                at, notes = f"{tileset.where}:{tileset.line}", self.shapes.notes
+                file = files.named_file(
+                    self.path, source, "tileset", at, notes, anywhere=self.options.anywhere
+                )
+                tileset = read_xml_tree(file, "tileset", "TSX")
+            size = np.array([_number(tileset, name) for name in ("tilewidth", "tileheight")])
             drawn = tileset.child("tileoffset")
-            offset = np.array([0.0 if drawn is None else _number(drawn, name, where) for name in "xy"])
+            offset = np.zeros(2) if drawn is None else np.array([_number(drawn, name) for name in "xy"])
             for tile in tileset.children:
-                group = tile.child("objectgroup") if tile.tag == "tile" else None
-                parts = () if group is None else tuple(group.children)
-                if tile.tag == "tile" and (parts or _says_solid(tile)):
-                    found[first + _whole(tile, "id", where, 0)] = _Tile(parts, size, offset, where)
+                if tile.tag != "tile":
+                    continue
+                group = tile.child("objectgroup")
+                parts = [] if group is None else group.children
+                if parts or _says_solid(tile):
+                    found[first + _whole(tile, "id", 0)] = _Tile(parts, size, offset)
         return found
 
     def _layers(
         self, parent: Element, labels: tuple[str, ...], offset: Array, *, wall: bool
     ) -> Iterator[_Layer]:
         """Yield the layers that are asked for, groups opened."""
-        only, skip = self.shapes.options.only, folded(self.shapes.options.skip or ())
+        shapes = self.shapes
         for element in parent.children:
             if element.tag not in ("layer", "objectgroup", "group"):
                 continue
-            names = tuple(element.attributes[key] for key in ("name", "class") if element.attributes.get(key))
-            names += labels
-            self.shapes.labels |= {name.casefold(): name for name in names}
-            moved = offset + [_number(element, key, self.where) for key in ("offsetx", "offsety")]
-            asked = only is not None and bool(folded(only) & folded(names))
-            says = wall or (only is None and _says_solid(element, names)) or asked
-            if skip & folded(names):
-                self.shapes.leave_out("layer", "by the names that were asked for")
+            names = (*filter(None, map(element.attributes.get, ("name", "class"))), *labels)
+            found = shapes.seen(names)
+            moved = offset + [_number(element, key) for key in ("offsetx", "offsety")]
+            says = wall or (_says_solid(element, names) if shapes.only is None else bool(shapes.only & found))
+            if shapes.skip & found:
+                shapes.leave_out("layer", "by the names that were asked for")
             elif element.tag == "group":
                 yield from self._layers(element, names, moved, wall=says)
-            elif element.tag == "objectgroup" or only is None or says:
+            elif element.tag == "objectgroup" or shapes.only is None or says:
                 yield _Layer(element, names, moved, says)
 
     def _grids(self, layers: list[_Layer]) -> list[tuple[_Layer, _IDs]]:
@@ -178,18 +169,17 @@ class _Map:
         given = [(layer, [*self._pieces(layer.element)]) for layer in layers]
         pieces = [piece for _, some in given for piece in some]
         left = top = 0
-        right, bottom = (_whole(self.root, name, self.where, 1) for name in ("width", "height"))
+        right, bottom = (_whole(self.root, name, 1) for name in ("width", "height"))
         infinite = bool(pieces) and self.root.attributes.get("infinite", "0") != "0"
         if infinite:
             left, top = min(x for x, _, _ in pieces), min(y for _, y, _ in pieces)
             right, bottom = (max(piece[k] + piece[2].shape[1 - k] for piece in pieces) for k in (0, 1))
         elif any((x, y, *ids.shape) != (0, 0, bottom, right) for x, y, ids in pieces):
-            what = f"a layer of another size, but one of {right} x {bottom} tiles was wanted"
-            self.root.refuse(self.where, what)
+            self.root.refuse(f"a layer of another size, but one of {right} x {bottom} tiles was wanted")
         self.shape = bottom - top, right - left
         if math.prod(self.shape) > MOST_TILES or math.prod(self.shape) * len(given) > MOST_READ:
-            what = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
-            self.root.refuse(self.where, f"{what}, but fewer were wanted")
+            found = f"{right - left} x {bottom - top} tiles in {counted(len(given), 'layer')}"
+            self.root.refuse(f"{found}, but fewer were wanted")
         grids = []
         for layer, some in given:
             grid = np.zeros(self.shape, np.uint32)
@@ -208,53 +198,18 @@ class _Map:
     def _pieces(self, layer: Element) -> Iterator[tuple[int, int, _IDs]]:
         """Yield the tiles of a layer: all, or, of an infinite map, chunk by chunk, with column and row."""
         data = layer.child("data")
-        chunks = [] if data is None else [child for child in data.children if child.tag == "chunk"]
-        for part in chunks or ([] if data is None else [data]):
-            sized = part if chunks else layer
-            width, height = (_whole(sized, name, self.where, 1) for name in ("width", "height"))
+        if data is None:
+            return
+        chunks = [child for child in data.children if child.tag == "chunk"]
+        for part in chunks or [data]:
+            width, height = (_whole(part if chunks else layer, name, 1) for name in ("width", "height"))
             self.tiles_read += width * height
             if self.tiles_read > MOST_READ:
-                what = f"with those before more than {MOST_READ} tiles"
-                part.refuse(self.where, f"{what}, but fewer were wanted")
-            x, y = (_whole(part, name, self.where, -MOST_READ, "0") for name in "xy") if chunks else (0, 0)
-            yield x, y, self._decoded(part, data or part, width * height).reshape(height, width)
-
-    def _decoded(self, part: Element, data: Element, count: int) -> _IDs:
-        """Return the global IDs of so many tiles."""
-        encoding, packing = (data.attributes.get(key, "") for key in ("encoding", "compression"))
-        if encoding == "base64" and packing in ("", "zlib", "gzip"):
-            try:
-                raw = binascii.a2b_base64("".join(part.text.split()), strict_mode=True)
-                if packing:  # not more than there should be, whatever is in it
-                    raw = zlib.decompressobj(wbits=47).decompress(raw, 4 * count + 1)
-            except (ValueError, zlib.error) as error:
-                part.refuse(self.where, f"not {packing or encoding}: {one_line(error)[:60]}")
-            ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
-        elif encoding == "csv":
-            more = part.text.count(",") > count  # a comma may end it
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", DeprecationWarning)
-                try:
-                    numbers = np.fromstring("" if more else part.text, dtype=np.int64, sep=",")
-                except (DeprecationWarning, ValueError, OverflowError):
-                    numbers = np.array([-1])
-            if len(numbers) and not 0 <= numbers.min() <= numbers.max() < 2**32:
-                what = "what is not whole numbers from 0, but those, with commas, were wanted"
-                part.refuse(self.where, what)
-            ids = None if more else numbers.astype(np.uint32)
-        elif not encoding:
-            tiles = [child for child in part.children if child.tag == "tile"]
-            ids = np.array([_whole(tile, "gid", self.where, 0, "0") for tile in tiles], np.uint32)
-        else:
-            name = " ".join(filter(None, (one_line(encoding)[:20], one_line(packing)[:20])))
-            part.refuse(self.where, f"{name}, but CSV, or base64 with zlib or gzip or neither, was wanted")
-        if ids is None or len(ids) != count:
-            found = "more" if ids is None else len(ids)
-            part.refuse(self.where, f"{found} tiles, but {count}, as it says, were wanted")
-        return ids
+                part.refuse(f"with those before more than {MOST_READ} tiles, but fewer were wanted")
+            x, y = (_whole(part, name, -MOST_READ, "0") for name in "xy") if chunks else (0, 0)
+            yield x, y, _decoded(part, data, width * height).reshape(height, width)
 
     def _metres(self, points: Array) -> Array:
-        """Return (n, 2) places in pixels, y down, in metres on the map."""
         return np.asarray((points - self.corner) * [self.pixel, -self.pixel])
 
     def _solid(self, layer: _Layer, ids: _IDs, tiles: dict[int, _Tile]) -> BoolArray:
@@ -267,57 +222,51 @@ class _Map:
             tile = tiles.get(gid & _ID)
             if tile is None or not tile.parts:
                 continue
-            figures = [_figure(part, tile.where) for part in tile.parts]
-            if any(figure and np.array_equal(figure[1], _RECTANGLE * self.tile) for figure in figures):
+            figures = [_figure(part) for part in tile.parts]
+            if any(np.array_equal(points, _RECTANGLE * self.tile) for _, points in figures):
                 full |= ids == gid
                 continue
             for row, column in np.argwhere(ids == gid).tolist():
                 corner = place + [column, row + 1] * self.tile - [0.0, tile.size[1]] + tile.offset
-                for part, figure in zip(tile.parts, figures, strict=True):
-                    turned = figure and (figure[0], corner + _turned(figure[1], gid, tile.size))
-                    self._add_part(part, turned, layer.labels)
+                for part, (kind, points) in zip(tile.parts, figures, strict=True):
+                    self._add_part(part, kind, corner + _turned(points, gid, tile.size), layer.labels)
         if layer.offset.any():  # beside the grid
             for row, column in np.argwhere(full).tolist():
-                cell = "polygon", place + np.add(_RECTANGLE, [column, row]) * self.tile
-                self._add_part(layer.element, cell, layer.labels)
+                cell = place + np.add(_RECTANGLE, [column, row]) * self.tile
+                self._add_part(layer.element, "polygon", cell, layer.labels)
             full = np.zeros_like(full)
         return full
 
-    def _add_part(self, element: Element, figure: tuple[str, Array] | None, labels: tuple[str, ...]) -> None:
-        """Add a part of a layer that is no cell of the grid."""
+    def _add_part(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
         self.parts += 1
         if self.parts > MOST_PARTS:
-            self.root.refuse(self.where, f"more than {MOST_PARTS} parts of tiles, but fewer were wanted")
-        self._add(element, figure, labels)
+            self.root.refuse(f"more than {MOST_PARTS} parts of tiles, but fewer were wanted")
+        self._add(element, kind, points, labels)
 
     def _add_objects(self, layers: list[_Layer], *, anything: bool) -> None:
         """Add the objects that are solid, or all; those that are called robots are places to start."""
-        options, shapes = self.shapes.options, self.shapes
+        shapes = self.shapes
         for layer in layers:
             for element in layer.element.children:
                 given = [element.attributes.get(key, "") for key in ("name", "class", "type")]
                 labels = (*filter(None, given), *layer.labels)
-                shapes.labels |= {label.casefold(): label for label in labels}
-                if element.tag != "object" or folded(options.skip or ()) & folded(labels):
+                found = shapes.seen(labels)
+                if element.tag != "object" or shapes.skip & found:
                     continue
-                figure = _figure(element, self.where)
-                if figure is not None:
-                    figure = figure[0], figure[1] + layer.offset
-                asked = bool(folded(options.only or ()) & folded(labels))
-                if figure is not None and any(_START.fullmatch(_plain(label)) for label in given):
-                    x, y = self._metres(figure[1].mean(axis=0)).tolist()
+                kind, points = _figure(element)
+                points = points + layer.offset
+                says = anything or layer.wall or _says_solid(element, labels)
+                if kind and any(_START.fullmatch(_plain(label)) for label in given):
+                    x, y = self._metres(points.mean(axis=0)).tolist()
                     shapes.robots.append((x, y))
-                elif asked or (
-                    options.only is None and (anything or layer.wall or _says_solid(element, labels))
-                ):
-                    self._add(element, figure, labels)
+                elif says if shapes.only is None else shapes.only & found:
+                    self._add(element, kind, points, labels)
                 else:
                     shapes.leave_out("object", "not solid by name or property (--only NAME takes it)")
 
-    def _add(self, element: Element, figure: tuple[str, Array] | None, labels: tuple[str, ...]) -> None:
-        """Add an obstacle whose points are pixels on the map."""
-        shapes, at = self.shapes, f"line {element.line}"
-        kind, points = ("", np.empty((0, 2))) if figure is None else (figure[0], self._metres(figure[1]))
+    def _add(self, element: Element, kind: str, points: Array, labels: tuple[str, ...]) -> None:
+        """Add an obstacle of a kind, as of `_figure`, in pixels on the map."""
+        shapes, at, points = self.shapes, f"line {element.line}", self._metres(points)
         if kind == "line":
             shapes.add_line(Line(points, shapes.thickness, labels), at=at)
         elif kind == "circle" and (points[0] != points[1]).any():
@@ -328,17 +277,44 @@ class _Map:
             shapes.leave_out("object", "of text, a template or without an area")
 
 
-def _figure(element: Element, where: str) -> tuple[str, Array] | None:
-    """Return the kind of an object (polygon, line, circle, point) and its points in pixels; None of others.
+def _decoded(part: Element, data: Element, count: int) -> _IDs:
+    """Return so many global IDs of tiles, encoded as `data` says."""
+    encoding, packing = (data.attributes.get(key, "") for key in ("encoding", "compression"))
+    if encoding == "base64" and packing in ("", "zlib", "gzip"):
+        try:
+            raw = binascii.a2b_base64("".join(part.text.split()), strict_mode=True)
+            if packing:  # not more than there should be, whatever is in it
+                raw = zlib.decompressobj(wbits=47).decompress(raw, 4 * count + 1)
+        except (ValueError, zlib.error) as error:
+            part.refuse(f"not {packing or encoding}: {one_line(error)[:60]}")
+        ids = np.frombuffer(raw, "<u4", min(count, len(raw) // 4)) if len(raw) <= 4 * count else None
+    elif encoding == "csv":
+        more = part.text.count(",") > count  # a comma may end it
+        numbers = files.whole_numbers("" if more else part.text, ",")
+        if numbers is None or not ((numbers >= 0) & (numbers < 2**32)).all():
+            part.refuse("what is not whole numbers from 0, but those, with commas, were wanted")
+        ids = None if more else numbers.astype(np.uint32)
+    elif not encoding:
+        tiles = [child for child in part.children if child.tag == "tile"]
+        ids = np.array([_whole(tile, "gid", 0, "0") for tile in tiles], np.uint32)
+    else:
+        name = " ".join(filter(None, (one_line(encoding)[:20], one_line(packing)[:20])))
+        part.refuse(f"{name}, but CSV, or base64 with zlib or gzip or neither, was wanted")
+    if ids is None or len(ids) != count:
+        part.refuse(f"{'more' if ids is None else len(ids)} tiles, but {count}, as it says, were wanted")
+    return ids
+
+
+def _figure(element: Element) -> tuple[str, Array]:
+    """Return the kind of an object, polygon, line, circle, point or none, and its points in pixels.
 
     Of a circle they are its centre and one of the rim.
     """
-    names = ("x", "y", "width", "height", "rotation")
-    x, y, width, height, turn = (_number(element, name, where) for name in names)
+    x, y, width, height, turn = (_number(element, key) for key in ("x", "y", "width", "height", "rotation"))
     kind, points = "polygon", _RECTANGLE * [width, height]
     children = {child.tag: child for child in element.children}
     if "template" in element.attributes or children.keys() & {"text", "capsule"}:
-        return None
+        return "", np.empty((0, 2))
     if "gid" in element.attributes:  # of pictures the lower left corner is given
         points = points - [0.0, height]
     elif "point" in children or (width == height == 0.0 and not children.keys() & {"polygon", "polyline"}):
@@ -350,12 +326,11 @@ def _figure(element: Element, where: str) -> tuple[str, Array] | None:
             kind, points = "polygon", np.asarray(_DISC.exterior.coords)[:-1] * middle + middle
     for tag, name, least in (("polygon", "polygon", 3), ("polyline", "line", 2)):
         if tag in children:
-            flat = children[tag].numbers(where, "points")
+            flat = children[tag].numbers("points")
             if len(flat) % 2 or len(flat) < 2 * least:
-                children[tag].refuse(where, f"points: {len(flat)} numbers, but {least} points were wanted")
+                children[tag].refuse(f"points: {len(flat)} numbers, but {least} points were wanted")
             kind, points = name, flat.reshape(-1, 2)
-    cos, sin = math.cos(math.radians(turn)), math.sin(math.radians(turn))
-    return kind, points @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
+    return kind, moved(frame(x, y, math.radians(turn)), points)
 
 
 def _turned(points: Array, gid: int, size: Array) -> Array:
@@ -370,34 +345,23 @@ def _turned(points: Array, gid: int, size: Array) -> Array:
 
 def _says_solid(element: Element, names: Iterable[str] = ()) -> bool:
     """Return whether an element is solid by its names, its class or a property."""
-    classes = [element.attributes.get(key, "") for key in ("class", "type")]
-    if any(_SOLID.fullmatch(_plain(name)) for name in (*names, *classes)):
-        return True
     properties = element.child("properties")
-    return properties is not None and any(
-        _SOLID.fullmatch(_plain(child.attributes.get("name", "")))
-        and child.attributes.get("value", "").casefold() not in ("false", "0", "no")
-        for child in properties.children
-    )
+    given = () if properties is None else [child.attributes for child in properties.children]
+    yes = [each.get("name", "") for each in given if each.get("value", "").casefold() not in _NO]
+    classes = [element.attributes.get(key, "") for key in ("class", "type")]
+    return any(_SOLID.fullmatch(_plain(name)) for name in (*names, *classes, *yes))
 
 
 def _plain(name: str) -> str:
     return re.sub(r"[\W\d_]", "", name.casefold())
 
 
-def _number(element: Element, name: str, where: str) -> float:
-    return float(element.numbers(where, name, count=1, default="0")[0])
+def _number(element: Element, name: str) -> float:
+    return float(element.numbers(name, count=1, default="0")[0])
 
 
-def _whole(element: Element, name: str, where: str, least: int, default: str = "") -> int:
+def _whole(element: Element, name: str, least: int, default: str = "") -> int:
     text = element.attributes.get(name, default)
     if not re.fullmatch(r"-?[0-9]{1,10}", text) or not least <= int(text) < 2**32:
-        element.refuse(where, f"{name} {shown(text)}, but a whole number from {least} was wanted")
+        element.refuse(f"{name} {shown(text)}, but a whole number from {least} was wanted")
     return int(text)
-
-
-IMPORTER = Importer(
-    "tmx", "Tiled: TMX of orthogonal maps, tiles and objects", (".tmx",),
-    lambda path, head: _ROOT.search(head) is not None and b"tilewidth" in head, _read,
-    options=frozenset({"cell", "scale", "thickness", "pillar", "anywhere", "only", "skip"}),
-)  # fmt: skip

@@ -13,7 +13,6 @@ _ROS_MAP = "drive a robot through it, or open it in RViz, and save a map with ma
 _UNPACK = "unpack it first"
 _PNG = "save it as a PNG"
 _FORMAT = r"\s*\{[^{}\[\]]*\"format\"\s*:\s*\"robocov-"
-
 _KINDS = [
     (r"\Z", "empty", "is it the right file?"),
     (_FORMAT + r"map\"", "a map of robocov already", "robocov check, run and edit take it as it is"),
@@ -52,17 +51,11 @@ _KINDS = [
 _TABLE = [
     (re.compile(begin.encode("latin-1"), re.DOTALL | re.IGNORECASE), what, way) for begin, what, way in _KINDS
 ]
-
 _PARTS = (".dbf", ".shx", ".prj", ".cpg")
 
 
 def named_kind(path: Path, head: bytes) -> str | None:
-    """Return what a file that begins with `head` is, and what to do with it; None where it is not known.
-
-    >>> from pathlib import Path
-    >>> named_kind(Path("plan.pdf"), b"%PDF-1.7")
-    'a PDF, which cannot be imported: pdftocairo -svg plan.pdf out.svg, or pdftoppm -png for a scan'
-    """
+    """Return what a file that begins with `head` is, and what to do with it; None where it is not known."""
     what, way = next(((what, way) for begin, what, way in _TABLE if begin.match(head)), ("", ""))
     suffix, name = path.suffix.lower(), shlex.quote(path.name)
     if not what and suffix == ".stl" and len(head) > 84:  # 80 bytes of anything, and their number

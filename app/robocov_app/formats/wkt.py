@@ -1,10 +1,16 @@
 """Well-known text.
 
 The grammar is that of OGC 06-103r4, section 7, with the prefix ``SRID=...;`` of PostGIS.
+
+Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
+Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in it;
+where there are only lines they are walls. The option ``outlines`` says it otherwise; see
+`shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
 """
 
 import re
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,7 +22,7 @@ from robocov.environment import Environment
 from robocov.errors import MapError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import line_and_column
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_DEPTH, name_of_map, read_text
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.polygons import DIGITS, decimal, on_grid, rings
@@ -29,9 +35,8 @@ KINDS = (
 )  # fmt: skip
 """The geometries that are read."""
 
+# those that are known and not read
 CURVED = ("CIRCULARSTRING", "COMPOUNDCURVE", "CURVEPOLYGON", "MULTICURVE", "MULTISURFACE", "CURVE", "SURFACE")
-"""Those that are known and not read."""
-
 _SPACE = re.compile(r"\s*")
 _WORD = re.compile(r"[A-Za-z_]+")
 _KIND = re.compile(rf"((?ai:{'|'.join(KINDS)}))\s*((?ai:ZM|Z|M))?(?![A-Za-z_])")
@@ -57,8 +62,7 @@ class WktText:
         self._figures: list[Figure] = []
 
     def figures(self) -> list[Figure]:
-        """Return all geometries; the parts of collections one by one."""
-        count = 0
+        number = 0
         while self._skip_space() < len(self.text):
             srid = _SRID.match(self.text, self.at)
             if srid:
@@ -67,8 +71,8 @@ class WktText:
                 self.srid = int(srid[1])
                 self.at = srid.end()
                 self._skip_space()
-            count += 1
-            self._geometry(0, f"geometry {count}")
+            number += 1
+            self._geometry(0, f"geometry {number}")
             if self._skip_space() < len(self.text) and self.text[self.at] in ",;":
                 self.at += 1
         return self._figures
@@ -76,59 +80,57 @@ class WktText:
     def _geometry(self, depth: int, place: str) -> None:
         if depth > MAX_DEPTH:
             self._refuse(f"nested too deeply, but at most {MAX_DEPTH} levels were wanted")
-        begin = self.at
+        begin, add = self.at, self._figures.append
         kind, measured = self._kind()
         if self._empty():
             self.shapes.leave_out("geometry", "without coordinates")
         elif kind == "GEOMETRYCOLLECTION":
-            for number, _ in enumerate(self._items(), start=1):
+            for number in self._items(empty=False):
                 self._geometry(depth + 1, f"{place}.{number}")
         elif kind in ("POLYGON", "TRIANGLE"):
             self._polygon(measured, place)
         elif kind in ("MULTIPOLYGON", "POLYHEDRALSURFACE", "TIN"):
-            for number, _ in enumerate(self._items(), start=1):
-                if not self._empty():
-                    self._polygon(measured, f"{place}.{number}")
+            for number in self._items():
+                self._polygon(measured, f"{place}.{number}")
         elif kind == "MULTILINESTRING":
             for _ in self._items():
-                if not self._empty():
-                    self._figures.append(Figure("line", (self._points(measured, 2),), at=place))
+                add(Figure("line", (self._points(measured, 2),), at=place))
         elif kind in ("LINESTRING", "LINEARRING"):
-            self._figures.append(Figure("line", (self._points(measured, 2),), at=place))
-        elif kind == "POINT":
-            points = self._points(measured, 1)
-            if len(points) != 1:
-                self._refuse(f"{len(points)} points, but one was wanted", begin)
-            self._figures.append(Figure("point", (points,), at=place))
+            add(Figure("line", (self._points(measured, 2),), at=place))
         else:
-            self._multipoint(measured, place)
+            several = kind == "MULTIPOINT" and not _POINTS.match(self.text, self.at)
+            parts = [self._points(measured, 1) for _ in (self._items() if several else [0])]
+            if kind == "POINT" and len(parts[0]) != 1:
+                self._refuse(f"{len(parts[0])} points, but one was wanted", begin)
+            self._figures += [Figure("point", (point[None],), at=place) for part in parts for point in part]
 
     def _kind(self) -> tuple[str, bool]:
         """Read the word that begins a geometry; return it, and whether its last coordinate is a measure."""
-        if match := _KIND.match(self.text, self.at):
-            self.at = match.end()
-            self._skip_space()
-            return match[1].upper(), (match[2] or "").upper() == "M"
-        word = _WORD.match(self.text, self.at)
-        found = word[0].upper() if word else ""
-        if found.rstrip("ZM") in CURVED:
-            raise self._refusal(f"{found}, but a geometry of straight edges was wanted")
-        raise self._refusal(f"{self._found()}, but one of {', '.join(KINDS)} was wanted")
+        match = _KIND.match(self.text, self.at)
+        if match is None:
+            word = _WORD.match(self.text, self.at)
+            found = word[0].upper() if word else ""
+            if found.rstrip("ZM") in CURVED:
+                self._refuse(f"{found}, but a geometry of straight edges was wanted")
+            self._refuse(f"{self._found()}, but one of {', '.join(KINDS)} was wanted")
+        self.at = match.end()
+        self._skip_space()
+        return match[1].upper(), (match[2] or "").upper() == "M"
 
     def _empty(self) -> bool:
-        """Read the word EMPTY if it comes next."""
         word = _WORD.match(self.text, self._skip_space())
         if word is None or word[0].upper() != "EMPTY":
             return False
         self.at = word.end()
         return True
 
-    def _items(self) -> Iterator[None]:
-        """Read the brackets and commas around items that the caller reads."""
+    def _items(self, *, empty: bool = True) -> Iterator[int]:
+        """Read brackets and commas around items that the caller reads: all but those that may be EMPTY."""
         self._expect("(")
-        while True:
+        for number in count(1):
             self._skip_space()
-            yield
+            if not (empty and self._empty()):
+                yield number
             self._skip_space()
             if self.text[self.at : self.at + 1] != ",":
                 break
@@ -136,23 +138,8 @@ class WktText:
         self._expect(")")
 
     def _polygon(self, measured: bool, place: str) -> None:
-        rings = []
-        for _ in self._items():
-            if self._empty():
-                continue
-            ring = self._points(measured, 1)
-            if len(ring) > 1 and (ring[0] != ring[-1]).any():
-                self.shapes.mended["ring", "closed: the last point was not the first"] += 1
-            rings.append(ring)
-        if rings:
-            self._figures.append(Figure("polygon", tuple(rings), at=place))
-
-    def _multipoint(self, measured: bool, place: str) -> None:
-        if _POINTS.match(self.text, self.at):
-            points = self._points(measured, 1)
-        else:
-            points = np.concatenate([self._points(measured, 1) for _ in self._items() if not self._empty()])
-        self._figures += [Figure("point", (point[None],), at=place) for point in points]
+        if rings := [self._points(measured, 1) for _ in self._items()]:
+            self._figures.append(self.shapes.polygon(rings, (), place))
 
     def _points(self, measured: bool, least: int) -> Array:
         """Read points in brackets; return them as (k, 2)."""
@@ -201,7 +188,6 @@ class WktText:
         self.at += 1
 
     def _found(self) -> str:
-        """Return what comes next, as messages quote it."""
         rest = self.text[self._skip_space() : self.at + 24].splitlines()
         return shown(rest[0]) if rest else "the end"
 
@@ -212,28 +198,18 @@ class WktText:
         self._refuse(f"{what}, but a point as 1.5 2, with as many numbers as the first, was wanted")
 
     def _refuse(self, what: str, at: int | None = None) -> NoReturn:
-        raise self._refusal(what, at)
-
-    def _refusal(self, what: str, at: int | None = None) -> MapError:
         line, column = line_and_column(self.text, self.at if at is None else at)
-        return MapError(f"{self.where}:{line}:{column}: {what}")
+        raise MapError(f"{self.where}:{line}:{column}: {what}")
 
 
-_BEGIN = re.compile(
+BEGIN = re.compile(
     rb"(?:\xef\xbb\xbf)?(?:\s|(?:#|--)[^\n]*\n)*(?:SRID\s*=\s*\d+\s*;\s*)?(?:%s)(?:ZM|Z|M)?\s*(?:ZM|Z|M)?\s*(?:\(|EMPTY)"
     % b"|".join(kind.encode() for kind in (*KINDS, *CURVED)),
     re.IGNORECASE,
 )
 
 
-def _read(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that the geometries of a file stand for.
-
-    Polygons are free space, all of them together, and their holes are obstacles: JuPedSim's accessible areas.
-    Only where all other polygons lie wholly in one, to which they would add nothing, they are obstacles in
-    it; where there are only lines they are walls. The option ``outlines`` says it otherwise; see
-    `shapes.foreign_map`. Coordinates are metres, unless a prefix ``SRID=...;`` names another system.
-    """
+def read(path: Path, options: ReadOptions) -> ForeignMap:
     text, where = read_text(path, b",")
     shapes = Shapes(where, options)
     parsed = WktText(text, where, shapes)
@@ -241,18 +217,10 @@ def _read(path: Path, options: ReadOptions) -> ForeignMap:
     crs = f"EPSG:{parsed.srid}" if parsed.srid else None
     figures, shapes.notes = in_metres(figures, options, where, crs=crs)
     shapes.add_all(figures)
-    name, text = name_of_map(path), "Imported from WKT."
-    return foreign_map(shapes, IMPORTER.name, name, text, solid=False, accessible=True)
+    return foreign_map(shapes, name_of_map(path), "Imported from WKT.", solid=False, accessible=True)
 
 
-IMPORTER = Importer(
-    "wkt", "well-known text (JuPedSim, PostGIS, shapely): polygons, lines, collections",
-    (".wkt", ".ewkt"), lambda path, head: _BEGIN.match(head) is not None, _read,
-    options=frozenset({"scale", "units", "thickness", "pillar", "outlines", "around"}),
-)  # fmt: skip
-
-
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     digits = DIGITS if options.digits is None else options.digits
     free = on_grid(environment.free, digits)
     parts = [_text(part, digits) for part in free]
@@ -271,9 +239,3 @@ def _text(polygon: Polygon, digits: int) -> str:
     points = [[f"{decimal(x, digits)} {decimal(y, digits)}" for x, y in ring] for ring in rings(polygon)]
     parts = [f"({', '.join(ring)})" for ring in points]
     return f"({', '.join(parts)})"
-
-
-EXPORTER = Exporter(
-    "wkt", "well-known text (JuPedSim): the free space as polygons with holes", (".wkt",), _write,
-    options=frozenset({"digits"}),
-)  # fmt: skip

@@ -17,7 +17,6 @@ from robocov_app.formats import files
 
 MOST_ELEMENTS = 100_000  # in a file, and drawn of it where parts are used again
 MOST_ATTRIBUTES = 1_000_000
-
 DEEPEST = 100  # deepest nesting of elements and uses; drawing programs stay below 30
 _SVG = "http://www.w3.org/2000/svg"
 _EXPANDED = 1_000_000
@@ -29,19 +28,20 @@ _LONGEST_NAMESPACE, _MOST_DECLARATIONS = 1000, 1000
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of SVG, or of a format without namespaces, with its line; others are left out.
-
-    Names are without namespaces; `text` is of elements whose text means something only.
-    """
+    """An element of SVG or of no namespace, named without; `pieces` of text, where that means something."""
 
     tag: str
     attributes: dict[str, str]
+    where: str
     line: int
     children: list[Element] = field(default_factory=list)
-    text: str = ""
+    pieces: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        return "".join(self.pieces)
 
     def everything(self) -> Iterator[Element]:
-        """Yield this element and all in it."""
         waiting = [self]
         while waiting:
             element = waiting.pop()
@@ -49,37 +49,30 @@ class Element:
             waiting += reversed(element.children)
 
     def child(self, tag: str) -> Element | None:
-        """Return the first child with a tag, if there is one."""
         return next((child for child in self.children if child.tag == tag), None)
 
-    def numbers(
-        self, where: str, name: str, *, count: int | None = None, default: str | None = None
-    ) -> Array:
+    def numbers(self, name: str, count: int | None = None, default: str | None = None) -> Array:
         """Return the numbers of an attribute, which commas or blanks separate, `count` of them."""
         text = self.attributes.get(name, default)
-        try:
-            values = np.array([float(part) for part in (text or "").replace(",", " ").split()])
-        except ValueError:
-            values = np.array([np.nan])
+        values = np.array([files.number(part) for part in (text or "").replace(",", " ").split()])
         if text is None or count not in (None, len(values)) or not (np.abs(values) <= FARTHEST).all():
             found = "missing" if text is None else shown(text)
-            wanted = "numbers" if count is None else "a number" if count == 1 else f"{count} numbers"
-            wanted += " within 1e7 was" if count == 1 else " within 1e7 were"
-            self.refuse(where, f"{name}: {found}, but {wanted} wanted")
+            wanted = {None: "numbers within 1e7 were", 1: "a number within 1e7 was"}
+            self.refuse(
+                f"{name}: {found}, but {wanted.get(count, f'{count} numbers within 1e7 were')} wanted"
+            )
         return values
 
-    def refuse(self, where: str, what: str) -> NoReturn:
-        """Raise the error of this element."""
+    def refuse(self, what: str) -> NoReturn:
         name = self.attributes.get("id")
         called = f"<{self.tag}>" if name is None else f"<{self.tag}> {shown(name)}"
-        raise MapError(f"{where}:{self.line}: {called}: {what}")
+        raise MapError(f"{self.where}:{self.line}: {called}: {what}")
 
 
-def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> tuple[Element, str]:
-    """Return the root of the XML file at `path`, and what messages call the file.
+def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ()) -> Element:
+    """Return the `root` of an XML file, which messages call a `kind`; `texts`: tags whose text counts.
 
-    `root`: tag that the root has. `kind`: what messages call the format. `texts`: tags of elements whose text
-    means something. Refused are entities that stand for other files, other entities or too much.
+    Refused are entities that stand for other files, other entities or too much.
     """
     where = one_line(path)
     content = files.content(path, files.MAX_TEXT_BYTES)
@@ -87,42 +80,38 @@ def read_xml_tree(path: Path, root: str, kind: str, texts: Collection[str] = ())
         raise MapError(f"{where}: compressed, but plain {kind} was wanted (gunzip makes it)")
     if content.count(b"=") > MOST_ATTRIBUTES:
         raise MapError(f"{where}: more than {MOST_ATTRIBUTES} attributes, but fewer were wanted")
-    return _Reader(where, content, root, kind, texts).root(), where
+    reader = _Reader(where, content, kind, texts)
+    try:
+        reader.parser.Parse(content, True)
+    except (expat.ExpatError, ValueError, LookupError) as error:
+        line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
+        reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
+        raise MapError(f"{where}{line}: not XML: {one_line(reason)[:60]}") from None
+    first = reader.first
+    if first is None or first.tag != root:
+        found = "other XML" if first is None else f"<{first.tag}>"
+        raise MapError(f"{where}: {found}, but <{root}> was wanted")
+    return first
 
 
 class _Reader:
-    def __init__(self, where: str, content: bytes, wanted: str, kind: str, texts: Collection[str]) -> None:
-        self.where, self.content = where, content
-        self.wanted, self.kind, self.texts = wanted, kind, texts
+    def __init__(self, where: str, content: bytes, kind: str, texts: Collection[str]) -> None:
+        self.where, self.kind, self.texts = where, kind, texts
         self.references = content.count(b"&")
         self.room = len(content) + _EXPANDED
         self.parser = expat.ParserCreate(namespace_separator=" ")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
+        self.parser.EndElementHandler = lambda name: self.open.pop()
         self.parser.CharacterDataHandler = self._text
         self.parser.EntityDeclHandler = self._entity
         self.parser.AttlistDeclHandler = self._declared
         self.parser.StartNamespaceDeclHandler = self._namespace
         self.open: list[Element | None] = []
-        self.pieces: list[str] = []
         self.first: Element | None = None
         self.count = self.declarations = 0
 
-    def root(self) -> Element:
-        try:
-            self.parser.Parse(self.content, True)
-        except (expat.ExpatError, ValueError, LookupError) as error:
-            line = f":{error.lineno}" if isinstance(error, expat.ExpatError) else ""
-            reason = expat.ErrorString(error.code) if isinstance(error, expat.ExpatError) else error
-            raise MapError(f"{self.where}{line}: not XML: {one_line(reason)[:60]}") from None
-        if self.first is None or self.first.tag != self.wanted:
-            found = "other XML" if self.first is None else f"<{self.first.tag}>"
-            raise MapError(f"{self.where}: {found}, but <{self.wanted}> was wanted")
-        return self.first
-
     def _start(self, name: str, attributes: dict[str, str]) -> None:
-        self._take_text()
         self.count += 1
         line = self.parser.CurrentLineNumber
         if self.count > MOST_ELEMENTS:
@@ -132,30 +121,21 @@ class _Reader:
         namespace, _, tag = name.rpartition(" ")
         plain = {key.rpartition(" ")[2]: value for key, value in attributes.items()}
         self._take(sum(map(len, plain)) + sum(map(len, plain.values())))
+        parent = self.open[-1] if self.open else None
         element = None
         # what a foreign element holds is foreign as well
-        if namespace in ("", _SVG) and (not self.open or self.open[-1] is not None):
-            element = Element(tag, plain, line)
-            if self.open and self.open[-1] is not None:
-                self.open[-1].children.append(element)
-            elif not self.open:
+        if namespace in ("", _SVG) and (parent is not None or not self.open):
+            element = Element(tag, plain, self.where, line)
+            if parent is None:
                 self.first = element
+            else:
+                parent.children.append(element)
         self.open.append(element)
-
-    def _end(self, name: str) -> None:
-        self._take_text()
-        self.open.pop()
 
     def _text(self, text: str) -> None:
         self._take(len(text))
-        self.pieces.append(text)
-
-    def _take_text(self) -> None:
-        """Give the innermost element the text since the last tag."""
-        element = self.open[-1] if self.open else None
-        if element is not None and element.tag in self.texts:
-            element.text += "".join(self.pieces)
-        self.pieces.clear()
+        if (element := self.open[-1]) is not None and element.tag in self.texts:
+            element.pieces.append(text)
 
     def _take(self, count: int) -> None:
         """Count characters: entities and default attributes make more of them than the file has."""
@@ -166,9 +146,10 @@ class _Reader:
     def _entity(self, name: str, parameter: bool, value: str | None, *rest: object) -> None:
         """Check an entity: it may stand for a few words, which expat puts in where it is used."""
         self._declared()
-        _, system, *_ = rest
         if value is None:
-            self._refuse(f"entity {shown(name)} stands for another file ({shown(system)}), which is not read")
+            self._refuse(
+                f"entity {shown(name)} stands for another file ({shown(rest[1])}), which is not read"
+            )
         if parameter or "&" in value or "%" in value:
             self._refuse(f"entity {shown(name)} stands for other entities")
         if len(value) * self.references > _EXPANDED:

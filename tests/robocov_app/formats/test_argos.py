@@ -8,8 +8,9 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import ForeignMap, ReadOptions, Shaping, detect, import_map
-from robocov_app.formats.argos import IMPORTER
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, Shaping, detect, import_map
+
+IMPORTER = IMPORTERS["argos"]
 
 WALL = '<box id="{}" size="{},{},0.5" movable="false"><body position="{},{},0" orientation="{},0,0"/></box>'
 ROBOT = '<foot-bot id="fb"><body position="{},{},0" orientation="0,0,0"/><controller config="c"/></foot-bot>'

@@ -13,8 +13,7 @@ from robocov.environment import DiscStart, UniformStart
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.geometry.conversion import Shaping, shaped
-from robocov_app.formats.geometry.passages import roomiest
+from robocov_app.formats.geometry.conversion import Shaping, roomiest, shaped
 from robocov_app.formats.geometry.polygons import bounded, rounded
 
 ROOM = box(0, 0, 10, 8) - box(4, 3, 6, 5) - box(1, 1, 1.05, 1.05)

@@ -11,8 +11,9 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError
-from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
-from robocov_app.formats.irsim import IMPORTER
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+
+IMPORTER = IMPORTERS["irsim"]
 
 WORLD = "world:\n  height: 6  # along y\n  width: 10\n  offset: [-1, 2]\n  step_time: 0.1\n"
 SPACE = box(-1, 2, 9, 8)
@@ -185,6 +186,6 @@ def test_a_world_is_not_taken_for_a_map_of_ros(tmp_path: Path) -> None:
 
 
 def test_turns_are_in_radians() -> None:
-    from robocov_app.formats.irsim import _frame
+    from robocov_app.formats.geometry.frames import frame
 
-    assert _frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))
+    assert frame(1.0, 2.0, math.pi / 2) == pytest.approx(np.array([[0, -1, 1], [1, 0, 2], [0, 0, 1]]))

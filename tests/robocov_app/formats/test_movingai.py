@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robocov.errors import MapError
-from robocov_app.formats import ReadOptions, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
 from robocov_app.formats.base import ForeignMap
-from robocov_app.formats.movingai import IMPORTER
+
+IMPORTER = IMPORTERS["movingai"]
 
 ROWS = ("@@@@@@", "@..GT@", "@S.OW@", "@....@", "@@@@@@")
 GRID = "type octile\nheight 5\nwidth 6\nmap\n" + "\n".join(ROWS) + "\n"

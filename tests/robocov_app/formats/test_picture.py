@@ -10,8 +10,10 @@ from PIL import Image, PngImagePlugin
 from raster_files import pgm
 
 from robocov.errors import MapError
-from robocov_app.formats import ReadOptions, detect, import_map
-from robocov_app.formats.picture import CHUNK, IMPORTER
+from robocov_app.formats import IMPORTERS, ReadOptions, detect, import_map
+from robocov_app.formats.picture import CHUNK
+
+IMPORTER = IMPORTERS["picture"]
 
 LEVELS = np.array([[0, 127, 128, 255], [255, 255, 255, 255]], dtype=np.uint8)
 

@@ -35,7 +35,7 @@ _BLOCK = st.builds(
 def drawn(primitives: list[Any], blocks: list[Polygon]) -> ForeignMap:
     solid = shapely.union_all([*blocks, *(one.polygon for one in primitives)])
     free = MultiPolygon([p for p in shapely.get_parts(ROOM - solid).tolist() if p.area > 0])
-    return ForeignMap("plan", "", "test", free, boundary=ROOM, primitives=tuple(primitives))
+    return ForeignMap("plan", "", free, "test", boundary=ROOM, primitives=tuple(primitives))
 
 
 def made(primitives: list[Any], *blocks: Polygon, **shaping: Any) -> Environment:

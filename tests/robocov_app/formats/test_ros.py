@@ -14,9 +14,11 @@ from raster_files import FREE, OCCUPIED, PLAN, UNKNOWN, drawn, pgm, ros_map
 from shapely import MultiPolygon
 
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import ReadOptions, Shaping, detect, import_map
+from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, detect, import_map
 from robocov_app.formats.picture import Brightness
-from robocov_app.formats.ros import IMPORTER, _raw, _scale, _trinary
+from robocov_app.formats.ros import _raw, _scale, _trinary
+
+IMPORTER = IMPORTERS["ros"]
 
 ROOMS = shapely.box(2, 2, 8, 8) | shapely.box(9, 2, 14, 8) | shapely.box(8, 4, 9, 6)
 """The free space of `PLAN`, in cells."""

@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Polygon, affinity
 
-from robocov_app.formats.geometry.passages import closed_gaps, rooms
+from robocov_app.formats.geometry.conversion import rooms
 from robocov_app.formats.geometry.raster import traced
 from robocov_app.formats.geometry.simplify import (
     KEPT_OUTLINE,
+    closed_gaps,
     drawn,
     outline_of,
     polygons_from,

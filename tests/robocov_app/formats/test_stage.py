@@ -9,8 +9,9 @@ from shapely import affinity, box
 
 from robocov.environment import PointsStart
 from robocov.errors import MapError
-from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
-from robocov_app.formats.stage import IMPORTER
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+
+IMPORTER = IMPORTERS["stage"]
 
 
 def read(folder: Path, text: str, **options: object) -> ForeignMap:

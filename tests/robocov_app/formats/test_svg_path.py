@@ -7,12 +7,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.svg.path import (
     affine,
     composed,
     fitted,
     length,
-    moved,
     numbers,
     stretch,
     subpaths,

@@ -18,7 +18,10 @@ from robocov_app.formats.xml_tree import Element
 
 def element(tag: str = "rect", **attributes: str) -> Element:
     return Element(
-        tag, {name.replace("_", "-").removesuffix("-"): text for name, text in attributes.items()}, 1
+        tag,
+        {name.replace("_", "-").removesuffix("-"): text for name, text in attributes.items()},
+        "plan.svg",
+        1,
     )
 
 

@@ -15,8 +15,9 @@ from shapely import affinity, box
 
 from robocov.environment import CircleObstacle
 from robocov.errors import MapError, ParameterError
-from robocov_app.formats import ForeignMap, ReadOptions, detect, import_map
-from robocov_app.formats.tmx import IMPORTER
+from robocov_app.formats import IMPORTERS, ForeignMap, ReadOptions, detect, import_map
+
+IMPORTER = IMPORTERS["tmx"]
 
 SOLID = '<properties><property name="{}" type="bool" value="{}"/></properties>'
 TILES = (

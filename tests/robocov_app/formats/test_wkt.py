@@ -58,6 +58,11 @@ def test_several_geometries_in_a_file(tmp_path: Path, separator: str) -> None:
     )
 
 
+def test_of_points_that_are_all_empty_nothing_comes(tmp_path: Path) -> None:
+    foreign = read(tmp_path, "wkt", f"{HALL} MULTIPOINT(EMPTY, EMPTY)", pillar=0.2)
+    assert foreign.free.area == pytest.approx(49.0)
+
+
 @pytest.mark.parametrize(
     "layout", ["MULTIPOLYGON({})", "GEOMETRYCOLLECTION({})", "{}"], ids=["multi", "collection", "several"]
 )

@@ -19,9 +19,7 @@ from robocov_app.formats.base import ExportReport
 from robocov_app.formats.files import MAX_CELLS
 from robocov_app.formats.geometry.polygons import sides_of
 
-CELL = 0.05
-"""Side of a cell in metres where none is given: what maps of robots mostly have."""
-
+CELL = 0.05  # side of a cell in metres where none is given: what maps of robots mostly have
 _LEAST = math.pi * DEFAULT_RADIUS**2  # parts of the free space with no room for a robot, in m², do not count
 _MOST_TRIED = 16_000_000  # cells of grids that are tried for whether they keep what others lose
 _DIGITS = 6  # decimals of a grid's corner: a micrometre
@@ -85,10 +83,7 @@ class Grid:
 
 
 def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELLS) -> Grid:
-    """Return a grid over the boundary; what was made of cells of that size meets them again.
-
-    Raises ParameterError when there are more than `most` cells.
-    """
+    """Return a grid over the boundary, which meets the cells that it was made of; at `most` so many cells."""
     cell = CELL if cell is None else cell
     low_x, low_y, high_x, high_y = environment.boundary_polygon.bounds
     # to a thousandth of a cell, so that a wall on the last line of cells needs no more of them
@@ -101,11 +96,10 @@ def grid_over(environment: Environment, cell: float | None, most: int = MAX_CELL
 
 
 def free_cells(environment: Environment, grid: Grid) -> BoolArray:
-    """Return which cells of `grid` are free, (rows, columns), the lowest row first.
+    """Return which cells of `grid` are free, (rows, columns), the lowest row first; ParameterError if none.
 
-    A cell is free if its centre is, and if nothing solid would be lost: no wall is too thin, and no pillar
-    too small, to block a cell: where robots drive from side to side of cells they drive on the map. Raises
-    ParameterError when none is.
+    A cell is free if its centre is, and nothing solid is lost: no wall is too thin, and no pillar too small,
+    to block a cell: where robots drive from side to side of cells they drive on the map.
     """
     free = grid.covered(environment.free) & ~grid.between(environment.free)
     # what is smaller than a cell may lie between all lines of centres
@@ -161,23 +155,17 @@ def _lost(environment: Environment, grid: Grid, free: BoolArray) -> str:
 
 
 def _smaller(cell: float) -> Iterator[float]:
-    """Return round sizes below that of a cell, the largest first.
-
-    >>> list(itertools.islice(_smaller(0.15), 4))
-    [0.1, 0.05, 0.02, 0.01]
-    """
+    """Return round sizes below that of a cell, the largest first."""
     for power in itertools.count(math.floor(-math.log10(cell))):
         for digit in (5, 2, 1):
             if (size := round(digit * 10.0**-power, power)) < cell * (1 - 1e-9):
                 yield size
 
 
-def not_held(environment: Environment) -> tuple[str, ...]:
-    """Return what of `environment` no raster format holds, in words."""
-    lost = []
-    if environment.starts:
-        lost.append(f"starts: {', '.join(environment.starts)}")
-    if any(obstacle.name for obstacle in environment.obstacles):
+def not_held(environment: Environment, *, names: bool = True) -> tuple[str, ...]:
+    """Return what of `environment` a format has no place for, in words; most have none for `names`."""
+    lost = [f"starts: {', '.join(environment.starts)}"] if environment.starts else []
+    if names and any(obstacle.name for obstacle in environment.obstacles):
         lost.append("names of obstacles")
     return tuple(lost)
 
@@ -192,13 +180,6 @@ def grid_report(
     dropped: tuple[str, ...] = (),
     notes: tuple[str, ...] = (),
 ) -> ExportReport:
-    """Return the report of a map that was written as the free cells of a grid."""
-    return ExportReport(
-        name,
-        files,
-        environment.free_area,
-        float(np.count_nonzero(free)) * grid.cell**2,
-        dropped=(*dropped, *not_held(environment)),
-        notes=notes,
-        warnings=lost_passages(environment, grid, free),
-    )
+    area = float(np.count_nonzero(free)) * grid.cell**2
+    dropped, lost = (*dropped, *not_held(environment)), lost_passages(environment, grid, free)
+    return ExportReport(name, files, environment.free_area, area, dropped, notes, lost)

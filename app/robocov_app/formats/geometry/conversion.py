@@ -1,43 +1,35 @@
 """From what a reader found to an environment, and how the two compare."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeVar
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal, TypeVar
 
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon, STRtree
 from shapely.geometry.base import BaseGeometry
 
-from robocov.environment import (
-    START_GAP,
-    CircleObstacle,
-    DiscStart,
-    Environment,
-    Gap,
-    Obstacle,
-    PointsStart,
-    PolygonObstacle,
-    Ring,
-    StartSpec,
-    UniformStart,
-    WallObstacle,
-    narrowest_gap,
-)
+from robocov import environment as env
+from robocov.environment import Environment, Ring
 from robocov.errors import MapError, ParameterError, counted, one_line, shown
 from robocov.mapfile import from_json, to_json
 from robocov.mapfile.check import MANY_VERTICES, many_vertices, vertex_count
 from robocov.mapfile.models import FARTHEST, LARGEST, SMALLEST
 from robocov.robots import DEFAULT_RADIUS
-from robocov_app.formats.base import ForeignMap, ImportReport, Primitive, check_options, square_metres
-from robocov_app.formats.geometry.passages import moved_walls, roomiest, rooms
-from robocov_app.formats.geometry.polygons import CRUMB, bounded, filled, made_valid, polygons_of, rounded
-from robocov_app.formats.geometry.simplify import sharpened, simplified
+from robocov_app.formats.base import ForeignMap, ImportReport, Options, Primitive, square_metres
+from robocov_app.formats.geometry.polygons import (
+    CRUMB,
+    bounded,
+    filled,
+    made_valid,
+    polygons_of,
+    rounded,
+    sides_of,
+)
+from robocov_app.formats.geometry.simplify import rays, sharpened, simplified
 
-DEFAULT_TOLERANCE = 0.02
-"""By how much walls of vector formats may move, in metres."""
-
+DEFAULT_TOLERANCE = 0.02  # by how much walls of vector formats may move, in metres
 # coordinates are rounded to a tenth of a millimetre, or to a hundredth of a cell if that is finer
 _GRID = 1e-4
 # obstacles smaller than this, in m², are perhaps noise: so many of them are worth a word
@@ -47,22 +39,22 @@ _TINY, _MANY = 0.01, 10
 _LITTLE, _CONSIDERABLE, _OFFERED = 0.5, 0.1, 3
 # of maps with more vertices it takes too long to say where robots do not pass, and the narrowest passage
 _SOON, _MOST_VERTICES = 10_000, 20_000
-
+# most obstacles and vertices of a map that is made: it takes seconds to make one that has as many
 MAX_OBSTACLES, MAX_KEPT = 8_000, 50_000
-"""Most obstacles and vertices of a map that is made: it takes seconds to make one that has as many."""
-
+# circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds
 MOST_PRIMITIVES = 5_000
-"""Circles and walls of a drawing that stay such; with more, all become polygons: to compare takes seconds."""
-
-_Obstacle = TypeVar("_Obstacle", bound=Obstacle)
+_Obstacle = TypeVar("_Obstacle", bound=env.Obstacle)
 _MOST_ROBOTS = 1000  # of a file, so many are looked at
 _ZERO = 1e-100  # coordinates nearer to zero, in metres, are zero; as of map files
+# squares that are looked at more closely, at each size, and sides that rays cross to tell which are inside
+_SQUARES, _MOST_RAYS = 1024, 5_000_000
+_QUARTERS = np.array([(-1, -1), (1, -1), (-1, 1), (1, 1)])
 # width, in tolerances, below which a difference counts as a wall that moved, not as one that was lost
 _SLIVER = 2.0
 
 
 @dataclass(frozen=True)
-class Shaping:
+class Shaping(Options):
     """Parameters of the conversion of a foreign map to an environment."""
 
     simplify: float | None = None
@@ -87,8 +79,9 @@ class Shaping:
     """The map's default start: a disc at the roomiest place, or anywhere."""
 
     def __post_init__(self) -> None:
-        ranges = {"simplify": (0.0, 10.0, "m"), "specks": (0.0, 1e6, "m²"), "margin": (0.0, 100.0, "m")}
-        check_options(self, ranges | {"radius": (1e-3, 100.0, "m")})
+        self.require(
+            simplify=(0, 10, "m"), specks=(0, 1e6, "m²"), margin=(0, 100, "m"), radius=(1e-3, 100, "m")
+        )
         if self.inside is None:
             return
         if len(self.inside) != 2 or not all(abs(value) <= FARTHEST for value in self.inside):
@@ -99,54 +92,50 @@ class Shaping:
 
 
 def shaped(foreign: ForeignMap, shaping: Shaping, where: str) -> tuple[Environment, ImportReport]:
-    """Return the environment that `foreign` stands for, and what was done to it.
-
-    Raises MapError when nothing is free, no place is wide enough for a robot, or the map breaks another rule.
-    """
+    """Return the environment that `foreign` stands for, and what was done; MapError where it is no map."""
     return _Shaper(foreign, shaping, where).shaped()
 
 
-@dataclass
 class _Shaper:
     """Makes the environment, and notes what the report will say."""
 
-    foreign: ForeignMap
-    shaping: Shaping
-    where: str
-    repaired: list[str] = field(default_factory=list)
-    dropped: list[str] = field(default_factory=list)
-    changed: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    others: list[tuple[float, float]] = field(default_factory=list)
+    def __init__(self, foreign: ForeignMap, shaping: Shaping, where: str) -> None:
+        self.foreign, self.shaping, self.where, self.radius = foreign, shaping, where, shaping.radius
+        self.repaired, self.dropped, self.notes = [*foreign.repaired], [*foreign.dropped], [*foreign.notes]
+        self.changed: list[str] = []
+        self.others: list[tuple[float, float]] = []
+        self.specks = foreign.specks if shaping.specks is None else shaping.specks
+        # how far from walls a robot starts, m: the rules of maps want room for the usual one
+        self.clearance = max(DEFAULT_RADIUS, self.radius) * (1 + env.START_GAP)
+        grid = _GRID if foreign.cell is None else min(_GRID, foreign.cell / 100)
+        self.digits = -math.floor(math.log10(grid) + 1e-9)
 
     def shaped(self) -> tuple[Environment, ImportReport]:
-        foreign, shaping, radius = self.foreign, self.shaping, self.shaping.radius
-        self.repaired += foreign.repaired
-        self.dropped += foreign.dropped
-        self.notes += foreign.notes
+        foreign, shaping, digits, cell = self.foreign, self.shaping, self.digits, self.foreign.cell
         outer = self._valid_boundary()
         read = self._valid(outer)
         parts = self._without_specks(self._kept(read))
+        before = MultiPolygon(parts)
         chosen = shaping.inside is not None or (foreign.robots and shaping.keep == "largest")
         if chosen and outer is not None and outer.contains_properly(parts[0]):
             outer = None  # what is around the other parts is not around this one
         self._require_few(sum(len(part.interiors) for part in parts), "obstacles", MAX_OBSTACLES)
         self._require_room(parts)
         tolerance = self._tolerance()
-        drawn = [sharpened(part, tolerance) for part in parts] if foreign.cut_corners else parts
-        simple = simplified(MultiPolygon(drawn), tolerance, foreign.cell, radius)
+        drawn = (
+            MultiPolygon([sharpened(part, tolerance) for part in parts]) if foreign.cut_corners else before
+        )
+        simple = simplified(drawn, tolerance, cell, self.radius)
         self.changed += simple.changed
-        base: Polygon | None = None
+        base = None
         if outer is not None:
-            base = filled(simplified(MultiPolygon([outer]), tolerance, foreign.cell, radius).free)
-        grid = _GRID if foreign.cell is None else min(_GRID, foreign.cell / 100)
-        digits = -math.floor(math.log10(grid) + 1e-9)
+            base = filled(simplified(MultiPolygon([outer]), tolerance, cell, self.radius).free)
         free = rounded(simple.free, digits)
         if free.is_empty:
-            few = f"{read.area:.3g} m² are free, but more was wanted: is the scale right?"
-            raise MapError(f"{self.where}: {few}")
+            few = f"{read.area:.3g} m² are free, but more was wanted"
+            raise MapError(f"{self.where}: {few}: is the scale right?")
         self._require_few(shapely.count_coordinates(free), "vertices", MAX_KEPT)
-        moved, by = moved_walls(MultiPolygon(parts), free)
+        moved, by = moved_walls(before, free)
         if by >= 1e-3:
             self.changed.append(
                 f"walls moved by at most {by:.2g} m; {square_metres(moved, 2)} changed sides, "
@@ -155,34 +144,29 @@ class _Shaper:
         boundary, solid = bounded(free, base, hull=shaping.hull, margin=shaping.margin, digits=digits)
         if outer is not None:
             solid = _without_slivers(solid, shapely.difference(outer, read), tolerance)
-        primitives = list(foreign.primitives)
-        if primitives and shapely.get_num_coordinates(free) <= _SOON:
-            places = max(len(rooms(space, radius)) for space in (MultiPolygon(parts), free))
-            primitives, solid = with_primitives(
-                solid, primitives, boundary, simple.tolerance, digits, places, radius
-            )
+        primitives: list[Primitive] = []
+        if foreign.primitives and shapely.get_num_coordinates(free) <= _SOON:
+            places = max(len(rooms(space, self.radius)) for space in (before, free))
+            primitives, solid = self._with_primitives(solid, boundary, simple.tolerance, places)
             if primitives:  # its vertices where polygons began that are gone
                 boundary = boundary.simplify(0.0)
-        else:
-            primitives = []
         environment = Environment(
             name=one_line(foreign.name)[:100].strip() or "map",
-            boundary=_ring(boundary.exterior, digits),
-            obstacles=(*self._obstacles(solid, digits), *primitives),
+            boundary=self._ring(boundary.exterior),
+            obstacles=(*self._obstacles(solid), *primitives),
             starts=self._starts(free),
             description=foreign.description[:10_000],
         )
         # through the rules of map files: what is imported can be saved and loaded
         environment = from_json(to_json(environment), self.where)
         if shapely.get_num_coordinates(environment.free) <= _SOON:
-            self._note_unreached(environment)
+            reached = sorted((place.area for place in rooms(environment.free, self.radius)), reverse=True)
+            if len(reached) > 1:
+                what = f"{counted(len(reached) - 1, 'place')} of {square_metres(sum(reached[1:]), 3)}"
+                self.notes.append(f"{what} no robot of radius {self.radius:g} m reaches from the largest one")
         width, height = np.ptp(np.array(environment.boundary), axis=0).tolist()
         kept = vertex_count(environment)
-        if kept > MANY_VERTICES:
-            self.notes.append(many_vertices(kept))
-        told: dict[str, Any] = {
-            name: tuple(getattr(self, name)) for name in ("repaired", "dropped", "changed", "notes", "others")
-        }
+        self.notes += [many_vertices(kept)] if kept > MANY_VERTICES else []
         return environment, ImportReport(
             source=self.where,
             format=foreign.format,
@@ -195,7 +179,11 @@ class _Shaper:
             tolerance=simple.tolerance,
             moved_area=moved,
             moved=by,
-            **told,
+            others=tuple(self.others),
+            repaired=tuple(self.repaired),
+            dropped=tuple(self.dropped),
+            changed=tuple(self.changed),
+            notes=tuple(self.notes),
         )
 
     def _valid_boundary(self) -> Polygon | None:
@@ -227,19 +215,17 @@ class _Shaper:
             raise MapError(f"{self.where}: nothing is free, but some free space was wanted")
         return valid
 
-    def _specks(self) -> float:
-        return self.foreign.specks if self.shaping.specks is None else self.shaping.specks
-
     def _kept(self, free: MultiPolygon) -> list[Polygon]:
-        parts, robots = np.array(free.geoms, dtype=object), self.foreign.robots
+        parts, robots, shaping = np.array(free.geoms, dtype=object), self.foreign.robots, self.shaping
+        drop, note = self.dropped.append, self.notes.append
         area = shapely.area(parts)
-        if self.shaping.keep == "all":
-            stays = area >= max(self._specks(), min(CRUMB, area[0]))
-        elif self.shaping.inside is not None:
-            distance = shapely.distance(parts, shapely.Point(self.shaping.inside))
+        if shaping.keep == "all":
+            stays = area >= max(self.specks, min(CRUMB, area[0]))
+        elif shaping.inside is not None:
+            distance = shapely.distance(parts, shapely.Point(shaping.inside))
             nearest = int(np.argmin(distance))
             if distance[nearest] > 0.0:
-                (a, b), (x, y) = self.shaping.inside, _place_in(parts[nearest])
+                (a, b), (x, y) = shaping.inside, _place_in(parts[nearest])
                 raise MapError(
                     f"{self.where}: inside: {a:.10g} {b:.10g} is solid, but a place in the free space was "
                     f"wanted; {x:.10g} {y:.10g} is one in the nearest part, {distance[nearest]:.3g} m away"
@@ -251,41 +237,34 @@ class _Shaper:
             most = int(np.argmax([shapely.contains(part, places).sum() for part in parts])) if robots else 0
             stays = np.arange(len(parts)) == most
             if most:
-                what = "the part of the free space with most robots"
-                self.notes.append(f"{what} stays, which is not the largest")
+                note("the part of the free space with most robots stays, which is not the largest")
         kept: list[Polygon] = parts[stays].tolist()
         left: list[Polygon] = parts[~stays].tolist()
         if not kept:
             raise MapError(
                 f"{self.where}: no part of the free space is larger than {area[0]:.3g} m², "
-                f"but one of at least {self._specks():g} m² was wanted"
+                f"but one of at least {self.specks:g} m² was wanted"
             )
         if left:
             largest = f" (the largest {square_metres(left[0].area, 3)})" if len(left) > 1 else ""
-            what = counted(len(left), "separate part")
-            self.dropped.append(f"{what} of the free space, {_squared(left)}{largest}")
-            self._offer(left, area[stays].sum() / area.sum(), left[0].area / area.sum())
+            drop(f"{counted(len(left), 'separate part')} of the free space, {_squared(left)}{largest}")
+            share = area[stays].sum() / area.sum()
+            if share < _LITTLE or left[0].area / area.sum() > _CONSIDERABLE:
+                self.others = [_place_in(part) for part in left[:_OFFERED]]
+                choices = " or ".join(
+                    f"--inside {x:.10g} {y:.10g} ({square_metres(part.area, 3)})"
+                    for (x, y), part in zip(self.others, left, strict=False)
+                )
+                stay = f"{'only ' if share < _LITTLE else ''}{100 * share:.2g} % of the free area stays"
+                note(f"{stay}: {choices} keeps another part, --keep all every part")
         if len(kept) > 1:
-            what = f"the free space is of {len(kept)} separate parts"
-            self.notes.append(f"{what}: robots cannot pass between them")
+            note(f"the free space is of {len(kept)} separate parts: robots cannot pass between them")
         return kept
 
-    def _offer(self, left: list[Polygon], share: float, next_share: float) -> None:
-        """Name the largest parts that are left out where little stays, or one of them is large."""
-        if share < _LITTLE or next_share > _CONSIDERABLE:
-            self.others = [_place_in(part) for part in left[:_OFFERED]]
-            choices = " or ".join(
-                f"--inside {x:.10g} {y:.10g} ({square_metres(part.area, 3)})"
-                for (x, y), part in zip(self.others, left, strict=False)
-            )
-            self.notes.append(
-                f"{'only ' if share < _LITTLE else ''}{100 * share:.2g} % of the free area stays: {choices} "
-                "keeps another part, --keep all every part"
-            )
-
     def _without_specks(self, parts: list[Polygon]) -> list[Polygon]:
-        cell, least = self.foreign.cell, self._specks()
+        cell, least = self.foreign.cell, self.specks
         crumb = CRUMB if cell is None else min(CRUMB, cell * cell / 2)
+        drop, note = self.dropped.append, self.notes.append
         result, specks, crumbs, tiny = [], [], [], 0
         for part in parts:
             holes = np.array([Polygon(hole) for hole in part.interiors], dtype=object)
@@ -298,18 +277,16 @@ class _Shaper:
             result.append(part if stays.all() else Polygon(part.exterior, rings))
         if specks:
             few = f"{counted(len(specks), 'obstacle')} smaller than {least:.3g} m²"
-            self.dropped.append(f"{few}, {_squared(specks)} (--specks 0 keeps them)")
+            drop(f"{few}, {_squared(specks)} (--specks 0 keeps them)")
         if crumbs:
-            what = f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}"
-            self.dropped.append(f"{what}, which come of rounding")
+            drop(f"{counted(len(crumbs), 'hole')} of {_squared(crumbs)}, which come of rounding")
         if tiny >= _MANY and least < _TINY:
-            few = f"{tiny} obstacles are smaller than {_TINY:g} m²"
-            self.notes.append(f"{few} (--specks {_TINY:g} drops them)")
+            note(f"{tiny} obstacles are smaller than {_TINY:g} m² (--specks {_TINY:g} drops them)")
         return result
 
     def _tolerance(self) -> float:
         """Return by how much walls may move, m: where cells are larger than robots, each one counts."""
-        cell, width = self.foreign.cell, 2 * self.shaping.radius
+        cell, width = self.foreign.cell, 2 * self.radius
         if self.shaping.simplify is not None:
             return self.shaping.simplify
         if cell is None:
@@ -320,55 +297,56 @@ class _Shaper:
         return min(cell, width)
 
     def _require_few(self, count: int, what: str, most: int) -> None:
-        """Check that a map is none that takes minutes to make, and for ever to simulate."""
         if count > most:
             raise MapError(
                 f"{self.where}: {count} {what}, but at most {most} were wanted: --specks AREA drops small "
                 "obstacles, --simplify METRES draws walls with fewer vertices"
             )
 
-    def _clearance(self) -> float:
-        """Return how far from walls a robot starts, m: the rules of maps want room for the usual one."""
-        return max(DEFAULT_RADIUS, self.shaping.radius) * (1 + START_GAP)
-
     def _require_room(self, parts: list[Polygon]) -> None:
-        clearance, widest = self._clearance(), 0.0
+        widest = 0.0
         for part in parts:
             if math.sqrt(part.area / math.pi) > widest:
-                widest = max(widest, roomiest(part, clearance / 50, clearance)[1])
-            if widest >= clearance:
+                widest = max(widest, roomiest(part, self.clearance / 50, self.clearance)[1])
+            if widest >= self.clearance:
                 return
+        wanted, most = self.clearance / (1 + env.START_GAP), widest / (1 + env.START_GAP)
         raise MapError(
-            f"{self.where}: no place is wide enough for a robot of radius {clearance / (1 + START_GAP):g} m "
-            f"(the widest is for one of {widest / (1 + START_GAP):.3g} m): is the scale right?"
+            f"{self.where}: no place is wide enough for a robot of radius {wanted:g} m "
+            f"(the widest is for one of {most:.3g} m): is the scale right?"
         )
 
-    def _obstacles(self, solid: list[Polygon], digits: int) -> list[PolygonObstacle]:
+    def _obstacles(self, solid: list[Polygon]) -> list[env.PolygonObstacle]:
         """Return `solid` as obstacles, the largest first, without what is too small for a map."""
         kept = [part for part in solid if min(np.subtract(part.bounds[2:], part.bounds[:2])) >= SMALLEST]
         if len(kept) < len(solid):
-            what = counted(len(solid) - len(kept), "obstacle")
-            self.dropped.append(f"{what} thinner than {SMALLEST * 1000:g} mm")
+            thin = counted(len(solid) - len(kept), "obstacle")
+            self.dropped.append(f"{thin} thinner than {SMALLEST * 1000:g} mm")
         kept.sort(key=lambda part: (-round(part.area, 6), part.bounds))
         return [
-            PolygonObstacle(
-                _ring(part.exterior, digits), tuple(_ring(hole, digits) for hole in part.interiors)
-            )
+            env.PolygonObstacle(self._ring(part.exterior), (*map(self._ring, part.interiors),))
             for part in kept
         ]
 
-    def _starts(self, free: MultiPolygon) -> dict[str, StartSpec]:
+    def _ring(self, ring: BaseGeometry) -> Ring:
+        """Return a closed ring as a map has it: counter-clockwise from its leftmost vertex."""
+        points = np.round(shapely.get_coordinates(ring)[:-1], self.digits) + 0.0
+        if not shapely.is_ccw(ring):
+            points = points[::-1]
+        first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
+        return tuple((float(x), float(y)) for x, y in np.roll(points, -first, axis=0))
+
+    def _starts(self, free: MultiPolygon) -> dict[str, env.StartSpec]:
         """Return the starts: a disc at the roomiest place, everywhere, and where the file places robots."""
-        clearance, robots = self._clearance(), self.foreign.robots
-        part = free.geoms[0]
+        clearance, robots, part = self.clearance, self.foreign.robots, free.geoms[0]
         # what is finer than this does not move a start by much
         (x, y), room = roomiest(part, max(0.01, math.sqrt(part.area) / 500))
         # the disc holds centres: one robot's radius stays between it and the walls
         radius = min(room - clearance, 2.0)
-        starts: dict[str, StartSpec] = {"uniform": UniformStart()}
+        starts: dict[str, env.StartSpec] = {"uniform": env.UniformStart()}
         if radius >= 0.02:
-            disc = DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
-            both: dict[str, StartSpec] = {"room": disc, **starts}
+            disc = env.DiscStart((round(x, 2), round(y, 2)), math.floor(100 * radius) / 100)
+            both: dict[str, env.StartSpec] = {"room": disc, **starts}
             starts = both if self.shaping.default_start == "room" else dict(reversed(both.items()))
         if robots:
             given = np.array(list(dict.fromkeys(robots))[:_MOST_ROBOTS])
@@ -377,19 +355,56 @@ class _Shaper:
             for k in np.flatnonzero(fits).tolist():
                 fits[k] = (np.hypot(*(given[:k][fits[:k]] - given[k]).T) >= 2 * clearance).all()
             if fits.any():
-                starts["robots"] = PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
+                starts["robots"] = env.PointsStart(tuple((x, y) for x, y in given[fits].tolist()))
             rest = "" if fits.sum() == len(robots) else "; there is no room at the others"
             many = f"{int(fits.sum())} of {counted(len(robots), 'place')}"
             self.notes.append(f'start "robots": {many} of robots in the file{rest}')
         return starts
 
-    def _note_unreached(self, environment: Environment) -> None:
-        """Say how much of the free space robots do not reach from where most of it is."""
-        radius = self.shaping.radius
-        places = sorted((place.area for place in rooms(environment.free, radius)), reverse=True)[1:]
-        if places:
-            what = f"{counted(len(places), 'place')} of {square_metres(sum(places), 3)}"
-            self.notes.append(f"{what} no robot of radius {radius:g} m reaches from the largest one")
+    def _with_primitives(
+        self, solid: list[Polygon], boundary: Polygon, tolerance: float, places: int
+    ) -> tuple[list[Primitive], list[Polygon]]:
+        """Return the primitives that make up polygons of `solid`, in their order, and the polygons that stay.
+
+        A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further
+        than twice the tolerance beyond the other, as corners may, their areas differ by no more than the
+        tolerance all along the outline, and the primitives have fewer points. Those of several primitives
+        stay, or all of them, where a robot would have more than so many `places`, apart from each other.
+        """
+        hair = 10.0**-self.digits
+        rounded = {
+            with_numbers(each, lambda value: round(value, self.digits) + 0.0): each
+            for each in self.foreign.primitives
+        }
+        usable = [primitive for primitive in rounded if _fits(primitive)]
+        if not usable or len(usable) > MOST_PRIMITIVES:
+            return [], solid
+        # of another radius, however near, a circle may be drawn with another number of sides
+        covered = np.array([rounded[primitive].polygon for primitive in usable], dtype=object)
+        shapely.prepare(boundary)
+        outside = ~shapely.covers(boundary, covered)
+        covered[outside] = shapely.intersection(covered[outside], boundary)
+        piece, source = shapely.get_parts(covered, return_index=True)
+        tree = STRtree(piece)
+        made: list[set[int]] = []
+        for part in solid:
+            found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
+            own = set(source[found].tolist())
+            union = shapely.union_all(piece[found])
+            same = (
+                sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
+                and union.buffer(2 * (tolerance + hair)).covers(part)
+                and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
+            )
+            made.append(own if same else set())
+        # several may have a gap among them that was filled
+        for most in (len(usable), 1):
+            kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
+            rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
+            obstacles = shapely.union_all([*rest, *(primitive.polygon for primitive in kept)])
+            if len(rooms(shapely.difference(boundary, obstacles), self.radius)) <= places:
+                return kept, rest
+        return [], solid
 
 
 def _reason(geometry: BaseGeometry) -> str:
@@ -421,91 +436,27 @@ def _without_slivers(solid: list[Polygon], before: BaseGeometry, tolerance: floa
     return list(np.delete(parts, np.flatnonzero(thin)[fresh]))
 
 
-def _ring(ring: BaseGeometry, digits: int) -> Ring:
-    """Return a closed ring as a map has it: counter-clockwise from its leftmost vertex."""
-    points = np.round(shapely.get_coordinates(ring)[:-1], digits) + 0.0
-    if not shapely.is_ccw(ring):
-        points = points[::-1]
-    first = int(np.lexsort((points[:, 1], points[:, 0]))[0])
-    return tuple((float(x), float(y)) for x, y in np.roll(points, -first, axis=0))
-
-
-def with_primitives(
-    solid: Sequence[Polygon],
-    primitives: Iterable[Primitive],
-    boundary: Polygon,
-    tolerance: float,
-    digits: int,
-    places: int,
-    radius: float,
-) -> tuple[list[Primitive], list[Polygon]]:
-    """Return the primitives that make up polygons of `solid`, in their order, and the polygons that stay.
-
-    A polygon goes where the primitives on it cover the same inside the boundary: neither reaches further than
-    twice the tolerance beyond the other, as corners may, their areas differ by no more than the tolerance all
-    along the outline, and the primitives have fewer points. Those of several primitives stay, or all of them,
-    where a robot of that radius would have more than so many `places`, apart from each other.
-
-    >>> wall = WallObstacle(((1.0, 2.0), (3.0, 2.0)), 0.2)
-    >>> desk, drawn = shapely.box(5, 1, 6, 2), shapely.box(1, 1.9, 3, 2.1)
-    >>> kept, rest = with_primitives([drawn, desk], [wall], shapely.box(0, 0, 8, 4), 0.02, 4, 1, 0.1)
-    >>> kept == [wall], rest == [desk]
-    (True, True)
-    """
-    rounded = {with_numbers(each, lambda value: round(value, digits) + 0.0): each for each in primitives}
-    usable = [primitive for primitive in rounded if _fits(primitive)]
-    if not usable or len(usable) > MOST_PRIMITIVES:
-        return [], list(solid)
-    # of another radius, however near, a circle may be drawn with another number of sides
-    covered = np.array([rounded[primitive].polygon for primitive in usable], dtype=object)
-    shapely.prepare(boundary)
-    outside = ~shapely.covers(boundary, covered)
-    covered[outside] = shapely.intersection(covered[outside], boundary)
-    piece, source = shapely.get_parts(covered, return_index=True)
-    tree = STRtree(piece)
-    hair = 10.0**-digits
-    made: list[set[int]] = []
-    for part in solid:
-        found = np.sort(tree.query(part.buffer(2 * (tolerance + hair)), "covers"))
-        own = set(source[found].tolist())
-        union = shapely.union_all(piece[found])
-        same = (
-            sum(len(_points(usable[k])) for k in own) < shapely.get_num_coordinates(part)
-            and union.buffer(2 * (tolerance + hair)).covers(part)
-            and shapely.symmetric_difference(part, union).area <= (tolerance + hair) * part.length
-        )
-        made.append(own if same else set())
-    # several may have a gap among them that was filled
-    for most in (len(usable), 1):
-        kept = [usable[k] for k in sorted(set().union(*(own for own in made if len(own) <= most)))]
-        rest = [part for part, own in zip(solid, made, strict=True) if not 0 < len(own) <= most]
-        obstacles = [*rest, *(primitive.polygon for primitive in kept)]
-        if len(rooms(shapely.difference(boundary, shapely.union_all(obstacles)), radius)) <= places:
-            return kept, rest
-    return [], list(solid)
-
-
 def with_numbers(obstacle: _Obstacle, number: Callable[[float], float]) -> _Obstacle:
     """Return an obstacle with other numbers for all that it has."""
 
     def ring(points: Ring) -> Ring:
         return tuple((number(x), number(y)) for x, y in points)
 
-    if isinstance(obstacle, CircleObstacle):
+    if isinstance(obstacle, env.CircleObstacle):
         return replace(obstacle, center=ring((obstacle.center,))[0], radius=number(obstacle.radius))
-    if isinstance(obstacle, WallObstacle):
+    if isinstance(obstacle, env.WallObstacle):
         return replace(obstacle, points=ring(obstacle.points), width=number(obstacle.width))
-    assert isinstance(obstacle, PolygonObstacle)
+    assert isinstance(obstacle, env.PolygonObstacle)
     return replace(obstacle, vertices=ring(obstacle.vertices), holes=tuple(map(ring, obstacle.holes)))
 
 
 def _points(primitive: Primitive) -> np.ndarray:
-    return np.array([primitive.center] if isinstance(primitive, CircleObstacle) else primitive.points)
+    return np.array([primitive.center] if isinstance(primitive, env.CircleObstacle) else primitive.points)
 
 
 def _fits(primitive: Primitive) -> bool:
     points = _points(primitive)
-    if isinstance(primitive, CircleObstacle):
+    if isinstance(primitive, env.CircleObstacle):
         sizes = [primitive.radius]
     else:
         sizes = [primitive.width, np.ptp(points, axis=0).max()]
@@ -524,17 +475,15 @@ class Comparison:
     lost: BaseGeometry
     opened: BaseGeometry
     region: BaseGeometry
-    gap: Gap | None
+    gap: env.Gap | None
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
-        """Least x and y, then largest."""
         x, y, right, top = self.region.bounds
         return x, y, right, top
 
 
 def compare(foreign: ForeignMap, environment: Environment, report: ImportReport) -> Comparison:
-    """Return what an import has changed of the free space."""
     before, after = foreign.free, environment.free
     before = before if before.is_valid else made_valid(before)
     everything = [before, after, environment.region.polygon, foreign.boundary or before]
@@ -544,7 +493,7 @@ def compare(foreign: ForeignMap, environment: Environment, report: ImportReport)
         lost=_changed(before, after, report.tolerance),
         opened=_changed(after, before, report.tolerance),
         region=shapely.GeometryCollection(everything).convex_hull,
-        gap=narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
+        gap=env.narrowest_gap(after) if report.vertices_kept <= _MOST_VERTICES else None,
     )
 
 
@@ -555,3 +504,50 @@ def _changed(first: BaseGeometry, second: BaseGeometry, tolerance: float) -> Mul
     # of a long strip this is its width
     width = 2.0 * shapely.area(parts) / shapely.length(parts)
     return MultiPolygon(parts[width > max(_SLIVER * tolerance, 1e-3) / 2].tolist())
+
+
+def rooms(free: MultiPolygon, radius: float) -> list[Polygon]:
+    """Return where the centre of a robot may be, each place that it cannot leave, but for tiny ones."""
+    inner = free.buffer(-radius, quad_segs=4)
+    return [part for part in shapely.get_parts(inner).tolist() if part.area > radius * radius / 4]
+
+
+def roomiest(free: Polygon, tolerance: float, enough: float = math.inf) -> tuple[tuple[float, float], float]:
+    """Return the place farthest from the walls, and how far that is, m; or any that is far `enough`.
+
+    Squares that may hold one better by `tolerance` are cut into four, the `_SQUARES` most promising of them.
+    """
+    sides = shapely.linestrings(sides_of(free))
+    walls = STRtree(sides)
+    shapely.prepare(free)
+    low_x, low_y, high_x, high_y = free.bounds
+    width, height = high_x - low_x, high_y - low_y
+    some = np.linspace(low_y, high_y, _SQUARES)
+    squares = max(min(_SQUARES, _SQUARES * _MOST_RAYS // max(rays(sides, some), 1)), 16)
+    side = max(min(width, height), max(width, height) / squares)
+    corners = np.meshgrid(np.arange(low_x, high_x, side), np.arange(low_y, high_y, side))
+    centres = np.stack(corners, axis=-1).reshape(-1, 2) + side / 2
+    best, place = -math.inf, centres[0]
+    while len(centres) and best < enough:
+        _, away = walls.query_nearest(shapely.points(centres), return_distance=True, all_matches=False)
+        away = np.where(shapely.contains_xy(free, *centres.T), away, -away)
+        if away.max() > best:
+            best, place = float(away.max()), centres[away.argmax()]
+        hopeful = away + side * math.sqrt(0.5)
+        order = np.argsort(-hopeful, kind="stable")[:squares]
+        better = best + tolerance if enough == math.inf else max(best + tolerance, enough)
+        centres = centres[order[hopeful[order] > better]]
+        side /= 2
+        centres = (centres[:, None] + side / 2 * _QUARTERS).reshape(-1, 2)
+    return (float(place[0]), float(place[1])), best
+
+
+def moved_walls(before: MultiPolygon, after: MultiPolygon) -> tuple[float, float]:
+    """Return what area, m², was free and is not, or is and was not; and how far walls moved, m, at most."""
+    distance = 0.0
+    for one, other in ((before, after), (after, before)):
+        points = shapely.points(np.unique(shapely.get_coordinates(one), axis=0))
+        walls = STRtree(shapely.linestrings(sides_of(other)))
+        _, away = walls.query_nearest(points, return_distance=True, all_matches=False)
+        distance = max(distance, float(away.max()))
+    return float(shapely.symmetric_difference(before, after).area), distance

@@ -9,16 +9,14 @@ import shapely
 from robocov.arrays import Array, IntArray, ranges
 from robocov.environment import SAGITTA
 
+# largest distance between a curve and the line that stands for it, in metres: as of round obstacles
 TOLERANCE = SAGITTA
-"""Largest distance between a curve and the line that stands for it, in metres: as of round obstacles."""
-
 # steps between two breaks at first; and what of the tolerance the middle of a step may be away, which need
 # not be where the curve is farthest
 _FIRST, _SAFE = 8, 0.8
 _LEAST = 8  # points of a whole ellipse at least, however small it is
-
+# of one call. A circle of 10 000 km, the farthest that coordinates go, has 222 thousand.
 MOST_POINTS = 250_000
-"""Of one call. A circle of 10 000 km, the farthest that coordinates go, has 222 thousand."""
 
 
 def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[Array, IntArray]:
@@ -28,9 +26,6 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
     control points bound the curvature. (G. Wang, The subdivision method for finding the intersection between
     two Bézier curves or surfaces, Zhejiang University Journal, 1984.) Raises ValueError when there would be
     more than `most`.
-
-    >>> beziers(np.array([[[0.0, 0.0], [2.0, 3.0], [4.0, 3.0], [6.0, 0.0]]]), 0.6)[0].tolist()
-    [[3.0, 2.25], [6.0, 0.0]]
     """
     bend = np.hypot(*np.moveaxis(np.diff(control, 2, axis=1), 2, 0)).max(axis=1, initial=0.0)
     count = _counted(np.sqrt(0.75 * bend / tolerance), most)
@@ -45,10 +40,7 @@ def beziers(control: Array, tolerance: float, most: int = MOST_POINTS) -> tuple[
 def arcs(
     centre: Array, u: Array, v: Array, begin: Array, sweep: Array, tolerance: float, most: int = MOST_POINTS
 ) -> tuple[Array, IntArray]:
-    """Return points and counts as `beziers` for n elliptic arcs: centre + u cos(angle) + v sin(angle).
-
-    `begin`, `sweep`, (n,) rad: first angle, and how far it goes on, either way.
-    """
+    """Return points and counts as `beziers` for arcs centre + u cos(a) + v sin(a), a from `begin` on, rad."""
     # the longer half axis: the greater singular value of [u v]
     square, area = (u**2 + v**2).sum(axis=1), u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     radius = np.sqrt((square + np.sqrt(np.maximum(square**2 - 4.0 * area**2, 0.0))) / 2.0)
@@ -68,10 +60,7 @@ def arc(centre: Array, u: Array, v: Array, begin: float, sweep: float, tolerance
 
 
 def sampled(curve: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
-    """Return points of any smooth curve, (k, 2): steps are halved until their middles are near their chords.
-
-    `curve` takes parameters to points; it is smooth between one of the growing `breaks` and the next.
-    """
+    """Return points of a curve, smooth between growing `breaks`: steps are halved until they are near."""
     part = np.arange(_FIRST) / _FIRST
     t = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * part).ravel(), breaks[-1])
     points = curve(t)

@@ -10,23 +10,18 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from robocov.arrays import Array
+from robocov.arrays import Array, BoolArray
 from robocov.environment import GRID
 from robocov.errors import MapError
 
+# the first ring with the others as holes, or what SVG calls ``fill-rule``
 Rule: TypeAlias = Literal["holes", "evenodd", "nonzero"]
-"""The first ring with the others as holes, or what SVG calls ``fill-rule``."""
-
-DIGITS = 6
-"""Decimals of metres by default: the free space is known to a micrometre."""
-
+DIGITS = 6  # decimals of metres by default: the free space is known to a micrometre
 MAX_CROSSINGS = 30_000
 """Edges may cross each other so often in a file, those of all its shapes together. A ring of some kB can
 cross itself millions of times, and to find all of these places takes minutes and gigabytes."""
 
-CRUMB = 1e-4
-"""Obstacles and parts that are smaller, in m², come of rounding."""
-
+CRUMB = 1e-4  # obstacles and parts that are smaller, in m², come of rounding
 _FEW = 12  # so few edges are compared each with each, which is quicker than a tree of them
 _RAYS = 500_000  # so many pairs of a ray and an edge are looked at together, which bounds the memory
 # edges that are looked at for an estimate, and so many at once; pairs of edges that are compared for it at
@@ -45,27 +40,23 @@ class Crossings:
         """Count how often edges cross, not how they meet; MapError at more than `MAX_CROSSINGS`."""
         edges = shapely.linestrings(edges_of(lines))
         n = len(edges)
+        estimate = 0.0
         if n <= _FEW:
             one, other = np.triu_indices(n, 1)
-            self._add(float(shapely.crosses(edges[one], edges[other]).sum()))
-            return
-        tree = shapely.STRtree(edges)
-        order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
-        crossings = work = seen = 0
-        estimate = 0.0
-        for begin in range(0, len(order), _TOGETHER):
-            some = order[begin : begin + _TOGETHER]
-            one, other = tree.query(edges[some])
-            work += len(one)
-            seen += len(some)
-            crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
-            estimate = crossings * n / seen / 2  # each is seen from both of its edges
-            if work > _WORK or (crossings > _CERTAIN and self.count + estimate > MAX_CROSSINGS):
-                break
-        self._add(estimate)
-
-    def _add(self, count: float) -> None:
-        self.count += count
+            estimate = float(shapely.crosses(edges[one], edges[other]).sum())
+        else:
+            tree = shapely.STRtree(edges)
+            order = np.random.default_rng(0).permutation(n)[:_SAMPLES]
+            crossings = work = 0
+            for begin in range(0, len(order), _TOGETHER):
+                some = order[begin : begin + _TOGETHER]
+                one, other = tree.query(edges[some])
+                work += len(one)
+                crossings += int(shapely.crosses(edges[some[one]], edges[other]).sum())
+                estimate = crossings * n / (begin + len(some)) / 2  # each is seen from both of its edges
+                if work > _WORK or (crossings > _CERTAIN and self.count + estimate > MAX_CROSSINGS):
+                    break
+        self.count += estimate
         if self.count > MAX_CROSSINGS:
             raise MapError(
                 f"{self.where}: its lines cross each other some {self.count:.1g} times, but at most "
@@ -81,22 +72,16 @@ def edges_of(lines: Iterable[BaseGeometry]) -> Array:
 
 
 def sides_of(area: BaseGeometry) -> Array:
-    """Return the (n, 2, 2) sides of polygons."""
     return edges_of(shapely.get_rings(shapely.get_parts(area)))
 
 
 def enclosed(
     rings: Sequence[Array], rule: Rule = "holes", crossings: Crossings | None = None
 ) -> tuple[MultiPolygon, str | None, dict[str, int]]:
-    """Return the valid area that rings enclose, what was wrong with them, and which holes are none.
+    """Return the valid area that rings, (k, 2) m, closed or not, enclose, the largest part first.
 
-    `rings`, (k, 2) m: closed or not. `crossings`: of the file so far; MapError when they are too many.
-    Returns the area, the largest part first; where rings of a polygon with holes meet, in words; and how many
-    holes take nothing out of it, by the reason.
-
-    >>> square = np.array([[0, 0], [4, 0], [4, 4], [0, 4]])
-    >>> [enclosed([square, 1 + square / 2], rule)[0].area for rule in ("holes", "evenodd", "nonzero")]
-    [12.0, 12.0, 16.0]
+    Also where rings of a polygon with holes meet, in words, and how many holes take nothing out of it, by the
+    reason. `crossings`: of the file so far; MapError when they are too many.
     """
     crossings = Crossings() if crossings is None else crossings
     good = [_has_three(ring) for ring in rings]
@@ -111,7 +96,14 @@ def enclosed(
     crossings.add(lines)
     if rule != "holes":
         return _filled(lines, rule), None, {}
-    area = _mended(rings, lost)
+    areas = [made_valid(Polygon(ring)) for ring in rings]
+    # of rings that run along themselves the parts may share an edge
+    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
+    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
+    lost["without an area"] += len(areas) - 1 - len(holes)
+    shapely.prepare(outer)
+    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
+    area = polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
     return area, None if area.is_empty else shapely.is_valid_reason(plain), +lost
 
 
@@ -135,18 +127,6 @@ def _has_three(ring: Array) -> bool:
     return bool((others != others[:1]).any())
 
 
-def _mended(rings: Sequence[Array], lost: Counter[str]) -> MultiPolygon:
-    """Return the area of a polygon that is not valid: of the outer ring, without those of the holes."""
-    areas = [made_valid(Polygon(ring)) for ring in rings]
-    # of rings that run along themselves the parts may share an edge
-    areas = [area if area.is_valid else shapely.union_all([area]) for area in areas]
-    outer, holes = areas[0], [area for area in map(polygons_of, areas[1:]) if not area.is_empty]
-    lost["without an area"] += len(areas) - 1 - len(holes)
-    shapely.prepare(outer)
-    lost["outside of their outline"] += int((~shapely.intersects(outer, holes)).sum())
-    return polygons_of(shapely.difference(outer, united(holes)) if holes else outer)
-
-
 def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     faces = shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.union_all(lines))))
     if not len(faces):
@@ -155,17 +135,16 @@ def _filled(lines: Sequence[BaseGeometry], rule: Rule) -> MultiPolygon:
     edges = edges_of(lines)
     tree = shapely.STRtree(shapely.box(*edges.min(axis=1).T, *edges.max(axis=1).T))
     most = max(_RAYS // len(edges), 1)
-    parts = [_windings(inside[k : k + most], edges, tree) for k in range(0, len(inside), most)]
-    winding, crossings = (np.concatenate(part) for part in zip(*parts, strict=True))
-    chosen = crossings % 2 == 1 if rule == "evenodd" else winding != 0
+    chosen = [_is_filled(inside[k : k + most], edges, tree, rule) for k in range(0, len(inside), most)]
+    faces = faces[np.concatenate(chosen)]
     try:
-        return polygons_of(shapely.coverage_union_all(faces[chosen]))
+        return polygons_of(shapely.coverage_union_all(faces))
     except shapely.GEOSException:  # faces so thin that rounding has folded them over others
-        return polygons_of(shapely.union_all(faces[chosen], grid_size=GRID))
+        return polygons_of(shapely.union_all(faces, grid_size=GRID))
 
 
-def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array, Array]:
-    """Return how often edges wind around (m, 2) points, and how many a ray to the right crosses."""
+def _is_filled(points: Array, edges: Array, tree: shapely.STRtree, rule: Rule) -> BoolArray:
+    """Return which (m, 2) points edges wind around, or, by evenodd, cross a ray to the right oddly often."""
     far = np.column_stack([np.full(len(points), edges[..., 0].max() + 1.0), points[:, 1]])
     which, near = tree.query(shapely.linestrings(np.stack([points, far], axis=1)))
     p, a, b = points[which], edges[near, 0], edges[near, 1]
@@ -173,12 +152,11 @@ def _windings(points: Array, edges: Array, tree: shapely.STRtree) -> tuple[Array
     down = (b[:, 1] <= p[:, 1]) & (p[:, 1] < a[:, 1])
     left = (b[:, 0] - a[:, 0]) * (p[:, 1] - a[:, 1]) - (p[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
     sign = np.where(up & (left > 0), 1, np.where(down & (left < 0), -1, 0))
-    winding, crossings = (np.bincount(which, turn, len(points)) for turn in (sign, np.abs(sign)))
-    return winding.astype(float), crossings.astype(float)
+    turns = np.bincount(which, np.abs(sign) if rule == "evenodd" else sign, len(points))
+    return np.asarray(turns % 2 == 1 if rule == "evenodd" else turns != 0)
 
 
 def made_valid(area: BaseGeometry) -> BaseGeometry:
-    """Return a valid area of rings that may cross themselves or each other."""
     made: BaseGeometry = shapely.make_valid(area, method="structure", keep_collapsed=False)
     return made
 
@@ -191,7 +169,6 @@ def polygons(geometry: BaseGeometry) -> list[Polygon]:
 
 
 def polygons_of(geometry: BaseGeometry) -> MultiPolygon:
-    """Return the polygons in `geometry` as one geometry."""
     return MultiPolygon(polygons(geometry))
 
 
@@ -216,15 +193,10 @@ def rounded(geometry: BaseGeometry, digits: int) -> MultiPolygon:
 def bounded(
     free: MultiPolygon, given: Polygon | None, *, hull: bool, margin: float, digits: int
 ) -> tuple[Polygon, list[Polygon]]:
-    """Return a boundary around `free`, whose coordinates have so many `digits`, and what is solid in it.
+    """Return a boundary around `free`, with coordinates of so many `digits`, and what is solid in it.
 
-    It is `given`, m, without holes, or else the outline of `free`, or of several parts the convex hull; or
-    the `hull` of that; with so much `margin`, m, around it.
-
-    >>> room = shapely.box(0, 0, 4, 3) - shapely.box(1, 1, 2, 2)
-    >>> boundary, solid = bounded(MultiPolygon([room]), None, hull=False, margin=0.0, digits=4)
-    >>> boundary.area, [part.area for part in solid]
-    (12.0, [1.0])
+    It is `given`, m, without holes, or the outline of `free`, or of several parts the convex hull; or the
+    `hull` of that; with so much `margin`, m, around it.
     """
     parts = list(free.geoms)
     if given is not None:
@@ -252,11 +224,7 @@ def on_grid(geometry: BaseGeometry, digits: int) -> list[Polygon]:
 
 
 def decimal(value: float, digits: int) -> str:
-    """Return a number with at most so many decimals, and none that say nothing.
-
-    >>> decimal(1.5, 3), decimal(-0.0001, 3), decimal(1200.0, 0)
-    ('1.5', '0', '1200')
-    """
+    """Return a number with at most so many decimals, and none that say nothing."""
     text = f"{value:.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")

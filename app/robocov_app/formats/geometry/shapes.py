@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -20,10 +20,7 @@ from robocov_app.formats.base import ForeignMap, ReadOptions
 from robocov_app.formats.geometry.polygons import Crossings, Rule, enclosed, polygons_of, united
 
 Kind: TypeAlias = Literal["polygon", "line", "point"]
-
-THICKNESS = 0.1
-"""Width of walls that are drawn as lines without one, in metres."""
-
+THICKNESS = 0.1  # width of walls that are drawn as lines without one, in metres
 _SHOWN = 20  # names that are listed where one is wrong
 _DIGITS = 9
 
@@ -32,8 +29,7 @@ _DIGITS = 9
 class Figure:
     """A geometry of a file, before it is known what its coordinates are; `at` is its place, for messages.
 
-    `rule`: what the rings of a polygon enclose; see `polygons.enclosed`. `width`, m: of a line, where the
-    file says it.
+    `rule`: as of `polygons.enclosed`. `width`, m: of a line, where the file says it.
     """
 
     kind: Kind
@@ -46,10 +42,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Closed outline: enclosed area, m, valid; names, ids, classes, layers, the most particular first.
-
-    `circle`: the same as an obstacle of a map, where it is a disc.
-    """
+    """A closed outline: its valid area, m; labels, the most particular first; the disc that it is, if any."""
 
     area: MultiPolygon
     labels: tuple[str, ...] = ()
@@ -58,10 +51,10 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """An open or closed line, (k, 2) m, that is a wall; `cap` and `join` are shapely's words.
+    """A line, (k, 2) m, open or closed, that is a wall; `cap` and `join` are shapely's words.
 
-    `stretched`, (points, width, matrix) or None: a pen that is no circle: (k, 2) points and a width in other
-    units, and the (3, 3) matrix that makes them metres.
+    `stretched`: of a pen that is no circle, (k, 2) points, a width and the (3, 3) matrix that makes them
+    metres.
     """
 
     points: Array
@@ -74,7 +67,6 @@ class Line:
 
     @cached_property
     def solid(self) -> BaseGeometry:
-        """Area that the wall covers."""
         points, width, matrix = self.stretched or (self.points, self.width, None)
         solid = LineString(points).buffer(
             width / 2, cap_style=self.cap, join_style=self.join, mitre_limit=self.mitre_limit
@@ -95,46 +87,48 @@ class Line:
         return WallObstacle(tuple((x, y) for x, y in points.tolist()), self.width, name_of(self.labels))
 
 
-@dataclass(eq=False)
 class Shapes:
     """Shapes that a reader has found in the file `where`: checked, counted, chosen by name.
 
-    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: how many of which things are no part
-    of the map, and why, or had to be put right, and how. `labels`: as they are compared and as they are
-    written. `robots`, `notes`, `cell`: as of a `ForeignMap`.
+    `pillars` are obstacles whatever outlines are. `left_out`, `mended`: counts of what is no part of the map
+    or was put right, and why. `labels`: as compared and as written. `robots`, `notes`, `cell`: of a
+    `ForeignMap`.
     """
 
-    where: str
-    options: ReadOptions
-    outlines: list[Outline] = field(default_factory=list)
-    lines: list[Line] = field(default_factory=list)
-    pillars: list[CircleObstacle] = field(default_factory=list)
-    vertices: int = 0
-    left_out: Counter[tuple[str, str]] = field(default_factory=Counter)
-    mended: Counter[tuple[str, str]] = field(default_factory=Counter)
-    labels: dict[str, str] = field(default_factory=dict)
-    robots: list[tuple[float, float]] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    cell: float | None = None
-    _heights: list[Array] = field(default_factory=list)
-    _met: list[str] = field(default_factory=list)
-
-    @cached_property
-    def _crossings(self) -> Crossings:
-        return Crossings(self.where)
+    def __init__(self, where: str, options: ReadOptions) -> None:
+        self.where, self.options = where, options
+        self.outlines: list[Outline] = []
+        self.lines: list[Line] = []
+        self.pillars: list[CircleObstacle] = []
+        self.vertices = 0
+        self.left_out: Counter[tuple[str, str]] = Counter()
+        self.mended: Counter[tuple[str, str]] = Counter()
+        self.labels: dict[str, str] = {}
+        self.only = None if options.only is None else set(map(str.casefold, options.only))
+        self.skip = set(map(str.casefold, options.skip or ()))
+        self.robots: list[tuple[float, float]] = []
+        self.notes: list[str] = []
+        self.cell: float | None = None
+        self.thickness = THICKNESS if options.thickness is None else options.thickness
+        self._heights: list[Array] = []
+        self._met: list[str] = []
+        self._crossings = Crossings(where)
 
     def wants(self, labels: Iterable[str]) -> bool:
         """Return whether something with these labels is asked for; what is not is counted."""
+        found = self.seen(labels)
+        wanted = (self.only is None or bool(self.only & found)) and not self.skip & found
+        if not wanted:
+            self.leave_out("shape", "by the names that were asked for")
+        return wanted
+
+    def seen(self, labels: Iterable[str]) -> set[str]:
+        """Return labels as they are compared, and keep what the file calls them."""
         found = {label.casefold(): label for label in labels}
         self.labels |= found
-        only, skip = self.options.only, self.options.skip
-        if (only is None or folded(only) & found.keys()) and not folded(skip or ()) & found.keys():
-            return True
-        self.leave_out("shape", "by the names that were asked for")
-        return False
+        return set(found)
 
     def add_all(self, figures: Iterable[Figure]) -> None:
-        """Add geometries as `add`, and join the lines that meet."""
         for figure in figures:
             self.add(figure)
         self.join_lines()
@@ -155,10 +149,7 @@ class Shapes:
         self, rings: Sequence[Array], labels: Sequence[str] = (), *,
         rule: Rule = "holes", at: str = "", thing: str = "outline",
     ) -> bool:  # fmt: skip
-        """Add the area that rings, (k, 2) m, enclose; without one the `thing`, if it has a name, is counted.
-
-        Raises MapError where a ring is out of range.
-        """
+        """Add the area of rings, (k, 2) m; without one the `thing`, if it has a name, is counted."""
         rings = self._checked(rings, at)
         area, reason, lost = enclosed(rings, rule, self._crossings)
         for why, count in lost.items():
@@ -172,7 +163,6 @@ class Shapes:
         return not area.is_empty
 
     def add_line(self, line: Line, *, at: str = "") -> None:
-        """Add a wall. Raises MapError as `add_outline`."""
         (points,) = self._checked([line.points], at)
         width = max(line.width, 0.0)
         files.require_length(width, ": ".join(filter(None, (self.where, at, "width"))), 0.0)
@@ -196,38 +186,39 @@ class Shapes:
         ]
 
     def add_circle(self, centre: Array, radius: float, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a disc, as the polygon that stands for a round obstacle. Raises MapError as `add_outline`."""
         self._checked([centre + np.array([[-radius, -radius], [radius, radius]])], at)
         circle = CircleObstacle((float(centre[0]), float(centre[1])), radius, name_of(labels))
         (ring,) = self._checked([np.asarray(circle.polygon.exterior.coords)[:-1]], at)
         self.outlines.append(Outline(MultiPolygon([Polygon(ring)]), tuple(labels), circle))
 
     def add_point(self, point: Array, labels: Sequence[str] = (), *, at: str = "") -> None:
-        """Add a pillar, if points were asked for. Raises MapError as `add_outline`."""
         ((x, y),) = self._checked([point[None]], at)[0].tolist()
         if self.options.pillar is None:
             self.leave_out("point", "(--pillar RADIUS makes pillars of them)")
         else:
             self.pillars.append(CircleObstacle((x, y), self.options.pillar, name_of(labels)))
 
+    def polygon(self, rings: Iterable[Array], labels: tuple[str, ...], at: str) -> Figure:
+        """Return a polygon of a format that closes rings; those that are not closed are counted."""
+        rings = tuple(rings)
+        if unclosed := sum(bool((ring[0] != ring[-1]).any()) for ring in rings):
+            self.mended["ring", "closed: the last point was not the first"] += unclosed
+        return Figure("polygon", rings, labels, at)
+
+    def flat(self, points: Array) -> Array:
+        """Return (k, 2) of points, whose third coordinates are counted."""
+        self.leave_heights(points[:, 2:3])
+        return points[:, :2]
+
     def leave_heights(self, heights: Array) -> None:
         """Count third coordinates, which no map has; nan is none."""
-        heights = heights[~np.isnan(heights)]
-        if len(heights):
-            self._heights.append(heights)
+        self._heights.append(heights[~np.isnan(heights)])
 
     def leave_out(self, thing: str, why: str = "", count: int = 1) -> None:
-        """Count something that is no part of the map."""
         self.left_out[thing, why] += count
 
     @property
-    def thickness(self) -> float:
-        """Width of lines that have none of their own, m."""
-        return THICKNESS if self.options.thickness is None else self.options.thickness
-
-    @property
     def areas(self) -> list[BaseGeometry]:
-        """Areas that the outlines enclose."""
         return [outline.area for outline in self.outlines]
 
     @property
@@ -237,7 +228,6 @@ class Shapes:
 
     @property
     def repaired(self) -> tuple[str, ...]:
-        """Repairs that were made, in words."""
         told = [f"{counted(count, thing)} {what}" for (thing, what), count in sorted(self.mended.items())]
         if len(self._met) == 1:
             told.append(f"the outline met itself: {self._met[0]}")
@@ -247,11 +237,10 @@ class Shapes:
 
     @property
     def dropped(self) -> tuple[str, ...]:
-        """Left-out content, in words."""
         left = sorted(self.left_out.items())
         told = [f"{_many(count, thing)} {why}".strip() for (thing, why), count in left]
-        if self._heights:
-            heights = np.concatenate(self._heights)
+        heights = np.concatenate([*self._heights, np.empty(0)])
+        if len(heights):
             span = f"z from {heights.min():.4g} to {heights.max():.4g}"
             told.append(f"{counted(len(heights), 'third coordinate')}, {span}")
         return tuple(told)
@@ -268,7 +257,6 @@ class Shapes:
                     raise ParameterError(f"{self.where}: {name}: {what}")
 
     def count(self, vertices: int) -> None:
-        """Count vertices that were read. Raises MapError when there are too many."""
         self.vertices += vertices
         files.require_vertices(self.vertices, self.where)
 
@@ -288,11 +276,7 @@ class Shapes:
 
 
 def _many(count: int, thing: str) -> str:
-    """Return how many things there are, also of nouns in y and x.
-
-    >>> _many(2, "empty geometry"), _many(2, "box")
-    ('2 empty geometries', '2 boxes')
-    """
+    """Return how many things there are, also of nouns in y and x."""
     if count != 1 and thing.endswith(("y", "x")):
         return f"{count} {thing[:-1]}ies" if thing[-1] == "y" else f"{count} {thing}es"
     return counted(count, thing)
@@ -304,23 +288,8 @@ def name_of(labels: Sequence[str]) -> str | None:
     return next(names, None) or None
 
 
-def folded(labels: Iterable[str]) -> set[str]:
-    """Return labels as they are compared."""
-    return {label.casefold() for label in labels}
-
-
-def polygonised(lines: Iterable[Line]) -> BaseGeometry:
-    """Return the area that lines enclose together, in whatever order they stand."""
-    noded = shapely.union_all([LineString(line.points) for line in lines])
-    return shapely.union_all(shapely.get_parts(shapely.polygonize(shapely.get_parts(noded))))
-
-
-BOUNDARY = "boundary"
-"""A shape of this name, id, class or layer is the boundary."""
-
-AROUND = 1.0
-"""Room left around the shapes where none of them is the boundary, in metres."""
-
+BOUNDARY = "boundary"  # a shape of this name, id, class or layer is the boundary
+AROUND = 1.0  # room left around the shapes where none of them is the boundary, in metres
 # a boundary holds more than this part of the other shapes; walls that are one leave so much of it open
 _MOST = 0.5
 # shapes that are farther from each other, in metres, are of no map: unions of such take seconds
@@ -338,7 +307,6 @@ class _Enclosure(NamedTuple):
 
 def foreign_map(
     shapes: Shapes,
-    format: str,  # noqa: A002 - as of a `ForeignMap`
     name: str,
     description: str,
     *,
@@ -383,7 +351,7 @@ def foreign_map(
         others = boundary is not None and len(shapes.outlines) > len(boundary.outlines)
         solid = not shapes.outlines or others
     if solid:
-        boundary = boundary or _walled(shapes) or _rectangle(shapes)
+        boundary = boundary or surrounding(shapes)
         area = boundary.area
     else:
         area = _together([o.area for o in shapes.outlines if not boundary or o not in boundary.outlines])
@@ -399,13 +367,9 @@ def foreign_map(
     shapely.prepare(area)
     around = shapely.covered_by(area, blocks)
     solids = [*blocks[~around], *(line.solid for line in walls), *(each.polygon for each in shapes.pillars)]
-    outside = int((~shapely.intersects(area, solids)).sum() + around.sum())
-    if outside:
+    if outside := int((~shapely.intersects(area, solids)).sum() + around.sum()):
         shapes.leave_out("shape", "outside of the boundary", outside)
-    free = area
-    if solids:
-        free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID))
-    outer = None
+    free = polygons_of(shapely.difference(area, united(solids), grid_size=GRID)) if solids else area
     # what is free of a grid has its own outline
     plain = world is None or (len(world.geoms) == 1 and not world.geoms[0].interiors)
     if boundary is not None and (solid or boundary.area is not area) and plain:
@@ -413,57 +377,45 @@ def foreign_map(
     elif (walls or shapes.pillars) and len(area.geoms) == len(free.geoms) == 1:
         # walls that begin at the edge are no part of it
         outer = Polygon(area.geoms[0].exterior)
+    else:
+        outer = None
+    notes = [*shapes.notes]
+    if boundary and boundary.words and solid:
+        notes.append(f"the boundary is {boundary.words}")
+    many = counted(int((~around).sum()), "closed outline")
+    if not around.all() and (boundary is None or boundary.words):  # else the format says what all of it is
+        notes.append(f"{many} taken as solid (--outlines free: as free space)")
+    elif not solid and len(shapes.outlines) > 1:
+        many = counted(len(shapes.outlines), "closed outline")
+        notes.append(f"{many} taken as free space (--outlines solid: as obstacles)")
+    if walls:
+        narrow, wide = (f"{most(line.width for line in walls):.3g}" for most in (min, max))
+        span = narrow if narrow == wide else f"{narrow} to {wide}"
+        notes.append(f"{counted(len(walls), 'line')} taken as walls, {span} m wide (--thickness)")
+    if shapes.pillars:
+        notes.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
+    circles = (outline.circle for outline in inner if outline.circle is not None)
+    straight = (wall for line in walls if (wall := line.wall) is not None)
     return ForeignMap(
         name=name,
         description=description,
-        format=format,
         free=free,
         boundary=outer,
         vertices_read=shapes.vertices,
         cell=shapes.cell,
-        primitives=(
-            *(outline.circle for outline in inner if outline.circle is not None),
-            *(wall for line in walls if (wall := line.wall) is not None),
-            *shapes.pillars,
-        ),
+        primitives=(*circles, *straight, *shapes.pillars),
         robots=tuple(shapes.robots),
         repaired=shapes.repaired,
         dropped=shapes.dropped,
-        notes=(*shapes.notes, *_words(shapes, solid, boundary, int((~around).sum()))),
+        notes=tuple(notes),
     )
 
 
-def surrounding(shapes: Shapes) -> tuple[MultiPolygon, str]:
-    """Return what the shapes enclose as walls, else a rectangle around them, m; and that in words."""
-    found = _walled(shapes) or _rectangle(shapes)
-    return found.area, f"the boundary is {found.words}"
-
-
 def _require_size(bounds: Iterable[float], where: str, most: float = LARGEST) -> None:
-    """Refuse what no map may be, before it is computed with."""
     x, y, right, top = bounds
     if max(right - x, top - y) > most:
-        size = f"{right - x:.6g} x {top - y:.6g} m"
         wanted = f"at most {LARGEST / 1000:g} km was wanted: is the scale right?"
-        raise MapError(f"{where}: {size}, but {wanted}")
-
-
-def _words(shapes: Shapes, solid: bool, boundary: _Enclosure | None, blocks: int) -> list[str]:
-    told = [f"the boundary is {boundary.words}"] if boundary and boundary.words and solid else []
-    if blocks and (boundary is None or boundary.words):  # else the format says what all of it is
-        told.append(f"{counted(blocks, 'closed outline')} taken as solid (--outlines free: as free space)")
-    elif not solid and len(shapes.outlines) > 1:
-        many = counted(len(shapes.outlines), "closed outline")
-        told.append(f"{many} taken as free space (--outlines solid: as obstacles)")
-    used = boundary.lines if boundary is not None else ()
-    widths = sorted(line.width for line in shapes.lines if line not in used)
-    if widths:
-        narrow, wide = f"{widths[0]:.3g}", f"{widths[-1]:.3g}"
-        span = narrow if narrow == wide else f"{narrow} to {wide}"
-        told.append(f"{counted(len(widths), 'line')} taken as walls, {span} m wide (--thickness)")
-    if shapes.pillars:
-        told.append(f"{counted(len(shapes.pillars), 'point')} taken as pillars")
-    return told
+        raise MapError(f"{where}: {right - x:.6g} x {top - y:.6g} m, but {wanted}")
 
 
 def _named(shapes: Shapes) -> _Enclosure | None:
@@ -471,13 +423,15 @@ def _named(shapes: Shapes) -> _Enclosure | None:
     key = (wanted or BOUNDARY).casefold()
     outlines = frozenset(o for o in shapes.outlines if key in map(str.casefold, o.labels))
     lines = frozenset(line for line in shapes.lines if key in map(str.casefold, line.labels))
-    area = _together([*(o.area for o in outlines), polygonised(lines)])
-    if area.is_empty:
-        if wanted is None:
-            return None
+    noded = shapely.union_all([LineString(line.points) for line in lines])
+    rooms = shapely.get_parts(shapely.polygonize(shapely.get_parts(noded)))
+    area = _together([*(o.area for o in outlines), shapely.union_all(rooms)])
+    if not area.is_empty:
+        return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+    if wanted is not None:
         what = f"boundary {shown(wanted)}: encloses no area, but a closed outline was wanted"
         raise MapError(f"{shapes.where}: {what}")
-    return _Enclosure(area, f"what is called {shown(wanted or BOUNDARY)}", outlines, lines)
+    return None
 
 
 def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
@@ -491,11 +445,7 @@ def _largest(shapes: Shapes, solid: bool, *, wholly: bool) -> _Enclosure | None:
         # walls as one shape have rooms as holes
         if outline.area.area < _MOST * _filled(outline):
             return None
-    if wholly:
-        holds = bool(shapely.covers(outline.area, inner).all())
-    else:
-        holds = not inner or _holds(outline.area, inner)
-    if not holds:
+    if inner and not (shapely.covers(outline.area, inner).all() if wholly else _holds(outline.area, inner)):
         return None
     called = f", {shown(outline.labels[0])}," if outline.labels else ""
     words = f"the largest closed outline{called} of {_filled(outline):.4g} m²"
@@ -506,20 +456,18 @@ def _filled(outline: Outline) -> float:
     return float(sum(Polygon(part.exterior).area for part in outline.area.geoms))
 
 
-def _walled(shapes: Shapes) -> _Enclosure | None:
-    solid = _together([*shapes.areas, *(line.solid for line in shapes.lines)])
+def surrounding(shapes: Shapes) -> _Enclosure:
+    """Return what the shapes enclose as walls, else a rectangle around them."""
+    solids = [*shapes.areas, *(line.solid for line in shapes.lines)]
+    solid = _together(solids)
     fills = [Polygon(part.exterior) for part in solid.geoms]
-    if not fills:  # what there is is thinner than the grid
-        return None
-    k = int(np.argmax([fill.area for fill in fills]))
-    if solid.geoms[k].area > (1.0 - _MOST) * fills[k].area or not _holds(fills[k], list(solid.geoms)):
-        return None
-    return _Enclosure(MultiPolygon([fills[k]]), f"the outer edge of the walls, around {fills[k].area:.4g} m²")
-
-
-def _rectangle(shapes: Shapes) -> _Enclosure:
+    if fills:  # else what there is is thinner than the grid
+        k = int(np.argmax([fill.area for fill in fills]))
+        fill, area = fills[k], fills[k].area
+        if solid.geoms[k].area <= (1.0 - _MOST) * area and _holds(fill, list(solid.geoms)):
+            return _Enclosure(MultiPolygon([fill]), f"the outer edge of the walls, around {area:.4g} m²")
     around = AROUND if shapes.options.around is None else shapes.options.around
-    x, y, right, top = shapely.total_bounds([*shapes.areas, *(line.solid for line in shapes.lines)])
+    x, y, right, top = shapely.total_bounds(solids)
     box = shapely.box(x - around, y - around, right + around, top + around)
     words = f"a rectangle {around:g} m around everything (--around): no shape holds the others"
     return _Enclosure(MultiPolygon([box]), words)

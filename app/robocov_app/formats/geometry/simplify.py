@@ -14,7 +14,6 @@ a digitized line or its caricature, Cartographica 10 (1973), 112-122.
 """
 
 from collections import Counter
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -24,7 +23,6 @@ from shapely import MultiPolygon, Polygon, STRtree
 
 from robocov.arrays import Array, BoolArray, IntArray, beginnings, ranges
 from robocov.errors import counted
-from robocov_app.formats.geometry.passages import closed_gaps, paths_of
 from robocov_app.formats.geometry.raster import NECK
 
 KEPT_OUTLINE, KEPT_AREA = 0.1, 0.02
@@ -48,6 +46,9 @@ _RIGHT, _SQUARE = 1e-5, 0.2
 # in tolerances: what counts as a short edge, and how far from the corner its run may be; and the sine of the
 # angle below which two walls count as parallel
 _SHORT, _NEAR, _PARALLEL = 1.5, 2.0, 0.1
+_CHUNK = 2048  # sides that are looked at together for gaps, which bounds the memory
+_MOST_GAPS, _MOST_RAYS = 200_000, 300_000_000  # looked at; sides that rays cross to tell what is inside
+_CLEARLY = 1 + 1e-6  # a gap of just a robot's diameter is none
 _LONGEST = 1024  # most vertices between two that must stay: the algorithm's depth may grow with their number
 
 
@@ -80,12 +81,24 @@ class Rings:
     @cached_property
     def areas(self) -> Array:
         """The signed area of each ring, (r,) m²: positive counter-clockwise."""
-        if not len(self.points):
-            return np.zeros(len(self.begin))
         local = self.points - self.points[self.begin].repeat(self.size, axis=0)
-        double = np.append(np.cumsum(_cross(local, local[self.after])), 0.0)
-        total = np.append(0.0, double[:-1])
+        total = np.append(0.0, np.cumsum(_cross(local, local[self.after])))
         return np.asarray((total[self.begin + self.size] - total[self.begin]) / 2)
+
+    @cached_property
+    def sides(self) -> Array:
+        """From each vertex to the next one, (k, 2) m."""
+        return np.asarray(self.points[self.after] - self.points)
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Of the sides, (k,) m."""
+        return np.asarray(np.hypot(*self.sides.T))
+
+    @property
+    def ends(self) -> Array:
+        """Of the sides, (k, 2, 2) m."""
+        return np.stack([self.points, self.points[self.after]], axis=1)
 
 
 class Outline(Rings):
@@ -103,8 +116,7 @@ class Outline(Rings):
 def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius: float) -> Simplified:
     """Return `free`, m, valid, with fewer vertices; walls move by the tolerance, m, at most.
 
-    `cell`, m: side of the cells that it is the outline of. `radius`, m: of a robot: where it passes, it still
-    does.
+    `cell`, m: side of the cells that it is the outline of. `radius`, m: robots pass wherever they passed.
     """
     if tolerance == 0.0 or free.is_empty:
         return Simplified(free, 0.0)
@@ -139,7 +151,6 @@ def simplified(free: MultiPolygon, tolerance: float, cell: float | None, radius:
 
 
 def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
-    """Return how often each thing that is checked was wrong at first, in words."""
     less = {
         "narrow place": f"so that a robot of radius {radius:g} m passes where it passed",
         "outline": f"whose area would have changed by more than {100 * KEPT_OUTLINE:g} %",
@@ -151,39 +162,46 @@ def _told(found: Counter[str], radius: float) -> tuple[str, ...]:
     return tuple(told)
 
 
-@dataclass(frozen=True, eq=False)
 class _Check:
-    """Validity checks of a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
+    """Checks of a drawing of an outline; each answer is a mask of the outline's vertices, (k,).
 
-    `allowed`, (k,) m: the tolerance at each. `found` counts what is wrong where that is still the whole one.
+    `allowed`, (k,) m: the tolerance at each; `found` counts what is wrong where that is still the whole one.
+    `width`, m: of a robot. `side`, (k,): the drawing's side that stands for each vertex, by its first one.
     """
 
-    outline: Outline
-    drawing: Rings
-    allowed: Array
-    tolerance: float
-    width: float
-    found: Counter[str]
-
-    @cached_property
-    def side(self) -> IntArray:
-        """Side of the drawing, by its first vertex, that stands for each vertex of the outline, (k,)."""
-        drawing, ring = self.drawing, self.outline.ring
-        order = np.argsort(drawing.source, kind="stable")
+    def __init__(
+        self,
+        outline: Outline,
+        drawing: Rings,
+        allowed: Array,
+        tolerance: float,
+        width: float,
+        found: Counter[str],
+    ) -> None:
+        self.outline, self.drawing, self.allowed = outline, drawing, allowed
+        self.tolerance, self.width, self.found = tolerance, width, found
+        order, ring = np.argsort(drawing.source, kind="stable"), outline.ring
         place = np.searchsorted(drawing.source[order], np.arange(len(ring)), side="right") - 1
         # before the first of a ring comes its last
         end = drawing.begin + drawing.size - 1
-        return np.asarray(order[np.where(place < drawing.begin[ring], end[ring], place)])
+        self.side = order[np.where(place < drawing.begin[ring], end[ring], place)]
 
     def misdrawn(self) -> tuple[BoolArray, BoolArray]:
         """Return what is in a ring of another size, and what a side stands for from furthest off."""
-        allowed, distance = self.allowed, self._distance()
+        allowed, drawing, points = self.allowed, self.drawing, self.outline.points
+        distance = np.full(len(points), np.inf)
+        # where a corner was made whole, the side before or after may be the nearer one
+        for near in (self.side, drawing.before[self.side], drawing.after[self.side]):
+            start, along = drawing.points[near], drawing.sides[near]
+            part = _dot(points - start, along) / np.maximum(_dot(along, along), 1e-300)
+            foot = start + np.clip(part, 0.0, 1.0)[:, None] * along
+            distance = np.minimum(distance, np.hypot(*(points - foot).T))
         furthest = np.lexsort((-distance, self.side))
         furthest = furthest[beginnings(self.side[furthest])]
         far = np.zeros(len(distance), dtype=bool)
         far[furthest] = distance[furthest] > allowed[furthest] * (1 + 1e-9)
         far &= allowed > 0.0
-        was, now, ring = self.outline.areas, self.drawing.areas, self.outline.ring
+        was, now, ring = self.outline.areas, drawing.areas, self.outline.ring
         off = np.abs(now - was) > KEPT_OUTLINE * np.abs(was)
         fresh = np.unique(ring[allowed == self.tolerance])
         self.found["outline"] += int(np.count_nonzero(off[fresh]))
@@ -193,24 +211,12 @@ class _Check:
             wrong = allowed > 0.0
         return wrong, far
 
-    def _distance(self) -> Array:
-        drawing, points = self.drawing, self.outline.points
-        nearest = np.full(len(points), np.inf)
-        # where a corner was made whole, the side before or after may be the nearer one
-        for near in (self.side, drawing.before[self.side], drawing.after[self.side]):
-            start, along = drawing.points[near], drawing.points[drawing.after[near]] - drawing.points[near]
-            part = _dot(points - start, along) / np.maximum(_dot(along, along), 1e-300)
-            foot = start + np.clip(part, 0.0, 1.0)[:, None] * along
-            nearest = np.minimum(nearest, np.hypot(*(points - foot).T))
-        return nearest
-
     def met(self) -> tuple[MultiPolygon, BoolArray]:
         outline, drawing, allowed = self.outline, with_necks(self.outline, self.drawing), self.allowed
         parts = polygons_from(outline, drawing)
         if parts.is_valid:
             return parts, np.zeros(len(outline.points), dtype=bool)
-        after = drawing.after
-        sides = shapely.linestrings(np.stack([drawing.points, drawing.points[after]], axis=1))
+        after, sides = drawing.after, shapely.linestrings(drawing.ends)
         one, other = STRtree(sides).query(sides, predicate="intersects")
         apart = (one < other) & (after[one] != other) & (after[other] != one)
         across = drawing.vertex[np.append(one[apart], other[apart])]
@@ -225,17 +231,18 @@ class _Check:
     def narrowed(self, parts: MultiPolygon) -> BoolArray | None:
         """Return what is about gaps that a robot does not pass any more; None where these are too many."""
         outline, drawing = self.outline, self.drawing
-        sides = np.stack([drawing.points, drawing.points[drawing.after]], axis=1)
         # a side from or to the middle of a short one stands for all of that
         first, last = drawing.vertex, np.ceil(drawing.source[drawing.after]).astype(np.intp)
-        ring = drawing.ring
-        paths = paths_of(outline.points, outline.begin[ring], outline.size[ring], first, last)
-        closed = closed_gaps(sides, paths, parts, self.width, 3 * self.tolerance)
+        begin, size = outline.begin[drawing.ring], outline.size[drawing.ring]
+        count = (last - first - 1) % size + 2
+        at = begin.repeat(count) + (ranges(first - begin, count)) % size.repeat(count)
+        runs = shapely.linestrings(outline.points[at], indices=np.arange(len(count)).repeat(count))
+        closed = closed_gaps(drawing.ends, runs, parts, self.width, 3 * self.tolerance)
         if closed is None:
             return None
         wrong = np.zeros(len(outline.points), dtype=bool)
         order = np.argsort(self.side, kind="stable")
-        of_sides = np.split(order, np.searchsorted(self.side[order], np.arange(1, len(sides))))
+        of_sides = np.split(order, np.searchsorted(self.side[order], np.arange(1, len(count))))
         for pair, place in zip(*closed, strict=True):
             about = np.concatenate([*(of_sides[k] for k in pair), first[drawing.after[pair]]])
             loose = about[self.allowed[about] > 0.0]
@@ -257,14 +264,12 @@ def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
     if cell is not None:
         # the two ends of a neck, a short side between two at right angles, become the corner between them
         rings = Rings(points, begin, source)
-        after, before = rings.after, rings.before
-        side = points[after] - points
-        length = np.hypot(*side.T)
-        along = side[before] / np.maximum(length[before], 1e-300)[:, None]
-        square = np.abs(_dot(along, along[after[after]])) < _RIGHT
-        neck = square & (length < np.minimum(length[before], length[after]))
+        before, length = rings.before, rings.lengths
+        along = rings.sides[before] / np.maximum(length[before], 1e-300)[:, None]
+        neck = np.abs(_dot(along, along[rings.after[rings.after]])) < _RIGHT
+        neck &= length < np.minimum(length[before], length[rings.after])
         neck &= length < 1.001 * np.sqrt(2) * NECK * cell
-        points = np.where(neck[:, None], points + _dot(side, along)[:, None] * along, points)
+        points = np.where(neck[:, None], points + _dot(rings.sides, along)[:, None] * along, points)
         keep = ~neck[before]
         points, neck, ring, source = points[keep], neck[keep], ring[keep], source[: keep.sum()]
         begin = np.searchsorted(ring, np.arange(len(lines)))
@@ -274,7 +279,6 @@ def outline_of(polygons: list[Polygon], cell: float | None) -> Outline:
 
 
 def polygons_from(outline: Outline, drawing: Rings) -> MultiPolygon:
-    """Return the polygons of a drawing of `outline`."""
     rings = shapely.linearrings(drawing.points, indices=drawing.ring)
     return MultiPolygon(list(shapely.polygons(rings, indices=outline.owner)))
 
@@ -285,8 +289,6 @@ def drawn(outline: Outline, tolerance: Array, fixed: BoolArray) -> Rings:
     Where that is 0 vertices stay, and where they are `fixed`, (k,), or the middles that stand for them.
     """
     path = _without_stairs(outline, tolerance)
-    if not len(path.points):
-        return path
     allowed = tolerance[path.vertex]
     stays = fixed[path.vertex] | ((path.source != path.vertex) & fixed[outline.after[path.vertex]])
     stays |= _extremes(path) | (allowed == 0.0) | (np.arange(len(allowed)) % _LONGEST == 0)
@@ -326,15 +328,13 @@ def _kept(path: Rings, allowed: Array, stays: BoolArray, most: Array) -> tuple[I
 
 
 def _fitted(path: Rings, kept: IntArray, drawing: Rings, allowed: Array) -> Rings:
-    """Return `drawing` with the sides that stand for stairs in the middle of these, and corners whole.
+    """Return `drawing` with corners whole, and sides that stand for stairs in the middle of these.
 
-    Such a side becomes the line of least squares of the middles that it stands for, and its ends go
-    where it meets its neighbours. A short side between two long ones that meet nearby is a corner.
+    Such a side becomes the line of least squares of the middles that it stands for; it ends where that meets
+    its neighbours. A short side between two long ones that meet nearby is a corner.
     """
-    points, after, before = drawing.points, drawing.after, drawing.before
-    chord = points[after] - points
-    length = np.hypot(*chord.T)
-    chord /= np.maximum(length, 1e-300)[:, None]
+    points, after, before, length = drawing.points, drawing.after, drawing.before, drawing.lengths
+    chord = drawing.sides / np.maximum(length, 1e-300)[:, None]
     stairs, foot, along = _stairs(path, kept, drawing)
     # a line for each side: a point of it, and its direction
     foot = np.where(stairs[:, None], foot, points)
@@ -403,15 +403,14 @@ def with_necks(outline: Outline, drawing: Rings) -> Rings:
 def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
     """Return `drawing` with rings of the area that they had, where they lost or won much of it.
 
-    All sides of such a ring move by the same distance, of at most half the tolerance at its vertices. Small
-    round things need it: with few corners, each on their rim, they get smaller.
+    All sides of one move by the same distance, of at most half the tolerance. Small round things need it:
+    with few corners, each on their rim, they get smaller.
     """
     points, was, now = drawing.points, outline.areas, drawing.areas
     some = (np.abs(now - was) > _UNBALANCED * np.abs(was)) & (2 * now * np.sign(was) > np.abs(was))
     if not some.any():
         return drawing
-    side = points[drawing.after] - points
-    length = np.hypot(*side.T)
+    side, length = drawing.sides, drawing.lengths
     # to the right of a side is the outside of a ring that runs counter-clockwise
     normal = np.column_stack([side[:, 1], -side[:, 0]]) / np.maximum(length, 1e-300)[:, None]
     around = np.maximum(np.add.reduceat(length, drawing.begin), 1e-300)
@@ -426,12 +425,11 @@ def balanced(outline: Outline, drawing: Rings, tolerance: Array) -> Rings:
 def _without_stairs(outline: Outline, tolerance: Array) -> Rings:
     """Return the vertices of `outline`, stairs drawn by the middles of their short sides."""
     points, after, cell = outline.points, outline.after, outline.cell
-    if cell is None or not len(points):
+    if cell is None:
         return outline
-    side = points[after] - points
-    turn = np.sign(np.round(_cross(side[outline.before], side) / cell**2, 6))
+    turn = np.sign(np.round(_cross(outline.sides[outline.before], outline.sides) / cell**2, 6))
     wide = tolerance >= _MIDDLES * cell
-    short = np.hypot(*side.T) <= cell * (1 + 1e-6)
+    short = outline.lengths <= cell * (1 + 1e-6)
     step = short & (turn * turn[after] < 0) & wide & wide[after]
     keep = np.column_stack([~(step | step[outline.before]), step]).ravel()
     return Rings(
@@ -478,10 +476,6 @@ def sharpened(plan: Polygon, tolerance: float) -> Polygon:
 
     A run of short edges becomes the point where the long edges before and after it meet, if all of the run is
     near that: unlike a plain simplification, it keeps the directions of the walls.
-
-    >>> cut = Polygon([(0, 0), (4, 0), (4, 2.99), (3.99, 3), (0, 3)])
-    >>> sharpened(cut, 0.02).area
-    12.0
     """
     rings = [_sharpened(np.asarray(ring.coords)[:-1], tolerance) for ring in (plan.exterior, *plan.interiors)]
     sharp = Polygon(rings[0], rings[1:])
@@ -502,3 +496,50 @@ def _sharpened(ring: Array, tolerance: float) -> Array:
         if np.hypot(*(runs[k] - corner[k]).T).max() <= _NEAR * tolerance:
             runs[k] = corner[k : k + 1]
     return np.concatenate(runs)
+
+
+def rays(sides: Array, y: Array) -> int:
+    """Return how many sides horizontal lines at `y` cross, together: the cost of telling what is inside."""
+    bounds = shapely.bounds(sides)
+    low, high = np.sort(bounds[:, 1]), np.sort(bounds[:, 3])
+    return int((np.searchsorted(low, y, side="right") - np.searchsorted(high, y)).sum())
+
+
+def closed_gaps(
+    sides: Array, paths: Array, free: MultiPolygon, width: float, moved: float
+) -> tuple[IntArray, Array] | None:
+    """Return the (p, 2) sides and the middles of gaps that are too narrow now; None if they are too many.
+
+    A gap is where two `sides`, (m, 2, 2), of walls as they are now face each other across the `free` space.
+    It was wide enough for a robot of diameter `width` if the walls as they were, `paths`, (m,) linestrings,
+    are further apart there; none has `moved` further than so many metres.
+    """
+    lines = shapely.linestrings(sides)
+    tree = STRtree(lines)
+    pairs = np.empty((0, 2), dtype=np.intp)
+    for begin in range(0, len(lines), _CHUNK):
+        one, other = tree.query(lines[begin : begin + _CHUNK], predicate="dwithin", distance=width)
+        one += begin
+        # neighbours meet in a corner; and two walls that are far closer now were close before
+        apart = (one < other) & (sides[one, 1] != sides[other, 0]).any(axis=1)
+        apart &= (sides[other, 1] != sides[one, 0]).any(axis=1)
+        one, other = one[apart], other[apart]
+        distance = shapely.distance(lines[one], lines[other])
+        narrow = (distance < width) & (distance > width - 2 * moved)
+        pairs = np.concatenate([pairs, np.column_stack([one[narrow], other[narrow]])])
+        if len(pairs) > _MOST_GAPS:
+            return None
+    ends = shapely.get_coordinates(shapely.shortest_line(lines[pairs[:, 0]], lines[pairs[:, 1]]))
+    places = ends.reshape(-1, 2, 2).mean(axis=1)
+    if rays(lines, places[:, 1]) > _MOST_RAYS:
+        return None
+    shapely.prepare(free)
+    across = shapely.contains_xy(free, *places.T)
+    pairs, places = pairs[across], places[across]
+    reach = width / 2 + 2 * moved
+    windows = shapely.box(*(places - reach).T, *(places + reach).T)
+    before = [shapely.intersection(paths[pairs[:, k]], windows) for k in (0, 1)]
+    # where nothing is left of a wall it was further away
+    was = np.nan_to_num(shapely.distance(*before), nan=np.inf)
+    lost = was > width * _CLEARLY
+    return pairs[lost], places[lost]

@@ -1,4 +1,14 @@
-"""SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale)."""
+"""SVG drawings, read (filled shapes are areas, unfilled strokes are walls) and written (at true scale).
+
+Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`; names are
+ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes that are only
+stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn more sharply than
+their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
+
+Without the option ``scale``, metres a user unit of the root, the drawing has its own size: 96 px are an inch,
+mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an attribute
+``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own scale.
+"""
 
 from __future__ import annotations
 
@@ -17,33 +27,22 @@ from robocov.arrays import Array
 from robocov.environment import CircleObstacle, Environment, Obstacle, Ring, WallObstacle
 from robocov.errors import MapError, one_line
 from robocov.files.atomic import written
-from robocov_app.formats.base import Exporter, ExportReport, ForeignMap, Importer, ReadOptions, WriteOptions
+from robocov_app.formats.base import ExportReport, ForeignMap, ReadOptions, WriteOptions
 from robocov_app.formats.files import MAX_VERTICES, name_of_map, require_shapes
 from robocov_app.formats.geometry.cells import not_held
 from robocov_app.formats.geometry.conversion import with_numbers
 from robocov_app.formats.geometry.curves import TOLERANCE, arc
+from robocov_app.formats.geometry.frames import moved
 from robocov_app.formats.geometry.polygons import Rule, decimal, free_area
 from robocov_app.formats.geometry.shapes import Line, Shapes, foreign_map
 from robocov_app.formats.svg import path as paths
-from robocov_app.formats.svg.path import (
-    Style,
-    StyleSheet,
-    affine,
-    composed,
-    inherited,
-    length,
-    moved,
-    numbers,
-    stretch,
-)
+from robocov_app.formats.svg.path import affine, composed, length, numbers, stretch
 from robocov_app.formats.xml_tree import DEEPEST, MOST_ELEMENTS, Element, read_xml_tree
 from robocov_app.render.theme import DARK, LIGHT, Theme
 
-DIGITS = 3
-"""Decimals of millimetres by default: as fine as the free space is known at true scale."""
-
+DIGITS = 3  # decimals of millimetres by default: as fine as the free space is known at true scale
 _MARGIN = 0.03  # of the longer side, around a map that is written
-_ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
+ROOT = re.compile(rb"<(?:[\w-]+:)?svg[\s>]")
 _SMALLEST = 1.0  # a drawing smaller than this, in metres, at its own scale is a picture of something larger
 _GROUPS = ("g", "a", "switch", "svg", "use")
 _SHAPES = ("path", "rect", "circle", "ellipse", "line", "polyline", "polygon")
@@ -54,43 +53,37 @@ _JOINS: dict[str, Literal["bevel", "round"]] = {"bevel": "bevel", "round": "roun
 _EVEN = 1.0 + 1e-6
 
 
-def read_svg(path: Path, options: ReadOptions) -> ForeignMap:
-    """Return the map that an SVG file draws.
-
-    Filled shapes are areas, by their fill rule: solid, but for the boundary (see `shapes.foreign_map`;
-    names are ids, classes and the labels of Inkscape's layers, of the shape and the groups around it). Shapes
-    that are only stroked are walls as wide as the stroke, or as the option ``thickness``, cut where they turn
-    more sharply than their mitre limit. Colours mean nothing. What is hidden, text and pictures are left out.
-
-    Without the option ``scale``, metres a user unit of the root, the drawing has its own size: 96 px are an
-    inch, mm are mm. The y axis is turned up; the lower left corner of the picture is [0, 0] m, or what an
-    attribute ``data-origin`` of the root says. Raises MapError when it is smaller than a metre at its own
-    scale.
-    """
-    root, where = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
-    shapes = Shapes(where, options)
+def read(path: Path, options: ReadOptions) -> ForeignMap:
+    root = read_xml_tree(path, "svg", "SVG", ("style", "title", "desc"))
+    shapes = Shapes(root.where, options)
     drawing = _Drawing(root, shapes)
     try:
-        matrix, width, height = _page(root, options.scale)
+        matrix, width, height = _page(root.attributes, options.scale)
     except ValueError as error:
-        root.refuse(where, str(error))
+        root.refuse(str(error))
     drawing.draw(matrix, width, height)
-    if options.scale is None:
-        _require_size(shapes)
-    texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
+    everything = [*shapes.areas, *shapes.paths]
+    if options.scale is None and everything:
+        x, y, right, top = shapely.total_bounds(everything)
+        if max(right - x, top - y) < _SMALLEST:
+            raise MapError(
+                f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but at least "
+                f"{_SMALLEST:g} m was wanted: --scale METRES says what a unit is, as in --scale 0.01"
+            )
     own = "at its own scale" if options.scale is None else f"a unit is {options.scale:g} m"
     shapes.notes = [own, *drawing.notes()]
+    texts = {each.tag: one_line(" ".join(each.text.split())) for each in root.children if each.text.strip()}
     name = texts.get("title", "")[:80] or name_of_map(path)
     text = texts.get("desc", "")[:1000] or "Imported from SVG."
-    return foreign_map(shapes, IMPORTER.name, name, text, solid=True)
+    return foreign_map(shapes, name, text, solid=True)
 
 
-def _page(root: Element, scale: float | None) -> tuple[Array, float, float]:
+def _page(given: dict[str, str], scale: float | None) -> tuple[Array, float, float]:
     """Return the matrix from the root's units to metres, and the size of its viewport in these units."""
-    given, box = root.attributes, _view_box(root.attributes)
+    box = _view_box(given)
     whole = {"width": box[2] if box else 300.0, "height": box[3] if box else 150.0}
-    texts = {name: given.get(name, "100%").strip() for name in whole}
-    width, height = (length("100%" if texts[k] == "auto" else texts[k], whole[k]) for k in whole)
+    sizes = {name: given.get(name, "100%").strip() for name in whole}
+    width, height = (length("100%" if sizes[k] == "auto" else sizes[k], whole[k]) for k in whole)
     box = box or (0.0, 0.0, width, height)
     if width <= 0.0 or height <= 0.0:
         raise ValueError(f"{width:g} x {height:g} px, but a size was wanted")
@@ -105,17 +98,6 @@ def _page(root: Element, scale: float | None) -> tuple[Array, float, float]:
     return composed(affine(d=-1.0, e=origin[0], f=origin[1] + bottom), fit), box[2], box[3]
 
 
-def _require_size(shapes: Shapes) -> None:
-    """Refuse a plan that is as small as the paper it is on, before a robot finds no room in it."""
-    everything = [*shapes.areas, *shapes.paths]
-    x, y, right, top = shapely.total_bounds(everything) if everything else (0.0, 0.0, np.inf, np.inf)
-    if max(right - x, top - y) < _SMALLEST:
-        raise MapError(
-            f"{shapes.where}: {right - x:.3g} x {top - y:.3g} m at its own scale, but at least "
-            f"{_SMALLEST:g} m was wanted: --scale METRES says what a unit is, as in --scale 0.01"
-        )
-
-
 def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None:
     """Return the ``viewBox`` among attributes, None where there is none of positive size."""
     if "viewBox" not in given:
@@ -127,22 +109,20 @@ def _view_box(given: dict[str, str]) -> tuple[float, float, float, float] | None
     return (x, y, width, height) if width > 0.0 and height > 0.0 else None
 
 
-def _labels(element: Element) -> list[str]:
+def _labels(element: Element, *, outer: tuple[str, ...] = (), inner: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the labels of an element among others, the innermost first, each once."""
     given = element.attributes
     names = (given.get("id", ""), given.get("label", ""), *given.get("class", "").split())
-    return [name.strip() for name in names if name.strip()]
+    own = [name.strip() for name in names if name.strip()]
+    return tuple(dict.fromkeys([*inner, *own, *outer]))
 
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Transform and inherited attributes of an element.
-
-    `matrix`, (3, 3): from its units to metres. `labels`: the innermost first. `width`, `height`: of the
-    viewport.
-    """
+    """Matrix from an element's units to metres, (3, 3); style; labels, the innermost first; viewport."""
 
     matrix: Array
-    style: Style
+    style: paths.Style
     labels: tuple[str, ...]
     width: float
     height: float
@@ -153,8 +133,8 @@ class _Place:
         """Reference length of a percentage in no direction (SVG 2, section 8.9)."""
         return math.hypot(self.width, self.height) / math.sqrt(2.0)
 
-    def shifted(self, x: float, y: float) -> _Place:
-        return replace(self, matrix=composed(self.matrix, affine(e=x, f=y)))
+    def radius(self, element: Element) -> float:
+        return length(element.attributes.get("r", "0"), self.diagonal)
 
     def lengths(self, element: Element, *names: str) -> list[float]:
         """Return lengths along x or y; what is missing is 0."""
@@ -170,10 +150,8 @@ class _Drawing:
     """Goes through the elements as they are drawn, uses and nested pictures too, and adds the shapes."""
 
     def __init__(self, root: Element, shapes: Shapes) -> None:
-        self.root = root
-        self.shapes = shapes
-        self.where = shapes.where
-        self.sheet = StyleSheet(self.where)
+        self.root, self.shapes = root, shapes
+        self.sheet = paths.StyleSheet(root.where)
         self.named: dict[str, Element] = {}
         self.draws = paths.MOST_DRAWS
         self.dashed = self.clipped = 0
@@ -184,23 +162,20 @@ class _Drawing:
                 self.sheet.add(element.text)
 
     def draw(self, matrix: Array, width: float, height: float) -> None:
-        """Add all that is drawn, by the matrix and viewport of `_page`."""
         self._require_few()
-        style = inherited(paths.INHERITED, self.sheet.of(self.root))
-        labels = tuple(dict.fromkeys(_labels(self.root)))
+        style = paths.inherited(paths.INHERITED, self.sheet.of(self.root))
         for child in self.root.children:
-            self._draw(child, _Place(matrix, style, labels, width, height))
+            self._draw(child, _Place(matrix, style, _labels(self.root), width, height))
 
     def notes(self) -> list[str]:
-        told = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
         strange = "style rules of other kinds than tag, .class and #id not applied"
-        for count, words in (
-            (self.dashed, "dashed strokes taken as whole"),
-            (self.clipped, "clip paths and masks not applied"),
-            (self.sheet.strange, strange),
-        ):
-            told += [f"{count} {words}"] if count else []
-        return told
+        counts = {
+            "dashed strokes taken as whole": self.dashed,
+            "clip paths and masks not applied": self.clipped,
+            strange: self.sheet.strange,
+        }
+        curves = [f"curves flattened to within {1000 * TOLERANCE:g} mm"] if self.shapes.vertices else []
+        return curves + [f"{count} {words}" for words, count in counts.items() if count]
 
     def _require_few(self) -> None:
         """Count what will be drawn, uses and all, without drawing it: a few kB may stand for billions."""
@@ -209,25 +184,23 @@ class _Drawing:
 
         def count(element: Element, depth: int) -> tuple[int, int]:
             if element in inside:
-                element.refuse(self.where, "is used within itself, but an end was wanted")
+                element.refuse("is used within itself, but an end was wanted")
             if depth > DEEPEST:
-                element.refuse(self.where, f"uses nested deeper than {DEEPEST}, but less was wanted")
+                element.refuse(f"uses nested deeper than {DEEPEST}, but less was wanted")
             if element not in counted:
                 inside.add(element)
                 target = self._target(element)
-                elements, shapes = 1, int(element.tag in _SHAPES)
-                for each in [*element.children, *([] if target is None else [target])]:
-                    more = count(each, depth + 1)
-                    elements, shapes = elements + more[0], shapes + more[1]
-                counted[element] = elements, shapes
+                drawn = [*element.children, *([] if target is None else [target])]
+                parts = [(1, int(element.tag in _SHAPES)), *(count(each, depth + 1) for each in drawn)]
+                counted[element] = sum(part[0] for part in parts), sum(part[1] for part in parts)
                 inside.discard(element)
             return counted[element]
 
         elements, shapes = count(self.root, 0)
         if elements > MOST_ELEMENTS:
             few = f"but at most {MOST_ELEMENTS} were wanted"
-            raise MapError(f"{self.where}: {elements:.3g} elements to be drawn, uses and all, {few}")
-        require_shapes(shapes, self.where)
+            raise MapError(f"{self.root.where}: {elements:.3g} elements to be drawn, uses and all, {few}")
+        require_shapes(shapes, self.root.where)
 
     def _target(self, element: Element) -> Element | None:
         """Return what a ``use`` uses, if it is in this file."""
@@ -241,7 +214,7 @@ class _Drawing:
         if element.tag not in _GROUPS and element.tag not in _SHAPES:
             return
         if outer.depth > DEEPEST:
-            element.refuse(self.where, f"nested deeper than {DEEPEST}, but less was wanted")
+            element.refuse(f"nested deeper than {DEEPEST}, but less was wanted")
         own = self.sheet.of(element)
         if paths.is_hidden(own):
             self.shapes.leave_out("hidden element")
@@ -251,8 +224,8 @@ class _Drawing:
             place = replace(
                 outer,
                 matrix=composed(outer.matrix, paths.transform(own.get("transform", ""))),
-                style=inherited(outer.style, own),
-                labels=tuple(dict.fromkeys([*_labels(element), *outer.labels])),
+                style=paths.inherited(outer.style, own),
+                labels=_labels(element, outer=outer.labels),
                 depth=outer.depth + 1,
             )
             if element.tag in _SHAPES:
@@ -260,38 +233,37 @@ class _Drawing:
                 return
             children, place = self._inside(element, place)
         except ValueError as error:
-            element.refuse(self.where, str(error))
+            element.refuse(str(error))
         for child in children:
             self._draw(child, place)
 
     def _inside(self, element: Element, place: _Place) -> tuple[list[Element], _Place]:
-        given = element.attributes
+        """Return what a group holds or uses, and its place."""
+        given, target = element.attributes, self._target(element)
         if element.tag in ("use", "svg"):
-            place = place.shifted(*place.lengths(element, "x", "y"))
+            x, y = place.lengths(element, "x", "y")
+            place = replace(place, matrix=composed(place.matrix, affine(e=x, f=y)))
         if element.tag == "use":
-            target = self._target(element)
             if target is None:
                 self.shapes.leave_out("use", "of what is not in the file")
                 return [], place
             if target.tag not in ("symbol", "svg"):
                 return [target], place
-            labels = tuple(dict.fromkeys([*place.labels, *_labels(target)]))
-            place = replace(place, style=inherited(place.style, self.sheet.of(target)), labels=labels)
+            style = paths.inherited(place.style, self.sheet.of(target))
+            place = replace(place, style=style, labels=_labels(target, inner=place.labels))
             size = {name: text for name, text in given.items() if name in ("width", "height")}
             element, given = target, target.attributes | size
         elif element.tag != "svg":
             return element.children, place
         width = length(given.get("width", "100%").replace("auto", "100%"), place.width)
         height = length(given.get("height", "100%").replace("auto", "100%"), place.height)
-        box = _view_box(given)
-        if box is None:
-            return element.children, replace(place, width=width, height=height)
-        fit = paths.fitted(box, width, height, given.get("preserveAspectRatio", ""))
-        matrix = composed(place.matrix, fit)
-        return element.children, replace(place, matrix=matrix, width=box[2], height=box[3])
+        matrix, box = place.matrix, _view_box(given)
+        if box is not None:
+            matrix = composed(matrix, paths.fitted(box, width, height, given.get("preserveAspectRatio", "")))
+            _, _, width, height = box
+        return element.children, replace(place, matrix=matrix, width=width, height=height)
 
     def _shape(self, element: Element, place: _Place) -> None:
-        """Add a shape: as an area where it is filled, else as walls where it is stroked."""
         style, at = place.style, f"line {element.line}"
         visible = style["visibility"].lower() not in ("hidden", "collapse")
         if visible and not self.shapes.wants(place.labels):
@@ -301,8 +273,13 @@ class _Drawing:
         if not (visible and (filled or stroked)):
             self.shapes.leave_out("hidden element")
             return
-        if filled and element.tag == "circle" and self._disc(element, place, at):
-            return
+        least, most = stretch(place.matrix)
+        if filled and element.tag == "circle" and most - least <= 1e-9 * most:
+            (centre,) = moved(place.matrix, np.array([place.lengths(element, "cx", "cy")]))
+            radius = place.radius(element) * most
+            if radius > 0.0:
+                self.shapes.add_circle(centre, radius, place.labels, at=at)
+                return
         parts = self._points(element, place)
         rings = [moved(place.matrix, points) for points, _ in parts]
         rule: Rule = "evenodd" if style["fill-rule"].lower() == "evenodd" else "nonzero"
@@ -336,17 +313,8 @@ class _Drawing:
             )
             self.shapes.add_line(line, at=at)
 
-    def _disc(self, element: Element, place: _Place, at: str) -> bool:
-        """Add a filled circle that is one in metres as well; return whether it is."""
-        least, most = stretch(place.matrix)
-        centre, radius = place.lengths(element, "cx", "cy"), _radius(element, place)
-        if most - least > 1e-9 * most or not radius * most > 0.0:
-            return False
-        (centre,) = moved(place.matrix, np.array([centre]))
-        self.shapes.add_circle(centre, radius * most, place.labels, at=at)
-        return True
-
     def _points(self, element: Element, place: _Place) -> list[tuple[Array, bool]]:
+        """Return the points of the subpaths of a shape, (k, 2), and whether they are closed."""
         most = stretch(place.matrix)[1]
         tolerance = TOLERANCE / most if most > 0.0 else np.inf
         given = element.attributes
@@ -366,10 +334,9 @@ class _Drawing:
                 ends = place.lengths(element, "x1", "y1", "x2", "y2")
                 return [(np.array(ends).reshape(2, 2), False)]
             case "rect":
-                ring = _rectangle(element, place, tolerance)
-                return [] if ring is None else [(ring, True)]
+                return [(ring, True) for ring in _rectangle(element, place, tolerance)]
             case "circle":
-                radii = [_radius(element, place)] * 2
+                radii = [place.radius(element)] * 2
             case _:
                 radii = place.lengths(element, "rx", "ry")
                 radii = [radii["rx" not in given], radii["ry" in given]]
@@ -379,21 +346,16 @@ class _Drawing:
         return [(arc(centre, u, v, 0.0, 2 * np.pi, tolerance), True)]
 
 
-def _radius(element: Element, place: _Place) -> float:
-    return length(element.attributes.get("r", "0"), place.diagonal)
-
-
-def _rectangle(element: Element, place: _Place, tolerance: float) -> Array | None:
-    """Return the ring of a rectangle, whose corners may be round; None where it has no size."""
+def _rectangle(element: Element, place: _Place, tolerance: float) -> list[Array]:
+    """Return the ring of a rectangle, whose corners may be round, if it has a size."""
     x, y, width, height, *radii = place.lengths(element, "x", "y", "width", "height", "rx", "ry")
     if width <= 0.0 or height <= 0.0:
-        return None
+        return []
     given = [element.attributes.get(name, "auto").strip() != "auto" for name in ("rx", "ry")]
-    rx = min(radii[not given[0]], width / 2)
-    ry = min(radii[given[1]], height / 2)
+    rx, ry = min(radii[not given[0]], width / 2), min(radii[given[1]], height / 2)
     corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]])
     if rx <= 0.0 or ry <= 0.0:
-        return corners
+        return [corners]
     u, v = np.diag([rx, ry])
     inward = np.array([[rx, ry], [-rx, ry], [-rx, -ry], [rx, -ry]])
     parts = []
@@ -401,14 +363,7 @@ def _rectangle(element: Element, place: _Place, tolerance: float) -> Array | Non
         begin = np.pi + k * np.pi / 2
         first = centre + u * np.cos(begin) + v * np.sin(begin)
         parts += [first[None], arc(centre, u, v, begin, np.pi / 2, tolerance)]
-    return np.concatenate(parts)
-
-
-IMPORTER = Importer(
-    "svg", "SVG drawings: filled shapes, strokes as walls", (".svg", ".svgz"),
-    lambda path, head: _ROOT.search(head) is not None or path.suffix.lower() == ".svgz", read_svg,
-    options=frozenset({"scale", "thickness", "outlines", "boundary", "around", "only", "skip"}),
-)  # fmt: skip
+    return [np.concatenate(parts)]
 
 
 @dataclass(frozen=True)
@@ -422,7 +377,6 @@ class _Pen:
         return decimal(metres / self.scale, self.digits)
 
     def rounded(self, metres: float) -> float:
-        """Return what a reader will make of a length."""
         return round(metres / self.scale, self.digits) * self.scale
 
     def ring(self, ring: Ring, end: str = "Z") -> str:
@@ -443,7 +397,7 @@ class _Pen:
         return f"<{kind}><title>{title}</title></{kind.split(' ', 1)[0]}>" if title else f"<{kind}/>"
 
 
-def _write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
+def write(environment: Environment, path: Path, options: WriteOptions) -> ExportReport:
     scale = 0.001 if options.scale is None else options.scale
     pen = _Pen(scale, DIGITS if options.digits is None else options.digits)
     boundary = np.asarray(environment.boundary, dtype=float)
@@ -453,17 +407,11 @@ def _write(environment: Environment, path: Path, options: WriteOptions) -> Expor
         part.write_text(_text(environment, pen, low, high), encoding="utf-8")
     written_boundary = Polygon([(pen.rounded(x), pen.rounded(y)) for x, y in environment.boundary])
     obstacles = [with_numbers(obstacle, pen.rounded).polygon for obstacle in environment.obstacles]
+    area = free_area(written_boundary, obstacles)
     notes = [f"1 mm is {scale:g} m: {(high - low)[0] / scale:.6g} x {(high - low)[1] / scale:.6g} mm"]
-    if options.scale is not None:
-        notes.append(f"to import it again: --scale {scale:g}")
-    return ExportReport(
-        EXPORTER.name,
-        (path,),
-        environment.free_area,
-        free_area(written_boundary, obstacles),
-        dropped=tuple(thing for thing in not_held(environment) if not thing.startswith("names")),
-        notes=tuple(notes),
-    )
+    notes += [] if options.scale is None else [f"to import it again: --scale {scale:g}"]
+    dropped = not_held(environment, names=False)
+    return ExportReport("svg", (path,), environment.free_area, area, dropped, tuple(notes))
 
 
 def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
@@ -472,49 +420,51 @@ def _text(environment: Environment, pen: _Pen, low: Array, high: Array) -> str:
     width, height = pen.length(high[0] - low[0]), pen.length(high[1] - low[1])
     # where the corner is that the box gives with its decimals
     left, bottom = float(x) * pen.scale, -(float(y) + float(height)) * pen.scale
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}mm" height="{height}mm"',
-        f'     viewBox="{x} {y} {width} {height}" data-origin="{left!r} {bottom!r}">',
-        f"<title>{_plain(environment.name)}</title>",
-        f"<desc>{_plain(environment.description)}</desc>",
-        "<style>",
-        # a window shows all of it, however large it is
-        "svg { max-width: 100vw; max-height: 100vh }",
-        "#boundary { stroke-width: 1.5px; stroke-linejoin: miter; vector-effect: non-scaling-stroke }",
-        ".wall { stroke-linecap: butt; stroke-linejoin: miter; stroke-miterlimit: 4 }",
-        *_colours(LIGHT),
-        "@media (prefers-color-scheme: dark) {",
-        *_colours(DARK),
-        "}",
-        "</style>",
-        f'<path id="boundary" d="{pen.ring(environment.boundary)}"/>',
-        '<g id="obstacles">',
-        *map(pen.shape, environment.obstacles),
-        "</g>",
-        "</svg>",
-    ]
-    return "\n".join(lines) + "\n"
+    return _PAGE.format(
+        size=f'width="{width}mm" height="{height}mm"',
+        box=f'viewBox="{x} {y} {width} {height}" data-origin="{left!r} {bottom!r}"',
+        title=_plain(environment.name),
+        text=_plain(environment.description),
+        light=_colours(LIGHT),
+        dark=_colours(DARK),
+        boundary=pen.ring(environment.boundary),
+        obstacles="".join(f"{pen.shape(each)}\n" for each in environment.obstacles),
+    )
 
 
-def _colours(theme: Theme) -> list[str]:
+# a window shows all of it, however large it is
+_PAGE = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<svg xmlns="http://www.w3.org/2000/svg" {size}
+     {box}>
+<title>{title}</title>
+<desc>{text}</desc>
+<style>
+svg {{ max-width: 100vw; max-height: 100vh }}
+#boundary {{ stroke-width: 1.5px; stroke-linejoin: miter; vector-effect: non-scaling-stroke }}
+.wall {{ stroke-linecap: butt; stroke-linejoin: miter; stroke-miterlimit: 4 }}
+{light}
+@media (prefers-color-scheme: dark) {{
+{dark}
+}}
+</style>
+<path id="boundary" d="{boundary}"/>
+<g id="obstacles">
+{obstacles}</g>
+</svg>
+"""
+
+
+def _colours(theme: Theme) -> str:
     ground, page, edge, solid = (
         "#{:02x}{:02x}{:02x}".format(*colour)
         for colour in (theme.panel, theme.background, theme.boundary, theme.obstacle)
     )
-    return [
-        f"svg {{ background: {ground} }}",
-        f"#boundary {{ fill: {page}; stroke: {edge} }}",
-        f"#obstacles {{ fill: {solid} }}",
-        f".wall {{ fill: none; stroke: {solid} }}",
-    ]
+    return (
+        f"svg {{ background: {ground} }}\n#boundary {{ fill: {page}; stroke: {edge} }}\n"
+        f"#obstacles {{ fill: {solid} }}\n.wall {{ fill: none; stroke: {solid} }}"
+    )
 
 
 def _plain(text: str) -> str:
     return escape("".join(char if char.isprintable() else " " for char in text))
-
-
-EXPORTER = Exporter(
-    "svg", "SVG at true scale: boundary and obstacles by their ids", (".svg",), _write,
-    options=frozenset({"digits", "scale"}),
-)  # fmt: skip

@@ -1,17 +1,18 @@
 """The language of SVG: numbers, lengths, transforms, paths, and how elements are painted."""
 
+import cmath
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array, ranges
-from robocov.environment import Point
 from robocov.errors import MapError
 from robocov_app.formats.geometry.curves import arcs, beziers
+from robocov_app.formats.geometry.frames import frame
 from robocov_app.formats.xml_tree import Element
 
 # nothing is given back once it is taken (++, *+): else a million digits before a wrong letter take for ever
@@ -24,13 +25,10 @@ _LARGEST = 1e30
 _PIXELS = {
     "": 1.0, "px": 1.0, "in": 96.0, "cm": 96 / 2.54, "mm": 96 / 25.4, "q": 96 / 101.6, "pt": 4 / 3, "pc": 16.0
 }  # fmt: skip
-
-PIXEL = 0.0254 / 96
-"""A user unit in metres, where nothing says otherwise."""
+PIXEL = 0.0254 / 96  # a user unit in metres, where nothing says otherwise
 
 
 def number(text: str) -> float:
-    """Return a number, next to nothing as nothing; ValueError when it is too large to calculate with."""
     value = float(text)
     if not abs(value) <= _LARGEST:
         raise ValueError(f"{text[:20]}, but a number up to {_LARGEST:g} was wanted")
@@ -73,11 +71,6 @@ def composed(outer: Array, inner: Array) -> Array:
     return np.asarray(both)
 
 
-def moved(matrix: Array, points: Array) -> Array:
-    """Return (k, 2) points under a matrix."""
-    return np.asarray(points @ matrix[:2, :2].T + matrix[:2, 2])
-
-
 def stretch(matrix: Array) -> tuple[float, float]:
     """Return by how much a matrix makes lengths longer, at least and at most: its singular values."""
     (a, c), (b, d) = matrix[:2, :2].tolist()
@@ -102,11 +95,6 @@ def transform(text: str) -> Array:
     return matrix
 
 
-def _rotation(angle: float, x: float = 0.0, y: float = 0.0) -> Array:
-    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    return affine(e=x, f=y) @ affine(cos, sin, -sin, cos) @ affine(e=-x, f=-y)
-
-
 _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
     # how many numbers each takes, and its matrix
     "matrix": ((6,), affine),
@@ -116,7 +104,7 @@ _FUNCTIONS: dict[str, tuple[tuple[int, ...], Callable[..., Array]]] = {
     "scale": ((1, 2), lambda x, y=None: affine(x, d=x if y is None else y)),
     "scalex": ((1,), lambda x: affine(a=x)),
     "scaley": ((1,), lambda y: affine(d=y)),
-    "rotate": ((1, 3), _rotation),
+    "rotate": ((1, 3), lambda turn, x=0.0, y=0.0: frame(x, y, math.radians(turn)) @ affine(e=-x, f=-y)),
     "skewx": ((1,), lambda angle: affine(c=math.tan(math.radians(angle)))),
     "skewy": ((1,), lambda angle: affine(b=math.tan(math.radians(angle)))),
 }
@@ -139,9 +127,8 @@ def fitted(box: tuple[float, float, float, float], width: float, height: float, 
     return affine(scale, d=scale, e=left, f=top) @ affine(e=-box[0], f=-box[1])
 
 
+# commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none
 MOST_DRAWS = 150_000
-"""Commands of all paths of a file, repeated ones without their letter too; vertices of polylines are none."""
-
 _COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])", re.ASCII)
 _FLAG = re.compile(r"[\s,]*([01])")
 _ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -154,10 +141,6 @@ def subpaths(
 
     `tolerance`: largest distance of a curve from its points. `most`, `draws`: points and commands at most.
     Raises ValueError where it is no path data, or has more; the message says which character.
-
-    >>> [(points, closed)], _ = subpaths("m0 0h4v2z", 0.1, 100)
-    >>> points.tolist(), closed
-    ([[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]], True)
     """
     if sum(text.count(letter) for command in _ARGUMENTS for letter in (command, command.lower())) > draws:
         raise ValueError(f"more than {draws} commands, but fewer were wanted")
@@ -171,12 +154,12 @@ def subpaths(
             pen.close()
             continue
         values, at = pen.arguments(text, at, command, most, draws)
+        count = _ARGUMENTS[command.upper()]
         if command in "MmLl":
             pen.draw(command, values[:2])
             if len(values) > 2:  # lines through all that follow
                 pen.polyline(values[2:], relative=command.islower())
         else:
-            count = _ARGUMENTS[command.upper()]
             for k in range(0, len(values), count):
                 pen.draw(command, values[k : k + count])
     if text[at : at + 1].strip(" \t\r\n\f,") or text[at:].strip(" \t\r\n\f,"):
@@ -185,23 +168,17 @@ def subpaths(
 
 
 class _Pen:
-    """Pen position and the path drawn so far.
-
-    A curve is kept with the index of the vertex that it ends at: all become points together, which is
-    quicker.
-    """
+    """Pen position and path so far, as x + i y; curves become points all together at the end, for speed."""
 
     def __init__(self) -> None:
         self.draws = 0
-        self.vertices: list[Point] = []
-        self.at: Point = (0.0, 0.0)
-        self.start: Point = (0.0, 0.0)
-        self.handle: Point = (0.0, 0.0)
+        self.vertices: list[complex] = []
+        self.at = self.start = self.handle = 0j
         self.last = ""
         self._begins: list[int] = []
         self._closed: list[bool] = []
-        self._beziers: list[tuple[float, ...]] = []
-        self._arcs: list[tuple[float, ...]] = []
+        self._beziers: list[tuple[complex, ...]] = []
+        self._arcs: list[tuple[complex, ...]] = []
 
     def arguments(self, text: str, at: int, command: str, most: int, draws: int) -> tuple[list[float], int]:
         values: list[float] = []
@@ -221,34 +198,30 @@ class _Pen:
         return values, at
 
     def draw(self, command: str, v: list[float]) -> None:
-        kind = command.upper()
-        x, y = self.at if command.islower() else (0.0, 0.0)
+        kind, origin = command.upper(), self.at if command.islower() else 0j
         self.draws += 1
         if kind == "M":
-            self.at = self.start = (x + v[0], y + v[1])
+            self.at = self.start = origin + complex(*v)
         if kind == "M" or self.last == "Z":  # after a Z the next subpath begins where the last did
             self._begins.append(len(self.vertices))
             self._closed.append(False)
             self.vertices.append(self.at)
         match kind:
             case "L":
-                self._line(x + v[0], y + v[1])
+                self._line(origin + complex(*v))
             case "H":
-                self._line(x + v[0], self.at[1])
+                self._line(complex(origin.real + v[0], self.at.imag))
             case "V":
-                self._line(self.at[0], y + v[0])
+                self._line(complex(self.at.real, origin.imag + v[0]))
             case "A":
-                self._arc(v, (x + v[5], y + v[6]))
+                self._arc(v, origin + complex(*v[5:]))
             case "C" | "S" | "Q" | "T":
-                self._curve(kind, [(x + a, y + b) for a, b in zip(v[::2], v[1::2], strict=True)])
+                self._curve(kind, [origin + complex(*pair) for pair in zip(v[::2], v[1::2], strict=True)])
         self.last = kind
 
     def polyline(self, values: list[float], *, relative: bool) -> None:
-        """Draw lines to many points, x and y in turn."""
-        points = np.array(values).reshape(-1, 2)
-        if relative:
-            points = np.cumsum(points, axis=0) + self.at
-        self.vertices += map(tuple, points.tolist())
+        points = np.array(values).view(complex)
+        self.vertices += (np.cumsum(points) + self.at if relative else points).tolist()
         self.at = self.vertices[-1]
         self.last = "L"
 
@@ -258,17 +231,18 @@ class _Pen:
         self.last = "Z"
 
     def finished(self, tolerance: float, most: int) -> list[tuple[Array, bool]]:
-        vertices = np.array(self.vertices).reshape(-1, 2)
+        vertices = np.array(self.vertices, complex).view(float).reshape(-1, 2)
         count = np.ones(len(vertices), dtype=np.intp)
         curves = []
         if self._beziers:
             rows = np.array(self._beziers)
-            flat = beziers(rows[:, 1:].reshape(-1, 4, 2), tolerance, most)
-            curves.append((rows[:, 0].astype(np.intp), *flat))
+            flat = beziers(rows[:, 1:].copy().view(float).reshape(-1, 4, 2), tolerance, most)
+            curves.append((rows[:, 0].real.astype(np.intp), *flat))
         if self._arcs:
             rows = np.array(self._arcs)
-            flat = arcs(rows[:, 1:3], rows[:, 3:5], rows[:, 5:7], rows[:, 7], rows[:, 8], tolerance, most)
-            curves.append((rows[:, 0].astype(np.intp), *flat))
+            centre, u, v = (rows[:, k : k + 1].copy().view(float) for k in (1, 2, 3))
+            flat = arcs(centre, u, v, rows[:, 4].real, rows[:, 5].real, tolerance, most)
+            curves.append((rows[:, 0].real.astype(np.intp), *flat))
         for index, _, steps in curves:
             count[index] = steps
         end = np.cumsum(count)
@@ -279,56 +253,50 @@ class _Pen:
         parts = np.split(all_points, (end - count)[self._begins[1:]]) if self._begins else []
         return [(part, closed) for part, closed in zip(parts, self._closed, strict=True) if len(part) > 1]
 
-    def _line(self, x: float, y: float) -> None:
-        self.at = (x, y)
-        self.vertices.append(self.at)
+    def _line(self, end: complex) -> None:
+        self.at = end
+        self.vertices.append(end)
 
-    def _curve(self, kind: str, points: list[Point]) -> None:
+    def _curve(self, kind: str, points: list[complex]) -> None:
         """Draw a Bézier curve; S and T begin with the mirror image of the handle before them."""
         if kind in "ST":
             smooth = self.last in ("CS" if kind == "S" else "QT")
-            mirrored = (2 * self.at[0] - self.handle[0], 2 * self.at[1] - self.handle[1])
-            points = [mirrored if smooth else self.at, *points]
-        self.handle = points[-2]
-        (x, y), (end_x, end_y) = self.at, points[-1]
-        if len(points) == 2:  # the same curve as one of degree 3
-            u, v = points[0]
-            first = (x + 2 * (u - x) / 3, y + 2 * (v - y) / 3)
-            points = [first, (end_x + 2 * (u - end_x) / 3, end_y + 2 * (v - end_y) / 3)]
-        self._beziers.append((len(self.vertices), x, y, *points[0], *points[1], end_x, end_y))
-        self._line(end_x, end_y)
+            points = [2 * self.at - self.handle if smooth else self.at, *points]
+        *handles, end = points
+        self.handle = handles[-1]
+        if len(handles) == 1:  # the same curve as one of degree 3
+            handles = [place + 2 * (handles[0] - place) / 3 for place in (self.at, end)]
+        self._beziers.append((len(self.vertices), self.at, *handles, end))
+        self._line(end)
 
-    def _arc(self, v: list[float], end: Point) -> None:
+    def _arc(self, given: list[float], end: complex) -> None:
         """Draw an elliptic arc (SVG 2, appendix B.2.4 and B.2.5)."""
-        (x, y), rx, ry, turn = self.at, abs(v[0]), abs(v[1]), math.radians(v[2])
+        rx, ry, angle = abs(given[0]), abs(given[1]), math.radians(given[2])
         if end == self.at:
             return
         if rx == 0.0 or ry == 0.0:
-            self._line(*end)
+            self._line(end)
             return
-        cos, sin = math.cos(turn), math.sin(turn)
-        dx, dy = (x - end[0]) / 2, (y - end[1]) / 2
+        turn = complex(math.cos(angle), math.sin(angle))
+        half = (self.at - end) / 2 * turn.conjugate()
         # along the axes, where the ellipse is a circle of radius 1
-        a, b = (cos * dx + sin * dy) / rx, (cos * dy - sin * dx) / ry
-        size = math.hypot(a, b)
+        place = complex(half.real / rx, half.imag / ry)
+        size = abs(place)
         if size > 1.0:  # too small to reach: as large as it takes
-            rx, ry, a, b = rx * size, ry * size, a / size, b / size
+            rx, ry, place = rx * size, ry * size, place / size
         ratio = math.sqrt(max(1.0 / max(min(size, 1.0), 1e-150) ** 2 - 1.0, 0.0))
-        sign = -1.0 if v[3] == v[4] else 1.0
-        p, q = sign * ratio * b, -sign * ratio * a
+        middle = (1j if given[3] == given[4] else -1j) * ratio * place
         # the chord is twice the size: exact for huge radii too
         sweep = 2.0 * math.asin(min(size, 1.0))
-        sweep = math.copysign(math.tau - sweep if v[3] else sweep, 1.0 if v[4] else -1.0)
-        ux, uy, vx, vy = cos * rx, sin * rx, -sin * ry, cos * ry
-        centre = ((x + end[0]) / 2 + ux * p + vx * q, (y + end[1]) / 2 + uy * p + vy * q)
-        begin = math.atan2(b - q, a - p)
-        self._arcs.append((len(self.vertices), *centre, ux, uy, vx, vy, begin, sweep))
-        self._line(*end)
+        sweep = math.copysign(math.tau - sweep if given[3] else sweep, 1.0 if given[4] else -1.0)
+        u, v = turn * rx, turn * (1j * ry)
+        centre = (self.at + end) / 2 + u * middle.real + v * middle.imag
+        begin = cmath.phase(place - middle)
+        self._arcs.append((len(self.vertices), centre, u, v, begin, sweep))
+        self._line(end)
 
 
-Style: TypeAlias = Mapping[str, str]
-"""Properties by name, as they are written."""
-
+Style: TypeAlias = Mapping[str, str]  # properties by name, as they are written
 INHERITED = {
     "fill": "black", "fill-opacity": "1", "fill-rule": "nonzero",
     "stroke": "none", "stroke-opacity": "1", "stroke-width": "1", "stroke-dasharray": "none",
@@ -343,36 +311,25 @@ _IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _HARMLESS = re.compile(r"@(?:charset|font-face|keyframes|media|namespace|page)\b", re.IGNORECASE)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _AT_RULE_PARTS = re.compile(r"[{};]")
-
+# characters of style sheets, rules in them, and pairs of a rule and an element that are looked at
 MOST_TEXT, MOST_RULES, MOST_WORK = 1_000_000, 10_000, 500_000
-"""Characters of style sheets, rules in them, and pairs of a rule and an element that are looked at."""
 
 
 class _Rule(NamedTuple):
-    """A rule of a style sheet, for one selector; the second of its properties are marked as important."""
+    """A rule of a style sheet, for what has all `marks`; the second of its properties are important."""
 
-    tag: str
-    marks: tuple[str, ...]
+    marks: frozenset[str]
     weight: tuple[int, int, int, int]
     properties: tuple[dict[str, str], dict[str, str]]
 
-    def fits(self, element: Element, classes: set[str]) -> bool:
-        return self.tag in ("", "*", element.tag) and all(
-            mark[1:] in classes if mark[0] == "." else element.attributes.get("id") == mark[1:]
-            for mark in self.marks
-        )
 
-
-@dataclass
 class StyleSheet:
     """The rules of the file `where`, of tags, classes and ids; others, as in @supports, are `strange`."""
 
-    where: str
-    strange: int = 0
-    _keyed: dict[str, list[_Rule]] = field(default_factory=dict)
-    _count: int = 0
-    _size: int = 0
-    _work: int = 0
+    def __init__(self, where: str) -> None:
+        self.where, self.strange = where, 0
+        self._keyed: dict[str, list[_Rule]] = {}
+        self._count = self._size = self._work = 0
 
     def add(self, text: str) -> None:
         """Add the rules of a text. Raises MapError when there are too many."""
@@ -396,13 +353,13 @@ class StyleSheet:
         """Return an element's own properties; MapError when there are too many rules for too many."""
         attributes = element.attributes
         found = {name: attributes[name].strip() for name in _PROPERTIES if name in attributes}
-        classes = set(attributes.get("class", "").split())
-        keys = ["", element.tag, *(f".{name}" for name in classes), f"#{attributes.get('id', '')}"]
-        looked_at = [rule for key in keys for rule in self._keyed.get(key, ())]
+        marks = {element.tag, f"#{attributes.get('id', '')}"}
+        marks |= {f".{name}" for name in attributes.get("class", "").split()}
+        looked_at = [rule for key in ("", *marks) for rule in self._keyed.get(key, ())]
         self._work += len(looked_at)
         if self._work > MOST_WORK:
             raise MapError(f"{self.where}: too many rules for too many elements, but fewer were wanted")
-        rules = [rule for rule in looked_at if rule.fits(element, classes)]
+        rules = [rule for rule in looked_at if rule.marks <= marks]
         chosen = [rule.properties for rule in sorted(rules, key=lambda rule: rule.weight)]
         chosen.append(_by_importance(declarations(attributes.get("style", ""))))
         for k in (0, 1):
@@ -430,20 +387,17 @@ class StyleSheet:
         if match is None or not selector or self._count >= MOST_RULES:
             self.strange += 1
             return
-        tag, marks = match[1] or "", tuple(re.findall(r"[.#][\w-]+", match[2]))
+        tag = [match[1]] if match[1] not in (None, "*") else []
+        marks = re.findall(r"[.#][\w-]+", match[2])
         ids = sum(mark[0] == "#" for mark in marks)
         self._count += 1
-        rule = _Rule(tag, marks, (ids, len(marks) - ids, int(tag not in ("", "*")), self._count), properties)
-        key = marks[-1] if marks else tag.replace("*", "")
-        self._keyed.setdefault(key, []).append(rule)
+        weight = ids, len(marks) - ids, len(tag), self._count
+        key = [*tag, *marks][-1] if tag or marks else ""
+        self._keyed.setdefault(key, []).append(_Rule(frozenset([*tag, *marks]), weight, properties))
 
 
 def declarations(text: str) -> dict[str, str]:
-    """Return the properties of a ``style`` attribute or of the body of a rule.
-
-    >>> declarations("fill: none; stroke-width:2px;")
-    {'fill': 'none', 'stroke-width': '2px'}
-    """
+    """Return the properties of a ``style`` attribute or of the body of a rule."""
     pairs = (part.partition(":") for part in text.split(";") if ":" in part)
     return {name.strip().lower(): value.strip() for name, _, value in pairs}
 
@@ -470,12 +424,10 @@ def is_painted(style: Style, what: str) -> bool:
 
 
 def is_hidden(own: Style) -> bool:
-    """Return whether an element is not drawn, with all in it."""
     return own.get("display", "").lower() == "none" or _is_zero(own.get("opacity", "1"))
 
 
 def _is_zero(number: str) -> bool:
-    try:
+    with suppress(ValueError):
         return float(number.strip().rstrip("%")) == 0.0
-    except ValueError:
-        return False
+    return False
