@@ -10,15 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
-from robocov.arrays import Array, BoolArray
+from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
-from robocov.errors import ParameterError, shown
-from robocov_app.figures.curves import DISTANCE
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
     SMALL,
     Page,
-    check_some,
     cut_to,
     even_ticks,
     figure_of,
@@ -26,8 +23,8 @@ from robocov_app.figures.page import (
     tone,
     value_limits,
 )
-from robocov_app.figures.styles import CurveStyle, curve_styles
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.figures.styles import CurveStyle
+from robocov_app.render.theme import LIGHT, Theme
 
 MOST_LEVELS = 15  # different values of a gain up to which medians are drawn; more are a sample of a range
 MOST_LETTERS = 28  # of a name on an axis or in a legend
@@ -39,86 +36,53 @@ class Dependence(NamedTuple):
     """Values of one controller's runs against a gain, (m,) each: nan is no limit, and a word its number."""
 
     label: str
-    controller: str
+    style: CurveStyle
     gains: Array
     values: Array
 
 
 @plain_style()
 def plot_gains(
-    dependences: Sequence[Dependence],
-    gain: str,
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
-    styles: Sequence[CurveStyle] | None = None,
-    label: str = DISTANCE,
-    words: Sequence[str] = (),
+    dependences: Sequence[Dependence], gain: str, size: tuple[int, int], label: str, words: Sequence[str] = ()
 ) -> Figure:
     """Plot values against a gain, one colour and mark a controller, with a line through medians.
 
     The axis of the gain is logarithmic where it spans much; null has a place of its own at the right. A gain
-    that is one of `words` has even places, and no line. The page has `size` px. Raises ParameterError when
-    there are no values, or one controller has no finite one.
+    that is one of `words` has even places, and no line.
     """
-    theme = theme_named(theme)
-    kept = []
-    gain = cut_to(gain, len, MOST_LETTERS)
+    axes = _page_axes(size)
+    null = _gain_axis(axes, np.concatenate([each.gains for each in dependences]), words)
     for each in dependences:
-        fine: BoolArray = np.isfinite(each.values)
-        if not fine.any():
-            raise ParameterError(f"dependence {shown(each.label)}: no finite value, but one was wanted")
-        short = cut_to(each.label, len, MOST_LETTERS)
-        kept.append(Dependence(short, each.controller, each.gains[fine], each.values[fine]))
-    check_some("dependences", kept)
-    known = curve_styles(each.controller for each in kept)
-    looks = [known[each.controller] for each in kept] if styles is None else list(styles)
-    axes = _page_axes(theme, size or (700, 480), title, scale)
-    gains = np.concatenate([each.gains for each in kept])
-    null = _gain_axis(axes, gains, words)
-    for each, look in zip(kept, looks, strict=True):
-        _draw_dependence(axes, each, look, null, theme, joined=not words)
-    values = np.concatenate([each.values for each in kept])
+        _draw_dependence(axes, each, null, joined=not words)
+    values = np.concatenate([each.values for each in dependences])
     axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
     even_ticks(axes.yaxis, 6)
-    quiet_axes(axes, theme, gain, label, grid="y")
-    if len(kept) > 1:
-        axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(theme.ink), borderaxespad=0.2)
+    quiet_axes(axes, LIGHT, cut_to(gain, len, MOST_LETTERS), label, grid="y")
+    if len(dependences) > 1:
+        axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(LIGHT.ink), borderaxespad=0.2)
     return figure_of(axes)
 
 
 @plain_style()
 def plot_gain_grid(
+    on: Axes | tuple[int, int],
     first: Sequence[Value],
     second: Sequence[Value],
     values: Array,
     gains: tuple[str, str],
-    axes: Axes | None = None,
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
+    theme: Theme = LIGHT,
 ) -> Figure:
     """Plot values (rows, columns) over a grid of two gains as a heat map with its numbers; nan for none.
 
-    `first`, `second`: the gains' values, ascending, None for no limit. ParameterError: another shape.
+    `on`: axes, or the size of a page of its own in px. `first`, `second`: the gains' values, ascending, None
+    for no limit.
     """
-    theme = theme_named(theme)
-    if values.shape != (len(second), len(first)) or not np.isfinite(values).any():
-        raise ParameterError(
-            f"values: shape {values.shape}, {int(np.isfinite(values).sum())} of them finite, "
-            f"but ({len(second)}, {len(first)}) with at least one finite was wanted"
-        )
+    axes = on if isinstance(on, Axes) else _page_axes(on)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     colours = theme.quiet_heat
     # numbers tell three digits, and a tenth of the way between the lowest and the highest
     digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
     decimals = min(max(0, *digits), 4) if digits else 2
-    if axes is None:
-        axes = _page_axes(theme, size or (700, 480), title, scale)
     for row, column in np.argwhere(np.isfinite(values)).tolist():
         part = (values[row, column] - low) / (high - low) if high > low else 0.0
         colour = tone(colours[round(part * (len(colours) - 1))])
@@ -139,13 +103,8 @@ def plot_gain_grid(
     return figure_of(axes)
 
 
-def _page_axes(theme: Theme, size: tuple[int, int], title: str, scale: float | None) -> Axes:
-    page = Page(size, theme, scale)
-    s = page.scale
-    if title:
-        page.title(title, 20)
-    above = (66 if title else 34) * s
-    return page.axes((52 * s, above, size[0] - 70 * s, size[1] - above - 50 * s))
+def _page_axes(size: tuple[int, int]) -> Axes:
+    return Page(size, LIGHT, 1.0).axes((52, 34, size[0] - 70, size[1] - 84))
 
 
 def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
@@ -180,19 +139,18 @@ def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
     return end if unlimited else None
 
 
-def _draw_dependence(
-    axes: Axes, each: Dependence, style: CurveStyle, null: float | None, theme: Theme, *, joined: bool
-) -> None:
-    colour = tone(style.colour(theme))
+def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined: bool) -> None:
+    style, label = each.style, cut_to(each.label, len, MOST_LETTERS)
+    colour = tone(style.colour(LIGHT))
     where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
     step = -(-len(where) // MOST_POINTS)
     dots: Any = {"color": colour, "markeredgewidth": 0.0, "linestyle": "none"}
     axes.plot(where[::step], each.values[::step], style.mark, markersize=3.6, alpha=0.5, **dots)
     levels = np.unique(where)
     if len(levels) > MOST_LEVELS:
-        axes.plot([], [], style.mark, markersize=5.0, label=each.label, **dots)
+        axes.plot([], [], style.mark, markersize=5.0, label=label, **dots)
         return
     medians = np.array([np.median(each.values[where == level]) for level in levels])
     dashes = style.dashes if joined else "none"
-    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": each.label}
+    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": label}
     axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)

@@ -16,12 +16,12 @@ from robocov.observation.region import Region
 from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import SMALL, Box, Page, quiet_axes, tone
-from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
+from robocov_app.render.theme import Theme, mix
 
 PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
 # heights are written beside the path, rounded, where their places are so far apart, as a part of it
 _APART = 0.13
-_LOW, _HIGH = 0.01, 100.0  # the range of the plot for such a cell, m
+_LOW, _HIGH = 0.01, 100.0  # the range of the plot, m
 _LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
 
 
@@ -35,63 +35,57 @@ class AtHeight(NamedTuple):
     missed: float
 
 
-def best_at_heights(vertices: Sequence[tuple[float, float]], heights: Sequence[float]) -> list[AtHeight]:
-    """Return the best places over a convex cell, m, at ascending heights, m, and in the limits 0, inf."""
-    cell = _cell_of(vertices)
-    size = float(np.sqrt(cell.mass[0]))
+def best_at_heights(heights: Sequence[float]) -> list[AtHeight]:
+    """Return the best places over the cell at ascending heights, m, and in the limits 0, inf."""
+    cell = _cell()
+    size, (centroid,) = float(np.sqrt(cell.mass[0])), cell.centroid
     rows = []
     for height in (0.0, *heights, np.inf):
-        place = cell.centroid[0]
+        place, missed = centroid, float("nan")
         if height < np.inf:
             place = best_points(cell, Sensing(height or _LIMIT * size))[0]
-        missed = float("nan")
-        if 0.0 < height < np.inf:
-            offsets = np.array([place, cell.centroid[0]])[:, None] - cell.generators
-            best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
-            missed = float(1.0 - plain / best)
-        away = float(np.hypot(*(place - cell.centroid[0])))
+            if height > 0.0:
+                offsets = np.array([place, centroid])[:, None] - cell.generators
+                best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
+                missed = float(1.0 - plain / best)
+        away = float(np.hypot(*(place - centroid)))
         rows.append(AtHeight(height, float(place[0]), float(place[1]), away, missed))
     return rows
 
 
 @plain_style()
-def plot_heights(
-    vertices: Sequence[tuple[float, float]] = PENTAGON,
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "The best place for a sensor depends on its height",
-    *,
-    scale: float | None = None,
-) -> Figure:
+def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
     """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
 
-    From left to right: the convex cell of `vertices`, m; what happens in it, enlarged; how far the optimum is
-    from the centroid. `size`: (width, height), by default 1080 x 440; `scale`: of texts and lines.
+    From left to right: the cell; what happens in it, enlarged; how far the optimum is from the centroid.
     """
-    theme = theme_named(theme)
-    cell = _cell_of(vertices)
-    unit = 10.0 ** round(float(np.log10(cell.mass[0] / 12.0)) / 2.0)
-    path = best_at_heights(vertices, np.geomspace(_LOW * unit, _HIGH * unit, 240).tolist())
-    marked = _apart(best_at_heights(vertices, [unit * n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
+    cell = _cell()
+    path = best_at_heights(np.geomspace(_LOW, _HIGH, 240).tolist())
+    marked = _apart(best_at_heights([n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
     median = best_points(cell, Distance())[0]
-    page = Page(size or (1080, 440), theme, scale)
-    s, (wide, high) = page.scale, page.size
-    top, bottom = (84 if title else 44) * s, 46 * s
-    if title:
-        page.title(title, 22)
-    tall, begin = high - top - bottom, page.margin + 26 * s
+    page = Page(size, theme, scale)
+    wide, high = size
+    top, bottom = 44 * scale, 46 * scale
+    tall, begin = high - top - bottom, page.margin + 26 * scale
     room = wide - page.margin - begin
     left, middle, right = (
         page.axes((begin + part * room, top, share * room, tall))
         for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
     )
-    for part, words in ((0.0, "the cell (m)"), (0.37, "the frame in it (m)")):
-        page.text(words, begin + part * room, top - 16 * s)
-    page.text("from the optimum to the centroid (mm)", begin + 0.68 * room, top - 16 * s)
+    for part, words in (
+        (0.0, "the cell (m)"),
+        (0.37, "the frame in it (m)"),
+        (0.68, "from the optimum to the centroid (mm)"),
+    ):
+        page.text(words, begin + part * room, top - 16 * scale)
     window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
     _draw_cell(left, cell, window, theme)
     _draw_path(middle, path, marked, median, window, theme)
-    _draw_rays(left, middle, window, theme)
+    x, y, width, height = window
+    for part in (0.0, 1.0):
+        ray: Any = {"xyA": (x + width, y + part * height), "xyB": (0.0, part)}
+        ray |= {"coordsA": left.transData, "coordsB": middle.transAxes, "color": tone(theme.faint)}
+        page.figure.add_artist(ConnectionPatch(**ray, linewidth=0.8))
     _draw_distance(right, path, marked, theme)
     return page.figure
 
@@ -107,8 +101,8 @@ def _apart(rows: Sequence[AtHeight]) -> list[AtHeight]:
     return [*kept, last]
 
 
-def _cell_of(vertices: Sequence[tuple[float, float]]) -> VoronoiPartition:
-    region = Region(np.array(vertices, dtype=float))
+def _cell() -> VoronoiPartition:
+    region = Region(np.array(PENTAGON))
     return partition(region.centroid[None], region)
 
 
@@ -132,14 +126,6 @@ def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) ->
     _plain(axes, theme)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(6, integer=True))
-
-
-def _draw_rays(left: Axes, middle: Axes, window: Box, theme: Theme) -> None:
-    x, y, width, height = window
-    for part in (0.0, 1.0):
-        begin: Any = {"xyA": (x + width, y + part * height), "coordsA": left.transData}
-        end: Any = {"xyB": (0.0, part), "coordsB": middle.transAxes}
-        left.figure.add_artist(ConnectionPatch(**begin, **end, color=tone(theme.faint), linewidth=0.8))
 
 
 def _draw_path(

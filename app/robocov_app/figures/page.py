@@ -23,13 +23,11 @@ Place: TypeAlias = Literal["upper left", "upper center", "center right"]
 
 
 def tone(colour: Colour) -> tuple[float, float, float]:
-    """Return a colour as matplotlib wants it."""
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
 
 
 def figure_of(axes: Axes) -> Figure:
-    """Return the figure that axes are on."""
     return cast("Figure", axes.get_figure(root=True))
 
 
@@ -109,7 +107,6 @@ class Page:
 
     @property
     def margin(self) -> float:
-        """Pixels that stay free at the edges."""
         return 18.0 * self.scale
 
     @property
@@ -118,7 +115,6 @@ class Page:
         return self.size[0] - 2 * self.margin
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return a pixel as fractions of the figure, which hold for every resolution."""
         return x / self.size[0], 1.0 - y / self.size[1]
 
     def axes(self, box: Box) -> Axes:
@@ -183,14 +179,12 @@ class Page:
             written.set_text(text.rstrip(" ·") + "…")
 
     def text_width(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
-        """Return how wide a line would be, in pixels."""
         written = self.figure.text(0, 0, text, fontsize=points, fontweight="bold" if bold else "normal")
         width = self.width_of(written)
         written.remove()
         return width
 
     def width_of(self, artist: Any) -> float:
-        """Return how wide a text or legend is, in pixels."""
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
     def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:

@@ -13,23 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError, shown
-from robocov_app.figures.curves import DISTANCE, Curve, draw_curves, end_label
+from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import (
-    TEXT,
-    Page,
-    check_some,
-    cut_to,
-    even_ticks,
-    figure_of,
-    quiet_axes,
-    tone,
-    value_limits,
-)
+from robocov_app.figures.page import TEXT, Page, cut_to, even_ticks, figure_of, quiet_axes, tone, value_limits
 from robocov_app.figures.statistics import Interval
-from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.figures.styles import CurveStyle
+from robocov_app.render.theme import LIGHT, Theme
 
 _REACH = 1.5  # so much farther than its pairs an axis of ratios goes for their intervals
 _USUAL = 700.0  # width of a page in pixels from which on lines have their full width
@@ -46,104 +35,72 @@ class Band(NamedTuple):
     """Runs of one controller over time (T,) s: `values` (m, T) has a row for each, nan where it has none."""
 
     label: str
-    controller: str
+    style: CurveStyle
     time: Array
     values: Array
 
 
 class Sample(NamedTuple):
-    """One value of each of several runs: label, controller's name, (m,) values."""
+    """One value of each of several runs, (m,)."""
 
     label: str
-    controller: str
+    style: CurveStyle
     values: Array
 
 
 class Pairs(NamedTuple):
-    """Ratios (m,) of two controllers in pairs of runs, and the typical one; the colour is the first one's."""
+    """Ratios (m,) of two controllers in pairs of runs, all above 0, and the typical one."""
 
     label: str
-    controller: str
+    style: CurveStyle
     ratios: Array
     interval: Interval
 
 
 @plain_style()
-def plot_cost_bands(
-    bands: Sequence[Band],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
-    *,
-    scale: float | None = None,
-    styles: Sequence[CurveStyle] | None = None,
-    label: str = DISTANCE,
-    unit: str = "m",
-) -> Figure:
+def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, unit: str) -> Figure:
     """Plot values against time: of several runs their median and quartiles, of one run its line."""
-    check_some("bands", bands)
-    for band in bands:
-        if band.values.ndim != 2 or band.values.shape[1] != len(band.time):
-            raise ParameterError(
-                f"band {shown(band.label)}: values of shape {band.values.shape}, but a row for each run with "
-                f"{len(band.time)} columns was wanted"
-            )
-        if not np.isfinite(band.values).any():
-            wanted = "at least one in each was wanted"
-            raise ParameterError(f"band {shown(band.label)}: no finite value, but {wanted}")
-    theme = theme_named(theme)
-    looks = styles_of([band.controller for band in bands]) if styles is None else styles
+    page = Page(size, LIGHT, 1.0)
     curves, around = [], []
-    for band in bands:
-        low, middle, high = quartiles(band.values)
-        curves.append((band.label, band.controller, band.time, middle))
-        around.append((low, high) if len(band.values) > 1 else None)
-    page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
-    s = page.scale
-    most = 0.5 * page.size[0] - 30 * s
-    curves = [_fitting(curve, page, unit, most) for curve in curves]
-    right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-    left, top = 44 * s, (72 if title else 44) * s
-    if title:
-        page.title(title, 22)
-    axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
+    for name, style, time, values in bands:
+        low, middle, high = quartiles(values)
+        around.append((low, high) if len(values) > 1 else None)
+
+        def width_of(name: str, time: Array = time, middle: Array = middle) -> float:
+            return page.text_width(end_label((name, "", time, middle), unit), bold=True)
+
+        # what stands at a curve's end takes no more than half of the page
+        curves.append((cut_to(name, width_of, 0.5 * size[0] - 30), style.name, time, middle))
+    right = 30 + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    axes = page.axes((44, 44, size[0] - 44 - right, size[1] - 94))
     # lines as in a picture of the usual size would fill a small one
-    weight = 1.0 if size is None or size[0] >= _USUAL * (scale or 1.0) else 0.7
-    draw_curves(axes, curves, theme, styles=looks, bands=around, label=label, unit=unit, weight=weight)
-    return figure_of(axes)
+    weight, styles = 1.0 if size[0] >= _USUAL else 0.7, [band.style for band in bands]
+    draw_curves(axes, curves, LIGHT, styles=styles, bands=around, label=label, unit=unit, weight=weight)
+    return page.figure
 
 
 @plain_style()
 def plot_final_costs(
     rows: Sequence[tuple[str, Sequence[Sample]]],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int | None] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
-    styles: Sequence[CurveStyle] | None = None,
-    label: str = DISTANCE,
+    label: str,
+    width: int,
+    scale: float,
+    theme: Theme = LIGHT,
     origin: float = 0.0,
 ) -> Figure:
     """Plot samples as boxes on their side, every value as a point, in groups such as maps, from the top.
 
     Boxes span the quartiles, whiskers 1.5 times as much; below `FEW` values only points and median stand.
-    A height of None is what they need. The axis begins at `origin` unless all values are far from it.
+    The axis begins at `origin` unless all values are far from it. What is not finite is left out.
     """
     samples = [sample for _, group in rows for sample in group]
-    _check_samples(samples)
-    theme = theme_named(theme)
     places, heads, total = laid_rows([(name, len(group)) for name, group in rows])
-    names = [sample.label for sample in samples]
-    axes, names = rows_page(total, names, theme, size, title, scale)
-    looks: list[CurveStyle] = []
-    for _, group in rows:
-        looks += styles_of([each.controller for each in group]) if styles is None else styles[: len(group)]
-    for sample, place, look in zip(samples, places, looks, strict=True):
-        draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
-    _row_frame(axes, places, names, total, theme, label, looks)
-    values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
-    low, high = float(values.min()), float(values.max())
+    axes, names = rows_page(total, [sample.label for sample in samples], theme, width, scale)
+    finite = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
+    for sample, values, place in zip(samples, finite, places, strict=True):
+        draw_box(axes, values, place, sample.style, theme)
+    _row_frame(axes, places, names, total, theme, label, [sample.style for sample in samples])
+    low, high = (float(end) for end in (min(map(np.min, finite)), max(map(np.max, finite))))
     axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
     even_ticks(axes.xaxis, 6)
     box, ink = axes.get_position(), tone(theme.ink)
@@ -156,29 +113,12 @@ def plot_final_costs(
 
 
 @plain_style()
-def plot_paired(
-    pairs: Sequence[Pairs],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int | None] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
-    label: str = "ratio of final mean distances",
-    styles: Sequence[CurveStyle] | None = None,
-) -> Figure:
+def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, theme: Theme = LIGHT) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis."""
-    _check_samples([Sample(each.label, each.controller, each.ratios) for each in pairs])
-    for each in pairs:
-        if not (each.ratios > 0).all():
-            raise ParameterError(f"pairs {shown(each.label)}: ratios above 0 were wanted")
-    theme = theme_named(theme)
     places, _, total = laid_rows([("", len(pairs))])
-    names = [each.label for each in pairs]
-    axes, names = rows_page(total, names, theme, size, title, scale)
-    known = curve_styles(each.controller for each in pairs)
-    looks = [known[each.controller] for each in pairs] if styles is None else styles
-    for each, look, place in zip(pairs, looks, places, strict=True):
-        _draw_points(axes, np.sort(each.ratios), place, tone(look.colour(theme)), theme)
+    axes, names = rows_page(total, [each.label for each in pairs], theme, width, scale)
+    for each, place in zip(pairs, places, strict=True):
+        _draw_points(axes, np.sort(each.ratios), place, tone(each.style.colour(theme)), theme)
         ratio = each.interval
         if np.isfinite(ratio.low):
             line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
@@ -193,30 +133,13 @@ def plot_paired(
     return figure_of(axes)
 
 
-def quartiles(values: Array) -> tuple[Array, Array, Array]:
-    """Return quartiles and the median between, (T,), over finite rows of (m, T); nan for none."""
+def quartiles(values: Array) -> Array:
+    """Return the quartiles and the median between, (3, T), over finite rows of (m, T); nan for none."""
     kept = np.where(np.isfinite(values), values, np.nan)
     result = np.full((3, values.shape[1]), np.nan)
     some = ~np.isnan(kept).all(axis=0)
     result[:, some] = np.nanpercentile(kept[:, some], [25, 50, 75], axis=0)
-    return result[0], result[1], result[2]
-
-
-def _fitting(curve: Curve, page: Page, unit: str, room: float) -> Curve:
-    """Return a curve with its name cut so that what stands at its end takes no more than `room` pixels."""
-
-    def width_of(label: str) -> float:
-        return page.text_width(end_label((label, *curve[1:]), unit), bold=True)
-
-    return cut_to(curve[0], width_of, room), *curve[1:]
-
-
-def _check_samples(samples: Sequence[Sample]) -> None:
-    check_some("samples", samples)
-    for sample in samples:
-        if not np.isfinite(sample.values).any():
-            wanted = "at least one was wanted"
-            raise ParameterError(f"sample {shown(sample.label)}: no finite value, but {wanted}")
+    return result
 
 
 def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[float], float]:
@@ -238,27 +161,16 @@ def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[floa
 
 
 def rows_page(
-    total: float,
-    names: Sequence[str],
-    theme: Theme,
-    size: tuple[int, int | None] | None,
-    title: str,
-    scale: float | None,
+    total: float, names: Sequence[str], theme: Theme, width: int, scale: float
 ) -> tuple[Axes, list[str]]:
     """Return axes on a page high enough for `total` rows, and the names as they fit to the left of them."""
-    width, height = size or (800, None)
-    # how high it is depends on the scale, not the other way round
-    page = Page((width, 200), theme, scale or min(max(width / 640, 0.8), 6.0))
-    s = page.scale
+    page = Page((width, 200), theme, scale)
     short = [cut_to(name, page.text_width, 0.42 * width) for name in names]
-    left = max(page.text_width(name) for name in short) + 32 * s
-    above, below = (36 if title else 8) * s, 46 * s
-    if height is None:
-        height = round(above + _ROW * s * total + below)
-    page = Page((width, height), theme, s)
-    if title:
-        page.title(title, 20)
-    return page.axes((left, above, width - left - 16 * s, height - above - below)), short
+    left = max(page.text_width(name) for name in short) + 32 * scale
+    above, below = 8 * scale, 46 * scale
+    height = round(above + _ROW * scale * total + below)
+    page = Page((width, height), theme, scale)
+    return page.axes((left, above, width - left - 16 * scale, height - above - below)), short
 
 
 def _row_frame(

@@ -13,7 +13,7 @@ from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some, figure_of
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Page, check_some, figure_of
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
@@ -55,7 +55,8 @@ def plot_trajectories(
     `axes`: None makes a page of `size` px. `colours`: those of the paper, or a hue for each robot.
     `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
-    _check_colours(colours)
+    if colours not in ("paper", "robots"):
+        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
     theme = theme_named(theme)
     if axes is None:
         facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
@@ -78,17 +79,7 @@ def plot_comparison(
     mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
     """Plot runs side by side at one scale, with final mean distances, m, and times, s, in the titles."""
-    _check_colours(colours)
-    costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
-    if not records or len(costs) != len(records):
-        raise ParameterError(
-            f"comparison: {len(records)} runs and {len(costs)} mean distances, "
-            f"but at least one run and one distance for each was wanted"
-        )
-    times = list(mean_times) if mean_times is not None else [None] * len(records)
-    if len(times) != len(records):
-        wanted = "one time for each was wanted"
-        raise ParameterError(f"comparison: {len(records)} runs and {len(times)} mean times, but {wanted}")
+    costs, times = (known or [None] * len(records) for known in (mean_distances, mean_times))
     theme = theme_named(theme)
     bounds = np.array([record.environment.region.bounds for record in records])
     limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
@@ -167,11 +158,6 @@ def plot_cost(
     return figure_of(axes)
 
 
-def _check_colours(colours: str) -> None:
-    if colours not in ("paper", "robots"):
-        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
-
-
 def _map_page(
     environment: Environment,
     theme: Theme,
@@ -193,22 +179,17 @@ def _map_page(
     width = min(page.room, room_y * aspect)
     height = width / aspect
     box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
-    _titles(page, box, title, facts)
+    for text, up, points, bold, colour in (
+        (title, 38, TITLE, True, theme.ink),
+        (facts, 16, TEXT, False, theme.faint),
+    ):
+        # above a narrow map lines may be wider than it
+        wide = min(page.text_width(text, points=points, bold=bold), page.room)
+        start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)
+        y = box[1] - up * page.scale
+        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
     page.footer(handles, [box], width / (high_x - low_x))
     return page.map_axes(box, low_x, low_y, high_x, high_y)
-
-
-def _titles(page: Page, box: Box, title: str, facts: str) -> None:
-    """Write two lines above `box`; above a narrow map they may be wider than it."""
-    left, top, width, _ = box
-    for text, up, points, bold, colour in (
-        (title, 38, TITLE, True, page.theme.ink),
-        (facts, 16, TEXT, False, page.theme.faint),
-    ):
-        wide = min(page.text_width(text, points=points, bold=bold), page.room)
-        start = left if wide <= width else max(left + (width - wide) / 2, page.margin)
-        y = top - up * page.scale
-        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
 
 
 def _captions(

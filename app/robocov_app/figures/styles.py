@@ -44,7 +44,6 @@ class CurveStyle(NamedTuple):
     mark: str
 
     def colour(self, theme: Theme) -> Colour:
-        """Return the colour in a theme."""
         kind, _, number = self.name.rpartition("-")
         return theme.others[int(number)] if kind == "other" else theme.controller(self.name)
 

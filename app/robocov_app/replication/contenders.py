@@ -38,7 +38,6 @@ class Contender:
 
     @property
     def all_gains(self) -> dict[str, Value]:
-        """All gains, the controller's defaults among them."""
         return dict(gain_values(make_controller(self.controller, self.gains)))
 
     @property
@@ -48,12 +47,10 @@ class Contender:
 
 
 def of_paper(key: str, gains: Mapping[str, Value]) -> Contender:
-    """Return a contender of the paper's claims."""
     return Contender(key, LABELS[key], key.partition("-")[0], dict(gains))
 
 
 def with_gains(name: str, gains: Mapping[str, Value]) -> Contender:
-    """Return a registered controller with other gains than its defaults."""
     return Contender(name, CONTROLLERS[name].label, name, dict(gains))
 
 
@@ -81,7 +78,6 @@ OWN = tuple(with_gains(name, {}) for name in OURS)
 
 
 def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
-    """Return all combinations of values of gains."""
     return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
 
 
@@ -113,7 +109,6 @@ GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
 
 
 def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
-    """Return all registered controllers of other authors, each with its `best` gains or its defaults."""
     others = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
     return tuple(with_gains(name, best.get(name, {})) for name in others)
 

@@ -12,8 +12,7 @@ import numpy as np
 from robocov.controllers import controller_kind, gain_values, information_of, make_controller
 from robocov.controllers.gains import value_text
 from robocov_app.figures.statistics import Interval, bootstrap
-from robocov_app.replication.beyond_claims import capitalised
-from robocov_app.replication.claims import amount, share_above_zero
+from robocov_app.replication.claims import amount, capitalised, share_above_zero
 from robocov_app.replication.contenders import OURS, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes, Scenario
 from robocov_app.replication.results import BeyondResults
@@ -76,7 +75,6 @@ def account_of(controller: str) -> Account:
 
 
 def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow]:
-    """Return a row for each contender that has runs."""
     rows = []
     for each in contenders:
         fine = outcomes.measured("gap", each.key)
@@ -107,7 +105,6 @@ def ranked_rows(results: BeyondResults) -> list[LawRow]:
 
 
 def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
-    """Return what is said of every controller, in the order in which the rows have its best contender."""
     own: dict[str, list[LawRow]] = {}
     for row in rows:
         own.setdefault(row.contender.controller, []).append(row)
@@ -125,7 +122,6 @@ def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
 
 
 def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str, Comparison]]:
-    """Return each of our controllers against these contenders, in the scenarios of both."""
     labels = {each.key: each.label for each in results.contenders}
     found = []
     for ours in OURS:
@@ -137,7 +133,6 @@ def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str
 
 
 def failure_text(outcomes: Outcomes, law: LawRow) -> str:
-    """Return in words where a contender does worst, and what else goes wrong in its runs."""
     key = law.contender.key
     medians = sorted(outcomes.median_by_map(key).items(), key=lambda item: -item[1])[:WORST_MAPS]
     highest = ", ".join(f"{name} {amount(high, '%')}" for name, high in medians)

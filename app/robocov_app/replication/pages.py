@@ -23,13 +23,19 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import beyond_claims, claims, contenders, evidence, step_times, studies
+from robocov_app.replication import claims, contenders, evidence, step_times, studies
 from robocov_app.replication.claims import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
 from robocov_app.replication.contenders import LABELS, OURS
 from robocov_app.replication.evidence import ASSETS, Evidence
-from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
+from robocov_app.replication.figures import (
+    FIGURES,
+    WORDS,
+    beyond_plots,
+    describe_figure,
+    draw_figure,
+    paper_plots,
+)
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
-from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
@@ -59,7 +65,6 @@ class Image(NamedTuple):
 
 
 def save(path: Path, text: str) -> None:
-    """Write a text, whole or not at all; may raise OutputError."""
     with written(path) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -85,7 +90,6 @@ def save_paper_figures(
 
 
 def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, Image]:
-    """Write the figures beyond the paper to ``figures/``; may raise OutputError."""
     return _save_figures(folder, partial(beyond_plots, results), {}, quiet=quiet)
 
 
@@ -169,18 +173,18 @@ def paper_page(
 
 
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
-    """Return ``beyond.html``."""
-    found, rows = beyond_claims.beyond_claims(results), evidence.ranked_rows(results)
+    found, rows = claims.beyond_claims(results), evidence.ranked_rows(results)
     each, tuned = evidence.evidence(results, rows), bool(results.plan.beyond.tuning)
+    goal_claims = [claim for claim in found if claim.part == claims.GOALS]
     beside = ("rapf-best", "rapf-default", "lloyd")
     others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
         "results": results,
         "found": found,
-        "goals": beyond_claims.beyond_goals(results),
-        "unseen": beyond_claims.beyond_unseen(results),
-        "goal_claims": [claim for claim in found if claim.part == beyond_claims.GOALS],
-        "rival_claims": [claim for claim in found if claim.part == beyond_claims.RIVALS],
+        "goals": [claim for claim in goal_claims if claim.key != "goal-unseen"],
+        "unseen": next((claim for claim in found if claim.key == "goal-unseen"), None),
+        "goal_claims": goal_claims,
+        "rival_claims": [claim for claim in found if claim.part == claims.RIVALS],
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
         "failures": [
@@ -206,7 +210,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     environment.filters.update(span=span, g="{:g}".format, amount=amount)
     environment.filters["unbroken"] = lambda text: Markup(_unbroken(str(text)))
     known = environment.globals.update
-    known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
+    known(t=claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
     known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=LEAST_MAPS)

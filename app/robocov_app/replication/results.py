@@ -3,11 +3,11 @@
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -63,6 +63,10 @@ class RunnerOptions:
     quiet: bool
     stop: Interruption
     keep_versions: bool = False
+
+    def raise_if_stopped(self) -> None:
+        if self.stop.requested:
+            raise Interrupted
 
 
 @dataclass(frozen=True)
@@ -149,27 +153,20 @@ def open_folder(folder: Path, plan: Plan) -> None:
         with written(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
-    try:
-        content = json.loads(mark.read_bytes())
-        named = content["plan"] if content["format"] == _HEAD["format"] else None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        named = None
-    if named == plan.name:
-        return
     words = "the folder is not empty, and what is in it is no study of the paper"
-    if named is not None:
-        words = f"holds the {named} study, but the {plan.name} one was asked for"
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        content = json.loads(mark.read_bytes())
+        if content["format"] == _HEAD["format"]:
+            if content["plan"] == plan.name:
+                return
+            words = f"holds the {content['plan']} study, but the {plan.name} one was asked for"
     raise InputError(f"{folder}: {words}; another --out was wanted")
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
-    """Do the runs of a sweep that are left, in ``studies/`` under its name; return that folder."""
     target = folder / "studies" / name
-    names = ("workers", "scheduler", "keep_versions", "quiet", "stop")
-    how: Any = {option: getattr(options, option) for option in names}
-    totals = sweep(study, target, title=f"paper: {name}", **how)
-    if totals.interrupted or options.stop.requested:
-        raise Interrupted
+    sweep(study, target, title=f"paper: {name}", **vars(options))
+    options.raise_if_stopped()
     return target
 
 
@@ -202,8 +199,7 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
                 tell.say(note)
             for _ in worked_off(tasks.values(), lambda: LocalPool(workers), count, options.stop, keep):
                 tell(count)
-    if options.stop.requested:
-        raise Interrupted
+    options.raise_if_stopped()
     quiet = options.quiet or options.scheduler is None  # then all has been told
     for name, study in sweeps.items():
         run_study(study, folder, name, replace(options, quiet=quiet))
@@ -212,11 +208,9 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
 def references_of(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
 ) -> dict[str, Reference]:
-    """Return the centralised reference of every map by its name, searched for where it is not there yet."""
-    at, workers, quiet = folder / "references", options.workers, options.quiet
-    found = find_references(maps, at, plan, workers=workers, quiet=quiet, stop=options.stop)
-    if options.stop.requested:
-        raise Interrupted
+    how = options.workers, options.stop
+    found = find_references(maps, folder / "references", plan, *how, quiet=options.quiet)
+    options.raise_if_stopped()
     return found
 
 
@@ -257,15 +251,12 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
 
 def expected_contenders(plan: Plan) -> tuple[Contender, ...]:
     """Return the paper's contenders with any gains for the best, distinct where that can be."""
-    guesses = (
-        (*UNTUNED, *(laws.of_paper(f"{law}-best", grid[k]) for law, grid in studies.gain_sets(plan).items()))
-        for k in (0, -1)
-    )
+    grids = studies.gain_sets(plan).items()
+    guesses = (paper_contenders({law: grid[k] for law, grid in grids}) for k in (0, -1))
     return max(guesses, key=lambda guess: sum(map(len, laws.distinct_gains(guess).values())))
 
 
 def grid_is_done(folder: Path, plan: Plan) -> bool:
-    """Return whether all runs of the paper's grids of gains are there."""
     tuning = studies.gains_study(plan)
     return runs_there(folder, "gains", tuning) == len(tuning)
 
@@ -312,9 +303,9 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     known |= references_of((*convex.study.maps, *claims.study.maps), folder, plan, options)
     in_convex = read_outcomes(run_study(convex.study, folder, "convex", options), convex, known)
     outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
-    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
+    counts = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
     worst = worst_runs(claims.study, outcomes, RAPF_SHARED, WORST)
-    return PaperResults(plan, figures, gains, in_convex, outcomes, papers, known, worst, runs, failed)
+    return PaperResults(plan, figures, gains, in_convex, outcomes, papers, known, worst, **counts)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -348,22 +339,19 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     found = {name: read_outcomes(at / name, each, known) for name, each in contests.items()}
     sides = [name for name in contests if name == "rivals" or name.startswith("ours-")]
     outcomes = reached.joined([among_baselines(claims, plan), *(found[name] for name in sides)])
-    steps = time_steps(folder, plan, options)
-    runs, failed = _counts(folder, (*[BASELINE_GAINS] * bool(gains), *sweeps))
     return BeyondResults(
-        plan=plan,
-        outcomes=outcomes,
-        unseen=found.get("unseen"),
+        plan,
+        outcomes,
+        found.get("unseen"),
         contenders=(*papers, *(law for name in sides for law in contests[name].contenders)),
         gains=gains,
-        steps=steps,
+        steps=time_steps(folder, plan, options),
         worst=worst_runs(contests[f"ours-{OURS[0]}"].study, outcomes, OWN[0], plan.beyond.worst),
         targets=found["targets"],
         density=_density(at, plan, found["density"], found["density-ignored"]),
         teams=found["teams"],
         degradations=read_degradations(at, plan),
-        runs=runs,
-        failed=failed,
+        **_counts(folder, (*[BASELINE_GAINS] * bool(gains), *sweeps)),
     )
 
 
@@ -375,12 +363,10 @@ def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
 
 
 def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:
-    """Return how long the steps of every registered controller take beside RAPF's."""
     everybody = tuple(CONTROLLERS)
     wanted = {ROBOTS: everybody, plan.beyond.large: everybody, plan.beyond.huge: OURS[:1]}
     found = step_times(folder, wanted, plan, stopped=lambda: options.stop.requested)
-    if options.stop.requested:
-        raise Interrupted
+    options.raise_if_stopped()
     return found
 
 
@@ -425,11 +411,12 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
     return found
 
 
-def _finals(
-    folder: Path, column: str = "", only: float | None = None
-) -> dict[tuple[str, float | None], dict[tuple[str, int], float]]:
+Finals: TypeAlias = dict[tuple[str, float | None], dict[tuple[str, int], float]]
+
+
+def _finals(folder: Path, column: str = "", only: float | None = None) -> Finals:
     """Return final costs by map and seed, by controller and value of a column, `only` if there is none."""
-    found: dict[tuple[str, float | None], dict[tuple[str, int], float]] = {}
+    found: Finals = {}
     for row in read_results(folder).to_table().to_pylist():
         if row["mean_distance_m"] is not None:
             group = found.setdefault((row["controller"], row.get(column, only)), {})
@@ -441,7 +428,7 @@ def _density(at: Path, plan: Plan, *found: Outcomes) -> DensityResults:
     costs = {each.name: CoverageCost(each.environment, plan.lattice) for each in studies.density_maps(plan)}
     values = {}
     for key, outcomes in zip(("known", "ignored"), found, strict=True):
-        (places,) = outcomes.placements.values()
+        (places,) = (each for (_, measure), each in outcomes.values.items() if measure == "placement")
         finals = [
             costs[name](place).mean_distance if np.isfinite(place).all() else np.nan
             for name, place in zip(outcomes.maps, places, strict=True)
@@ -461,6 +448,6 @@ def _run_grid(
     return reached.read_gain_outcomes(run_study(study, folder, name, options), study, known), known
 
 
-def _counts(folder: Path, names: Iterable[str]) -> tuple[int, int]:
+def _counts(folder: Path, names: Iterable[str]) -> dict[str, int]:
     found = [read_results(folder / "studies" / name) for name in names]
-    return sum(map(len, found)), sum(len(each.failures()) for each in found)
+    return {"runs": sum(map(len, found)), "failed": sum(len(each.failures()) for each in found)}

@@ -81,7 +81,6 @@ class Contest:
 
 
 def bundled(name: str, kinds: Iterable[str] = KINDS) -> StudyMap:
-    """Return a bundled map with the study's starts."""
     return StudyMap(name, with_kinds_of_starts(load_map(name), kinds))
 
 
@@ -147,19 +146,16 @@ def _start(environment: Environment, kind: str) -> StartSpec:
 
 @cache
 def generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
-    """Return non-convex maps drawn by chance, with the study's starts."""
     return tuple(map(generated, seeds))
 
 
 @cache
 def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the non-convex maps on which the claims are tested."""
     return (*map(bundled, plan.bundled), *generated_maps(plan.generated))
 
 
 @cache
 def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the convex regions."""
     known = (bundled(name, CONVEX_KINDS) for name in CONVEX)
     return (*known, *map(convex_region, plan.convex_generated))
 
@@ -171,7 +167,6 @@ def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 
 def density_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the small maps with a density."""
     return tuple(map(with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
 
 
@@ -208,7 +203,6 @@ def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
 
 
 def gains_study(plan: Plan) -> Study:
-    """Return the grids of gains on the maps of the tuning."""
     on, starts, seeds = generated_maps(plan.tuning), plan.tuning_starts, (plan.tuning_seed,)
     return Study(on, ("rapf", "rpf"), gain_sets(plan), starts=starts, seeds=seeds, **_common(plan))
 

@@ -115,7 +115,6 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
 
 @cache
 def template(name: str) -> Template:
-    """Return a template of pages."""
     loader = FunctionLoader(replay.asset)
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)

@@ -14,7 +14,6 @@ from robocov_app.sweep.study import UNITS, parameter_text
 
 
 def title_of(result: Result) -> str:
-    """Return what a result is called."""
     if result.kind == "sweep":
         return f"Sweep {printable(result.folder.resolve().name)}"
     controllers = list(dict.fromkeys(entry.label for entry in result.entries))
@@ -23,7 +22,6 @@ def title_of(result: Result) -> str:
 
 
 def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
-    """Return what came of it, in a few sentences."""
     fine = [entry for entry in result.fine if np.isfinite(entry.final)]
     if not fine:
         return ["No run has a result."]
@@ -50,7 +48,6 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
-    """Return what was run, as terms and descriptions."""
     starts = dict.fromkeys(entry.start for entry in result.entries)
     sizes = sorted({entry.robots for entry in result.entries})
     versions = result.facts.get("versions")
@@ -77,7 +74,6 @@ def facts(result: Result) -> list[tuple[str, str]]:
 
 
 def meanings(result: Result) -> list[tuple[str, str]]:
-    """Return the gains of the controllers that were run, and what they are."""
     used = {name for entry in result.entries for name, _ in entry.gains}
     return [(name, text) for name, text in result.meanings.items() if name in used and text]
 
@@ -146,7 +142,6 @@ def run_title(result: Result, entry: Entry, label: str) -> str:
 
 
 def run_facts(result: Result, entry: Entry) -> str:
-    """Return the figures of a run as a sentence."""
     figures = entry.figures
     words = [f"Gains: {gain_text(entry.gains, result.units)}"] if entry.gains else []
     if entry.has("mean_time_s"):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -24,7 +25,7 @@ _DIRECT = 12  # letters that a gain and its value may take in a label
 
 Gains: TypeAlias = tuple[tuple[str, Value], ...]
 Setting: TypeAlias = tuple[object, ...]
-Scales: TypeAlias = Mapping[Setting, float]  # what costs are divided by
+Scales: TypeAlias = Mapping[Entry, float]  # what the costs of runs are divided by
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,6 @@ class Group:
 
 
 def variants(result: Result) -> list[Group]:
-    """Return runs that did not fail by controller and gains, named by the differing gain or a letter."""
     found: dict[tuple[str, Gains], list[Entry]] = {}
     for entry in result.fine:
         found.setdefault((entry.controller, entry.gains), []).append(entry)
@@ -54,7 +54,6 @@ def variants(result: Result) -> list[Group]:
 
 
 def labels(result: Result) -> dict[Entry, str]:
-    """Return what the variant of each run that did not fail is called."""
     return {entry: group.label for group in variants(result) for entry in group.entries}
 
 
@@ -84,7 +83,6 @@ def styles(result: Result) -> dict[str, CurveStyle]:
 
 
 def by_controller(result: Result) -> list[Group]:
-    """Return the runs that did not fail by controller, whatever the gains."""
     found: dict[str, list[Entry]] = {}
     for entry in result.fine:
         found.setdefault(entry.controller, []).append(entry)
@@ -103,7 +101,6 @@ def shown_groups(result: Result) -> list[Group]:
 
 
 def settings(result: Result) -> list[Setting]:
-    """Return the settings of all runs that did not fail, in the result's order."""
     return list(dict.fromkeys(entry.setting for entry in result.fine))
 
 
@@ -118,24 +115,25 @@ def setting_label(result: Result, setting: Setting) -> str:
     return ", ".join(parts)
 
 
-def medians(result: Result) -> dict[Setting, float]:
-    """Return the median of the final mean distances of all runs in each setting, m."""
-    found: dict[Setting, list[float]] = {}
+def medians(result: Result, part_of: Callable[[Entry], object] = attrgetter("setting")) -> Scales:
+    """Return for each run the median of the final mean distances of all runs in its part of a result, m."""
+    found: dict[object, list[float]] = {}
     for entry in result.fine:
         if np.isfinite(entry.final):
-            found.setdefault(entry.setting, []).append(entry.final)
-    return {setting: float(np.median(values)) for setting, values in found.items()}
+            found.setdefault(part_of(entry), []).append(entry.final)
+    of_part = {part: float(np.median(values)) for part, values in found.items()}
+    return {entry: of_part.get(part_of(entry), 0.0) for entry in result.fine}
 
 
 def relative(entries: Iterable[Entry], scales: Scales) -> Array:
-    """Return final mean distances as multiples of their settings' medians, (m,); only the finite ones."""
-    parts = np.array([_part(entry, scales) for entry in entries])
-    return np.asarray(parts[np.isfinite(parts)])
+    """Return scaled final mean distances, (m,); only the finite ones."""
+    costs = np.array([scaled(entry, scales) for entry in entries])
+    return np.asarray(costs[np.isfinite(costs)])
 
 
-def _part(entry: Entry, scales: Scales) -> float:
-    """Return a final mean distance as a multiple of its setting's median; inf where that is not known."""
-    scale = scales.get(entry.setting, 0.0)
+def scaled(entry: Entry, scales: Scales) -> float:
+    """Return a final mean distance as a multiple of its scale; inf where that is not known."""
+    scale = scales.get(entry, 0.0)
     return entry.final / scale if np.isfinite(entry.final) and scale > 0.0 else np.inf
 
 
@@ -292,7 +290,7 @@ def compared_groups(result: Result) -> tuple[list[Group], str]:
     scales, groups, chosen_gains = medians(result), [], []
     costs: dict[object, list[tuple[object, float]]] = {}
     for entry in result.entries:
-        cost = part_of(entry), _part(entry, scales)
+        cost = part_of(entry), scaled(entry, scales)
         costs.setdefault((entry.controller, entry.gains), []).append(cost)
     for controller, own in by.items():
         if len(own) == 1:
@@ -372,7 +370,7 @@ def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
     scales = medians(result)
     by: dict[str, list[tuple[float, Entry]]] = {}
     for entry in entries:
-        if np.isfinite(part := _part(entry, scales)):
+        if np.isfinite(part := scaled(entry, scales)):
             by.setdefault(entry.controller, []).append((part, entry))
     found = set(_middle_case(_best_variants(result, entries), scales))
     for ranked in by.values():
@@ -394,8 +392,8 @@ def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
     ranks: dict[tuple[object, ...], list[float]] = {}
     runs: dict[tuple[object, ...], list[Entry]] = {}
     for group in groups:
-        known = [entry for entry in group.entries if np.isfinite(_part(entry, scales))]
-        order = sorted(known, key=lambda entry: _part(entry, scales))
+        known = [entry for entry in group.entries if np.isfinite(scaled(entry, scales))]
+        order = sorted(known, key=lambda entry: scaled(entry, scales))
         for rank, entry in enumerate(order):
             ranks.setdefault(entry.case, []).append(abs(rank - (len(order) - 1) / 2) / len(order))
             runs.setdefault(entry.case, []).append(entry)

@@ -152,7 +152,6 @@ def changes_sentence(record: Record) -> str:
 
 
 def map_sentence(environment: Environment) -> str:
-    """Return what a picture of a map shows, in words."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
     count, weighed = len(environment.obstacles), density_label(environment)
@@ -167,7 +166,6 @@ def map_sentence(environment: Environment) -> str:
 
 
 def run_sentence(record: Record, history: CostHistory | None) -> str:
-    """Return what a picture of a run shows, in words."""
     robots, span = counted(len(record.team), "robot"), record.time[-1] - record.time[0]
     start = f" from start {record.start}" if record.start else ""
     begin = f"{record.label} on map {record.environment.name}: trajectories of"

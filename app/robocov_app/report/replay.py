@@ -275,11 +275,9 @@ def replay_js() -> str:
 
 
 def script(content: str) -> str:
-    """Return a script whose names nobody else sees."""
     return f'(() => {{\n"use strict";\n{content}\n}})();'
 
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a file that pages are made of."""
     return files("robocov_app.report").joinpath("assets", name).read_text(encoding="utf-8")

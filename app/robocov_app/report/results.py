@@ -114,17 +114,14 @@ class Result:
 
     @cached_property
     def fine(self) -> tuple[Entry, ...]:
-        """The runs that did not fail."""
         return tuple(entry for entry in self.entries if entry.error is None)
 
     @property
     def failed(self) -> tuple[Entry, ...]:
-        """The runs that failed."""
         return tuple(entry for entry in self.entries if entry.error is not None)
 
     @property
     def missing(self) -> int:
-        """Number of runs that are not done."""
         return max(self.wanted - len(self.entries) - len(self.damaged), 0)
 
     def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:

@@ -143,7 +143,6 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
 
 
 def pairs_table(comparisons: Sequence[Comparison]) -> Table:
-    """Return how the groups compare over maps, one row a comparison."""
     rows = []
     for each in comparisons:
         lower = sum(int((own.a < own.b).sum()) for own in each.maps)

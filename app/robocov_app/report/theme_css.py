@@ -17,8 +17,6 @@ def hex_code(colour: Colour) -> str:
 
 
 def named_colours(theme: Theme) -> dict[str, Colour]:
-    """Return the colours that pages use, by the names that they have there."""
-
     def own(*names: str) -> dict[str, Colour]:
         return {name: getattr(theme, name.replace("-", "_")) for name in names}
 
