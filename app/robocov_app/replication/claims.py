@@ -23,26 +23,17 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from robocov.arrays import Array, IntArray
 from robocov.controllers import controller_kind, information_of
 from robocov_app.figures.statistics import Interval, bootstrap, bootstrap_by, median_time, share, spread
-from robocov_app.replication.contenders import (
-    LABELS,
-    OURS,
-    OWN,
-    PAPER,
-    TARGETS,
-    TEAMS,
-    Contender,
-    potential_text,
-    strongest,
-)
+from robocov_app.replication import contenders as laws
+from robocov_app.replication.contenders import LABELS, OURS, OWN, PAPER, TARGETS, TEAMS, Contender
 from robocov_app.replication.outcomes import EARLY, FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.plan import CONVEX_KINDS, Plan
 from robocov_app.replication.results import BeyondResults, Degradation
 from robocov_app.replication.step_times import StepTimes
+from robocov_app.report.groups import parted
 
 Verdict: TypeAlias = Literal["holds", "holds partly", "does not hold", "undecided"]
 
@@ -167,12 +158,7 @@ def amount(value: float, unit: str = "") -> str:
 
 
 def described(interval: Interval, unit: str = "") -> str:
-    """Return an estimate with its interval.
-
-    >>> from robocov_app.figures.statistics import Interval
-    >>> described(Interval(0.052, 0.031, 0.08), "%")
-    '5.2 % (3.1 % to 8 %)'
-    """
+    """Return an estimate with its interval: "5.2 % (3.1 % to 8 %)"."""
     estimate, low, high = (amount(each, unit) for each in (interval.estimate, interval.low, interval.high))
     return estimate if math.isnan(interval.low) else f"{estimate} ({low} to {high})"
 
@@ -234,15 +220,9 @@ def paper_claims(
     )
 
 
-def share_of(there: ArrayLike, on: Outcomes) -> Interval:
-    """Return in which share of the runs something is so, (m,) bool."""
-    return share(there, on.maps)
-
-
 def _both(
     measure: str, ours: Array, theirs: Array, maps: Sequence[str], bound: float
 ) -> tuple[Criterion, ...]:
-    """Return that RAPF's values are to be below a bound in the median, and RPF's above it."""
     mine, others = (bootstrap(values, clusters=maps) for values in (ours, theirs))
     low = Criterion(f"RAPF: {measure}", mine, high=bound, unit="%")
     return low, Criterion("RPF: the same", others, low=bound, unit="%")
@@ -256,15 +236,15 @@ def pair_claim(
     explain: Callable[[Comparison], str],
     *,
     below: float = 1.0,
-    share: float = 0.5,
+    most: float = 0.5,
 ) -> Claim:
     """Judge whether the first of a pair has the lower values: in the median ratio, and in most runs.
 
-    `ratio` and `wins` name these measures; `below` and `share` are what they have to reach.
+    `ratio` and `wins` name these measures; `below` and `most` are what they have to reach.
     """
     if pairs is None:
         return head
-    criteria = Criterion(ratio, pairs.ratio, high=below), Criterion(wins, pairs.wins, share, unit="%")
+    criteria = Criterion(ratio, pairs.ratio, high=below), Criterion(wins, pairs.wins, most, unit="%")
     return head.judged(criteria, explain(pairs), pairs.fine, 2)
 
 
@@ -274,7 +254,7 @@ def convex_final(outcomes: Outcomes) -> Claim:
     pairs = outcomes.compared("rapf-shared", "lloyd")
     if pairs is None:
         return head
-    near = share_of(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.fine)
+    near = share(np.abs(pairs.ratios - 1.0) <= NEARLY_SAME, pairs.fine.maps)
     criteria = (
         Criterion("median of J(RAPF) / J(LA) at the end", pairs.ratio, 1.0 - SAME_COST, 1.0 + SAME_COST),
         Criterion(f"runs that end within {amount(NEARLY_SAME, '%')} of LA", near, NEARLY_ALWAYS, unit="%"),
@@ -304,11 +284,10 @@ def convex_spreading(outcomes: Outcomes) -> Claim:
 def against_rpf(outcomes: Outcomes, gains: str, moment: str) -> Claim:
     """Test whether RAPF's cost is below RPF's, at {"shared", "best"} gains, in {"final", "motion"}."""
     at = "with the same potential parameters" if gains == "shared" else "each with its own best gains"
-    averaged = f"the cost averaged over {FIRST_MINUTE:g} s"
-    end, what, measure = {
-        "final": ("ends at a lower cost than RPF", "the final cost", "final"),
-        "motion": ("has a lower cost than RPF while it moves", averaged, "first_minute"),
-    }[moment]
+    end, what, measure = "ends at a lower cost than RPF", "the final cost", "final"
+    if moment == "motion":
+        end, what = "has a lower cost than RPF while it moves", f"the cost averaged over {FIRST_MINUTE:g} s"
+        measure = "first_minute"
     text = f"In a non-convex environment RAPF {end}, {at}."
     return pair_claim(
         Claim(f"nonconvex-{moment}-{gains}", 2, text, "VI-B, figures 4 to 7"),
@@ -317,7 +296,7 @@ def against_rpf(outcomes: Outcomes, gains: str, moment: str) -> Claim:
         "runs in which RAPF's is the lower one",
         lambda pairs: f"Median ratio per start: {_by_start(pairs)}. {lost_text(pairs, 'RAPF')}",
         below=CLEARLY_BELOW,
-        share=NEARLY_ALWAYS,
+        most=NEARLY_ALWAYS,
     )
 
 
@@ -344,12 +323,12 @@ def gains_result(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
     ratio = bootstrap(ours / np.maximum(theirs, 1e-12), clusters=maps)
     relative = Criterion("median ratio of that deviation, RAPF to RPF", ratio, high=1.0)
     criteria = *_both(measure, ours, theirs, maps, BARELY), relative
-    levels = sorted({float(gains["k_att"] or 0.0) for gains in rapf.gains if "k_att" in gains})
+    parts = ((level, rapf.with_gain("k_att", level)) for level in rapf.levels("k_att"))
     at = "; ".join(
         f"k_att = {level:g}: {median_text(variation(part), '%')}, "
         f"worst by best {median_text(worst_by_best(part))}"
-        for level in levels
-        if len((part := rapf.with_gain("k_att", level)).gains) > 1
+        for level, part in parts
+        if len(part.gains) > 1
     )
     explanation = (
         f"{len(rapf.gains)} sets of gains for RAPF and {len(rpf.gains)} for RPF. Worst by best set, median: "
@@ -371,7 +350,7 @@ def gains_choice(rapf: GainOutcomes, rpf: GainOutcomes) -> Claim:
         Criterion(f"RPF: {measure}", bootstrap(theirs, "mean", maps), low=REGRET, unit="%"),
         Criterion("RAPF: the same", bootstrap(ours, "mean", maps), high=REGRET, unit="%"),
     )
-    best = [potential_text(grid.gains[grid.best()]) for grid in (rapf, rpf)]
+    best = [laws.potential_text(grid.gains[grid.best()]) for grid in (rapf, rpf)]
     explanation = (
         f"Both sets are judged from a start that neither was chosen on. Highest excess: RPF "
         f"{amount(theirs.max(), '%')}, RAPF {amount(ours.max(), '%')}. Best over all maps: RAPF {best[0]}, "
@@ -432,7 +411,8 @@ def lloyd_stuck(outcomes: Outcomes) -> Claim:
     if not fine.scenarios:
         return head
     count = fine.of("lloyd", "stuck")
-    criteria = [Criterion("runs of LA that end with a robot stuck", share_of(count > 0, fine), 0.5, unit="%")]
+    stuck = share(count > 0, fine.maps)
+    criteria = [Criterion("runs of LA that end with a robot stuck", stuck, 0.5, unit="%")]
     near = fine.measured("gap", "lloyd")
     if near.scenarios:
         gap = bootstrap(near.of("lloyd", "gap"), clusters=near.maps)
@@ -551,11 +531,10 @@ def _other_gains(outcomes: Outcomes) -> str:
 
 def _variation_by_start(outcomes: Outcomes, law: str) -> tuple[Array, list[str]]:
     """Return the variation of the final cost over several starts, (k,), and the map of each value."""
-    groups: dict[tuple[str, int], list[float]] = {}
-    for (name, _, seed), final in zip(outcomes.scenarios, outcomes.of(law, "final"), strict=True):
-        groups.setdefault((name, seed), []).append(final)
-    several = {key: finals for key, finals in groups.items() if len(finals) > 1}
-    return np.array([spread(finals) for finals in several.values()]), [name for name, _ in several]
+    finals = zip(outcomes.scenarios, outcomes.of(law, "final"), strict=True)
+    groups = parted(finals, lambda pair: (pair[0].map, pair[0].seed))
+    several = {name: [final for _, final in pairs] for name, pairs in groups.items() if len(pairs) > 1}
+    return np.array([spread(own) for own in several.values()]), [name for name, _ in several]
 
 
 def same_scenarios(rapf: GainOutcomes, rpf: GainOutcomes) -> tuple[GainOutcomes, GainOutcomes]:
@@ -598,8 +577,8 @@ def beyond_claims(results: BeyondResults) -> tuple[Claim, ...]:
 
 def _first_criteria(fine: Outcomes, key: str) -> tuple[Criterion, Criterion, Criterion]:
     gap = bootstrap(fine.of(key, "gap"), clusters=fine.maps)
-    touched = share_of(fine.of(key, "contacts") > 0, fine)
-    rest = share_of(np.isfinite(fine.of(key, "settled")), fine)
+    touched = share(fine.of(key, "contacts") > 0, fine.maps)
+    rest = share(np.isfinite(fine.of(key, "settled")), fine.maps)
     return (
         Criterion("median of J/J_ref - 1", gap, high=LEAST_GAP, unit="%"),
         Criterion("runs with a contact", touched, high=RARELY, unit="%"),
@@ -633,7 +612,7 @@ def goals(
         criterion = Criterion("highest median of a map", worst, high=MAP_GAP, unit="%")
         add("every-map", text, criterion, _highest_text(fine.median_by_map(key), MAP_GAP))
 
-        for other in strongest(contenders):
+        for other in laws.strongest(contenders):
             if (pairs := outcomes.compared(key, other.key)) is not None:
                 above = amount(NEVER_WORSE - 1.0, "%")
                 text = f"On no map {label}'s median is more than {above} above that of {other.label}."
@@ -734,12 +713,12 @@ def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
     if not fine.scenarios:
         return None
     criteria = [*_first_criteria(fine, key)]
-    for other in strongest(contenders):
+    for other in laws.strongest(contenders):
         if (pairs := outcomes.compared(key, other.key)) is not None:
             text = f"median of J({label}) / J({other.label}) at the end"
             criteria.append(Criterion(text, pairs.ratio, high=1.0))
     medians = fine.median_by_map(key)
-    worst = max(medians, key=lambda name: medians[name])
+    worst = max(medians, key=medians.__getitem__)
     explanation = (
         f"{len(medians)} generated maps, {len(fine.scenarios)} runs of {label}. Highest median of a map: "
         f"{amount(medians[worst], '%')}, on {worst}."
@@ -749,7 +728,7 @@ def unseen_claim(outcomes: Outcomes, ours: Contender, contenders: Sequence[Conte
 
 
 def rival_claims(outcomes: Outcomes, ours: Contender, contenders: Sequence[Contender]) -> list[Claim]:
-    papers = strongest(contenders)
+    papers = laws.strongest(contenders)
     found = [gap_closed(outcomes, ours, papers[0])] if papers else []
     others = [each for each in contenders if each.controller not in (*PAPER, *OURS)]
     for other in (*papers, *others):

@@ -339,9 +339,9 @@ def gap_samples(results: BeyondResults) -> list[Sample]:
 def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
     """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
     rpf, rapf = gains["rpf"].complete, gains["rapf"].complete
-    attractions = _levels(rapf, "k_att")
-    panels = [("RPF", rpf), *((f"RAPF, k_att = {k:g}", rapf.with_gain("k_att", k)) for k in attractions)]
-    first, second = _levels(rpf, "k_rep"), _levels(rpf, "rho_0")
+    attracted = ((f"RAPF, k_att = {k:g}", rapf.with_gain("k_att", k)) for k in rapf.levels("k_att"))
+    panels = [("RPF", rpf), *attracted]
+    first, second = rpf.levels("k_rep"), rpf.levels("rho_0")
     columns = 3 if len(panels) > 4 else 2
     rows = -(-len(panels) // columns)
     left, right, above, below = 44 * DOTS, 10 * DOTS, 52 * DOTS, 44 * DOTS
@@ -481,7 +481,3 @@ def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> C
     there = [row for row in rows if row[1]]
     label = "J/J_ref at the end (1: the centralised reference)"
     return partial(plot_final_costs, there, label, WIDE, DOTS, theme, origin=1.0) if there else None
-
-
-def _levels(grid: GainOutcomes, name: str) -> list[float]:
-    return sorted({float(each[name] or 0.0) for each in grid.gains})

@@ -177,6 +177,10 @@ class GainOutcomes:
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 
+    def levels(self, gain: str) -> list[float]:
+        """Return the different values of a gain, ascending."""
+        return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
+
     def with_gain(self, name: str, value: float) -> GainOutcomes:
         """Return the part of the grid in which one gain has this value."""
         chosen = [gains.get(name) == value for gains in self.gains]
