@@ -186,20 +186,7 @@ NEAR_OPTIMUM, FAR_FROM_OPTIMUM = 0.1, 0.25
 
 CLUSTERED = CONVEX_KINDS[:-1]  # starts in convex regions in which the robots are close together
 
-GOALS, RIVALS, EXTENSIONS = 7, 8, 9
-
-# the questions that the claims belong to; from 7 on they are beyond the paper
-QUESTIONS = {
-    1: "In convex regions: does RAPF do as well as Lloyd's algorithm, and spread faster?",
-    2: "In non-convex environments: is RAPF better than RPF?",
-    3: "Does RAPF's result depend on the gains?",
-    4: "Does RAPF's result depend on the starts?",
-    5: "Lloyd's algorithm in non-convex environments: how often are robots stuck?",
-    6: "How far are they from what a team could reach that knew the map?",
-    GOALS: "Does our own controller reach its goals?",
-    RIVALS: "Is it better than its rivals?",
-    EXTENSIONS: "What the paper leaves to others: what difference does it make?",
-}
+GOALS, RIVALS, EXTENSIONS = 7, 8, 9  # questions beyond the paper; its own are 1 to 6
 
 
 def paper_claims(

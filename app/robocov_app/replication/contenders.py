@@ -133,19 +133,16 @@ def distinct_gains(contenders: Sequence[Contender]) -> dict[str, list[dict[str, 
     found: dict[str, list[dict[str, Value]]] = {}
     for each in contenders:
         sets = found.setdefault(each.controller, [])
-        if each.all_gains not in sets:
-            sets.append(each.all_gains)
+        sets += [each.all_gains] * (each.all_gains not in sets)
     return found
 
 
 def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
     """Return gains of the potential, numbers all: "(k_rep 1, rho_0 2)"; `no_limit`: unlimited attraction."""
-    parts = []
-    for name, value in gains.items():
-        if isinstance(value, str) or name == "height":
-            continue
-        if value is not None:
-            parts.append(f"{name} {value_text(value)}")
-        elif no_limit:
-            parts.append(no_limit if name == "attraction_limit" else f"{name} none")
+    known = {name: each for name, each in gains.items() if not isinstance(each, str) and name != "height"}
+    parts = [
+        no_limit if each is None and name == "attraction_limit" else f"{name} {value_text(each)}"
+        for name, each in known.items()
+        if each is not None or no_limit
+    ]
     return f"({', '.join(parts)})"

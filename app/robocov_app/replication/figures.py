@@ -3,6 +3,7 @@
 Starts are green, final positions blue, trajectories red; RAPF's cost is blue, RPF's red, as in the paper.
 """
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -35,7 +36,7 @@ from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication.claims import CLUSTERED, amount
 from robocov_app.replication.contenders import LABELS, OURS, OWN, TARGETS, TEAMS
-from robocov_app.replication.evidence import ranked_rows
+from robocov_app.replication.evidence import ASSETS, ranked_rows
 from robocov_app.replication.outcomes import (
     FIRST_MINUTE,
     Comparison,
@@ -52,20 +53,8 @@ WIDE, NARROW = 2148, 1050  # pixels of two columns of a journal (7.16 inches) an
 HIDDEN = 0.25  # m from its centroid within which a robot's disc hides it, on a map of ten metres
 ARRIVED = 0.05  # a cost has arrived when it stays within 5 % of its last value
 
-# the paper's figures, in its order: the case of each, and what is to be seen
-FIGURES = {
-    1: (
-        "partition",
-        "A Voronoi partition of a convex region: robots in blue, the centres of mass of their cells as dots.",
-    ),
-    2: ("convex", "A convex region without obstacles: (a) RAPF, (b) LA."),
-    3: ("convex", "The cost of both against time."),
-    4: ("a", "A first non-convex environment: (a) RAPF, (b) RPF, from the same starts."),
-    5: ("a", "The cost of both against time."),
-    6: ("b", "A second non-convex environment, the same starts as in figure 4: (a) RAPF, (b) RPF."),
-    7: ("b", "The cost of both against time."),
-    8: ("other", "The second environment again, from other starts: (a) RAPF, (b) RPF."),
-}
+# the paper's figures, in its order, and the case that each shows
+FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 COSTS = (3, 5, 7)  # figures of the cost against time; all but the first of the others show trajectories
 
 
@@ -204,7 +193,7 @@ def arrival(history: CostHistory) -> float:
 
 
 def _pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
-    case, _ = FIGURES[number]
+    case = FIGURES[number]
     return runs[f"{case}/rapf"], runs[f"{case}/{'lloyd' if case == 'convex' else 'rpf'}"]
 
 
@@ -218,30 +207,8 @@ def _difference_text(mine: float, theirs: float) -> str:
 # how every plot is drawn, by its name; those without a run are left out
 Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
 
-# what is said of the plots
-WORDS = {
-    "claim-1-convex": "RAPF against LA in convex regions: every pair of runs, the median and its interval.",
-    "claim-2-nonconvex": "RAPF against RPF and LA on non-convex maps: every pair of runs, the median and its "
-    "interval. Left of 1 RAPF is better.",
-    "claim-3-gains": "How far the final cost is above the reference for every set of gains, in percent: the "
-    "mean over the maps of the tuning. The best set of each panel is bold.",
-    "claim-4-starts": "The final cost from each kind of starts, by the reference.",
-    "claim-6-gap": "The final cost of every law on the non-convex maps, by the reference.",
-    "beyond-gaps": "How far every contender ends above the centralised reference: every run, quartiles and "
-    "median. The axis is one of square roots, so that what is near the reference can be told apart.",
-    "beyond-pairs": "Our controller's final cost by that of every other contender in the same run: every "
-    "pair, the median and its interval. Left of 1 ours is better.",
-    "beyond-heights": "Where a sensor that hovers at height h is best placed over a cell: what (14) says, "
-    "and the text after it denies. The path from the optimum near the ground to the centroid.",
-    "beyond-targets": "RAPF's final cost with another target by that with the centroid, pair by pair.",
-    "beyond-density": "Two runs from the same places, where the shading says how much each place counts: "
-    "RAPF that knows it, and RAPF that does not. Crosses are where they head: the centroids of the cells, "
-    "weighed and not.",
-    "beyond-teams": "The mean time until the first robot is at a place, of robots that are not equally fast: "
-    "with cells by time, by that with cells by distance, pair by pair.",
-    "beyond-conditions": "The final cost where messages get lost or are late, where robots hear less far, "
-    "sense badly or fail, by that of the same run under ideal conditions: medians with 95 % intervals.",
-}
+# what is said of the figures, by their names
+CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
 
 # what the axes of disturbances are called
 AXES = {

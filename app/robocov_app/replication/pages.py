@@ -79,11 +79,8 @@ def save_paper_figures(
         }
         return own if results is None else {**own, **figures.paper_plots(results, theme)}
 
-    words = {
-        f"figure-{number}": f"{shows} {figures.describe_figure(number, runs, first)}"
-        for number, (_, shows) in figures.FIGURES.items()
-    }
-    return _save_figures(folder, drawn, words, quiet=quiet)
+    seen = {f"figure-{number}": figures.describe_figure(number, runs, first) for number in figures.FIGURES}
+    return _save_figures(folder, drawn, seen, quiet=quiet)
 
 
 def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, Image]:
@@ -91,7 +88,7 @@ def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) ->
 
 
 def _save_figures(
-    folder: Path, drawn: Callable[[str], figures.Plots], words: Mapping[str, str], *, quiet: bool
+    folder: Path, drawn: Callable[[str], figures.Plots], seen: Mapping[str, str], *, quiet: bool
 ) -> dict[str, Image]:
     target = folder / "figures"
     with for_results(target):
@@ -105,7 +102,8 @@ def _save_figures(
                 save_figure(figure, target / f"{name}.{suffix}")
             save_figure(dark[name](), target / f"{name}-dark.png")
             size = round(figure.bbox.width), round(figure.bbox.height)
-            found[name] = Image(name, *size, words.get(name) or figures.WORDS[name])
+            words = f"{figures.CAPTIONS[name]} {seen.get(name, '')}".rstrip()
+            found[name] = Image(name, *size, words)
             update(number)
     return found
 
@@ -132,8 +130,8 @@ def paper_page(
         "beyond": beyond,
         "images": images,
         "figures": [
-            (number, shows, images[f"figure-{number}"], figures.describe_figure(number, runs, first))
-            for number, (_, shows) in figures.FIGURES.items()
+            (number, figures.CAPTIONS[name], images[name], figures.describe_figure(number, runs, first))
+            for number, name in ((number, f"figure-{number}") for number in figures.FIGURES)
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
         "replay_script": Markup(script(f"{replay_js()}startReplays();")),

@@ -39,12 +39,11 @@ class StepTimes:
     seconds: Mapping[str, tuple[float, ...]]
 
     def ratio_interval(self, controller: str) -> Interval:
-        """Return the median time by RAPF's in the same turn, with its bootstrap interval over the blocks."""
+        """Return the median time by RAPF's in the same turn."""
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
     def interval(self, controller: str) -> Interval:
-        """Return the median time of a step, s, with its bootstrap interval over the blocks."""
         own = self.seconds.get(controller)
         return bootstrap(own) if own else UNKNOWN
 

@@ -1,19 +1,19 @@
 """The sweeps of the study, each with its folder's name.
 
-1. ``figures-…``: the runs that figures 2 to 8 show;
-2. ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
-3. ``convex``: RAPF and LA in convex regions;
-4. ``claims``: the paper's contenders on non-convex maps, none of which was used in 2.
+- ``figures-…``: the runs that figures 2 to 8 show;
+- ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
+- ``convex``: RAPF and LA in convex regions;
+- ``claims``: the paper's contenders on non-convex maps, none of which was used for ``gains``.
 
 Beyond the paper:
 
-5. ``rival-gains``: grids of the baselines' gains, on maps of their own;
-6. ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
-7. ``unseen``: ours on maps that played no part in its development;
-8. ``targets``: RAPF heading for another optimum of its cell than the centroid;
-9. ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
-10. ``teams``: robots of different speeds, with cells by distance and by time;
-11. ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
+- ``rival-gains``: grids of the baselines' gains, on maps of their own;
+- ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
+- ``unseen``: ours on maps that played no part in its development;
+- ``targets``: RAPF heading for another optimum of its cell than the centroid;
+- ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
+- ``teams``: robots of different speeds, with cells by distance and by time;
+- ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -103,13 +103,12 @@ def convex_region(seed: int) -> StudyMap:
     those narrower than 5 m, are drawn again. Coordinates are whole centimetres.
     """
     rng = np.random.default_rng([seed, 1])
-    while True:
+    area = width = 0.0
+    while area < _LEAST_AREA or width < _LEAST_WIDTH:
         points = np.round(rng.uniform(0.0, SIDE, size=(_POINTS, 2)), 2)
         hull = shapely.convex_hull(shapely.MultiPoint(points))
         corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
-        width = np.hypot(*np.diff(corners[:3], axis=0).T).min()
-        if hull.area >= _LEAST_AREA and width >= _LEAST_WIDTH:
-            break
+        area, width = hull.area, np.hypot(*np.diff(corners[:3], axis=0).T).min()
     ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
     boundary = tuple((float(x), float(y)) for x, y in ring)
     region = Environment(f"convex-{seed}", boundary, description="A convex region drawn by chance.")
@@ -119,9 +118,8 @@ def convex_region(seed: int) -> StudyMap:
 def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
     """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
     start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
-
-    at = [(round(float(x), 2), round(float(y), 2)) for x, y in start.sample(HOT_SPOTS, seed=seed, radius=0.3)]
-    peaks = tuple(Gaussian(place, weight=20.0, sigma=1.0) for place in at)
+    places = start.sample(HOT_SPOTS, seed=seed, radius=0.3).tolist()
+    peaks = tuple(Gaussian((round(x, 2), round(y, 2)), weight=20.0, sigma=1.0) for x, y in places)
     return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
 
 
@@ -195,11 +193,9 @@ def figure_studies(plan: Plan) -> dict[str, Study]:
 
 def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
     """Return the grids of gains: the same potential for both, RAPF with every attraction beside it."""
-    potential = laws.grid(k_rep=plan.k_rep, rho_0=plan.rho_0)
-    attracted: list[dict[str, Value]] = [
-        {**both, "k_att": k_att, "attraction_limit": None} for k_att in plan.k_att for both in potential
-    ]
-    return {"rapf": attracted, "rpf": [dict(both) for both in potential]}
+    potential = [*laws.grid(k_rep=plan.k_rep, rho_0=plan.rho_0)]
+    attractions = laws.grid(k_att=plan.k_att, attraction_limit=(None,))
+    return {"rapf": [both | each for each in attractions for both in potential], "rpf": potential}
 
 
 def gains_study(plan: Plan) -> Study:

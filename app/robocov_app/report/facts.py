@@ -81,9 +81,8 @@ def meanings(result: Result) -> list[tuple[str, str]]:
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
     words = {name: density_label(environment) for name, environment in result.maps.items()}
-    if len(words) == 1:
-        return "".join(words.values())
-    return "; ".join(f"{name}: {each}" for name, each in words.items() if each)
+    several = [each if len(words) == 1 else f"{name}: {each}" for name, each in words.items() if each]
+    return "; ".join(several)
 
 
 def gaps(result: Result) -> list[str]:

@@ -28,7 +28,7 @@ from robocov_app.replication import plan as planned
 from robocov_app.replication.claims import amount
 from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
-from robocov_app.replication.figures import WORDS, arrival, beyond_plots, describe_figure, gap_samples
+from robocov_app.replication.figures import CAPTIONS, arrival, beyond_plots, describe_figure, gap_samples
 from robocov_app.replication.pages import Image
 from robocov_app.replication.results import Interrupted, forecast, open_folder
 from robocov_app.sweep.study import Study, tasks_of
@@ -65,7 +65,7 @@ def study(tmp_path_factory):
     return folder, paper, beyond, pickle.loads(kept.read_bytes())
 
 
-DRAWN = {name: Image(name, 2148, 900, words) for name, words in WORDS.items() if name.startswith("beyond")}
+DRAWN = {name: Image(name, 2148, 900, words) for name, words in CAPTIONS.items() if name.startswith("beyond")}
 
 
 @pytest.fixture(scope="module")
