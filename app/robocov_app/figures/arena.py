@@ -71,13 +71,9 @@ def draw_map(
 
 
 def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
-    shape = Polygon(
-        np.asarray(obstacle.polygon.exterior.coords),
-        facecolor=tone(theme.moving_obstacle) if not obstacle.polygon.interiors else "none",
-        edgecolor=tone(theme.obstacle_edge),
-        linewidth=1.4,
-        zorder=2.1,
-    )
+    ring, hollow = np.asarray(obstacle.polygon.exterior.coords), bool(obstacle.polygon.interiors)
+    fill: Any = {"facecolor": "none" if hollow else tone(theme.moving_obstacle)}
+    shape = Polygon(ring, edgecolor=tone(theme.obstacle_edge), linewidth=1.4, zorder=2.1, **fill)
     axes.add_patch(shape)
     shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
     axes.plot(*obstacle.path.T, zorder=2.2, **_path_style(theme))
@@ -114,9 +110,9 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
     axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
-    robots = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
+    own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = _failed(record)
-    robots = [wreck_colour(theme) if failed[robot] else robots[robot] for robot in there.tolist()]
+    robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
         facing = {
@@ -148,18 +144,11 @@ def draw_robots(
     true = radius * float(unit[1, 0] - unit[0, 0])
     # readable where there is room, in a crowd down to true size
     drawn: list[float] = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC).tolist()
-    axes.scatter(
-        places[:, 0],
-        places[:, 1],
-        s=[(2 * r) ** 2 for r in drawn],
-        c=[tone(fill) for fill in fills],
-        edgecolors=tone(theme.robot_ring),
-        linewidths=[min(1.1, 0.25 * r) for r in drawn],
-        zorder=7,
-        clip_on=False,
-    )
+    style: Any = {"c": [tone(fill) for fill in fills], "edgecolors": tone(theme.robot_ring)}
+    style |= {"s": [(2 * r) ** 2 for r in drawn], "linewidths": [min(1.1, 0.25 * r) for r in drawn]}
+    axes.scatter(*places.T, zorder=7, clip_on=False, **style)
     numbers = range(1, len(places) + 1) if numbers is None else numbers
-    style: Any = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
+    style = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
     for robot, (x, y), r, fill in zip(numbers, places.tolist(), drawn, fills, strict=True):
         size = r * (1.25, 1.1, 0.85, 0.65)[min(len(str(robot)), 4) - 1]
         if size >= _SMALLEST_NUMBER:
@@ -183,10 +172,8 @@ def _draw_noses(
 
 
 def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
-    if paper:
-        return [theme.trajectory] * n
-    if n > ONE_HUE_EACH:
-        return [mix(theme.trajectory, theme.background, 0.25)] * n
+    if paper or n > ONE_HUE_EACH:
+        return [theme.trajectory if paper else mix(theme.trajectory, theme.background, 0.25)] * n
     return [theme.trail(hue) for hue in hues]
 
 
@@ -202,25 +189,16 @@ def has_goals(record: Record) -> bool:
 
 
 def _start_style(theme: Theme, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": size,
-        "markerfacecolor": "none",
-        "markeredgecolor": tone(theme.start),
-        "markeredgewidth": min(1.5, 0.25 * size),
-    }
+    style = {"linestyle": "none", "marker": "o", "markersize": size, "markerfacecolor": "none"}
+    return style | {"markeredgecolor": tone(theme.start), "markeredgewidth": min(1.5, 0.25 * size)}
 
 
 def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "label": CENTROID if plus else GOAL,
-        "marker": "+" if plus else "x",
-        "markersize": size if plus else 0.8 * size,
-        "markeredgecolor": tone(theme.ink if plus else theme.final),
-        "markeredgewidth": min(1.2 if plus else 1.6, 0.2 * size),
-    }
+    if plus:
+        style = {"label": CENTROID, "marker": "+", "markersize": size, "markeredgecolor": tone(theme.ink)}
+        return style | {"linestyle": "none", "markeredgewidth": min(1.2, 0.2 * size)}
+    style = {"label": GOAL, "marker": "x", "markersize": 0.8 * size, "markeredgecolor": tone(theme.final)}
+    return style | {"linestyle": "none", "markeredgewidth": min(1.6, 0.2 * size)}
 
 
 def label_of(handle: Artist) -> str:

@@ -65,10 +65,8 @@ def draw_curves(
             dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])
         axes.plot(time, values, color=colour, linewidth=width, linestyle=dashes, dash_capstyle="butt")
         last = int(np.nonzero(np.isfinite(values))[0][-1])
-        size = weight * (6.5 + 2.0 * above)
-        axes.plot(
-            time[last], values[last], style.mark, color=colour, markersize=size, clip_on=False, zorder=5
-        )
+        end: Any = {"markersize": weight * (6.5 + 2.0 * above), "clip_on": False, "zorder": 5}
+        axes.plot(time[last], values[last], style.mark, color=colour, **end)
         ends.append((float(time[last]), float(values[last]), colour, end_label(curve, unit)))
     _draw_end_labels(axes, ends)
 

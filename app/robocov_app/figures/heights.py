@@ -72,11 +72,8 @@ def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
         page.axes((begin + part * room, top, share * room, tall))
         for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
     )
-    for part, words in (
-        (0.0, "the cell (m)"),
-        (0.37, "the frame in it (m)"),
-        (0.68, "from the optimum to the centroid (mm)"),
-    ):
+    heads = "the cell (m)", "the frame in it (m)", "from the optimum to the centroid (mm)"
+    for part, words in zip((0.0, 0.37, 0.68), heads, strict=True):
         page.text(words, begin + part * room, top - 16 * scale)
     window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
     _draw_cell(left, cell, window, theme)
@@ -163,13 +160,10 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     line, highest = tone(theme.final), 1e3 * path[0].from_centroid
     inner = path[1:-1]
     axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
-    styles: tuple[Any, Any] = (
-        {"linewidth": 2.4},
-        {"marker": "o", "linestyle": "none", "markersize": 5.5, "markeredgewidth": 0.0},
-    )
-    for rows, style in zip((inner, marked[1:-1]), styles, strict=True):
+    style: Any = {"marker": "o", "linestyle": "none", "markersize": 5.5, "markeredgewidth": 0.0}
+    for rows, look in ((inner, {"linewidth": 2.4}), (marked[1:-1], style)):
         millimetres = [1e3 * row.from_centroid for row in rows]
-        axes.plot([row.height for row in rows], millimetres, color=line, **style)
+        axes.plot([row.height for row in rows], millimetres, color=line, **look)
     axes.set_xscale("log")
     axes.set_xlim(inner[0].height, inner[-1].height)
     axes.set_ylim(0.0, 1.12 * highest)
@@ -179,14 +173,10 @@ def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeig
     axes.minorticks_off()
     worst = max(inner, key=lambda row: row.missed)
     style = {"fontsize": SMALL, "color": tone(theme.ink), "ha": "left", "va": "bottom"}
-    axes.annotate(
-        f"A sensor over the centroid misses\nat most {100.0 * worst.missed:.2g} % of what it could\n"
-        f"tell, at h = {worst.height:.2g} m.",
-        (0.04, 0.07),
-        xycoords="axes fraction",
-        bbox={"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0},
-        **style,
-    )
+    style |= {"bbox": {"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0}}
+    words = f"A sensor over the centroid misses\nat most {100.0 * worst.missed:.2g} % of what it could\n"
+    words += f"tell, at h = {worst.height:.2g} m."
+    axes.annotate(words, (0.04, 0.07), xycoords="axes fraction", **style)
 
 
 def _plain(axes: Axes, theme: Theme) -> None:

@@ -18,8 +18,6 @@ from robocov_app.render.theme import Colour, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
-# which part of a legend is where it is put
-Place: TypeAlias = Literal["upper left", "upper center", "center right"]
 
 
 def tone(colour: Colour) -> tuple[float, float, float]:
@@ -126,8 +124,7 @@ class Page:
     def map_axes(self, box: Box, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
         """Return axes without ticks that show a part of the world, m, in a box of its shape."""
         axes = self.axes(box)
-        axes.set_xlim(low_x, high_x)
-        axes.set_ylim(low_y, high_y)
+        axes.set(xlim=(low_x, high_x), ylim=(low_y, high_y))
         axes.set_axis_off()
         return axes
 
@@ -225,12 +222,8 @@ class Page:
         """Draw a bar of a round length; return where its words end."""
         length = round_length(self._longest_bar / zoom)
         tick, right = 4 * self.scale, left + length * zoom
-        for (x1, y1), (x2, y2) in (
-            ((left, y), (right, y)),
-            ((left, y - tick), (left, y + tick)),
-            ((right, y - tick), (right, y + tick)),
-        ):
-            (a, b), (c, d) = self.at(x1, y1), self.at(x2, y2)
+        for x1, x2, half in ((left, right, 0.0), (left, left, tick), (right, right, tick)):
+            (a, b), (c, d) = self.at(x1, y - half), self.at(x2, y + half)
             self.figure.add_artist(Line2D([a, c], [b, d], color=tone(self.theme.ink), linewidth=1.3))
         words = right + 8 * self.scale
         self.text(length_label(length), words, y, points=SMALL, bold=True)
@@ -247,20 +240,14 @@ class Page:
                 break
         return columns, float(extent.width), float(extent.height)
 
-    def _legend(
-        self, handles: Sequence[Artist], columns: int, place: Place, at: tuple[float, float]
-    ) -> Legend:
-        return self.figure.legend(
-            handles=list(handles),
-            loc=place,
-            bbox_to_anchor=self.at(*at),
-            ncols=columns,
-            frameon=False,
-            fontsize=SMALL,
-            labelcolor=tone(self.theme.ink),
-            borderaxespad=0.0,
-            borderpad=0.0,
-            columnspacing=1.6,
-            handletextpad=0.6,
-            handlelength=1.6,
-        )
+    def _legend(self, handles: Sequence[Artist], columns: int, place: str, at: tuple[float, float]) -> Legend:
+        """Draw a legend of which the `place`, as in "upper left", is `at` a pixel."""
+        style: Any = {
+            "frameon": False,
+            "fontsize": SMALL,
+            "labelcolor": tone(self.theme.ink),
+            "borderpad": 0.0,
+        }
+        style |= {"borderaxespad": 0.0, "columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
+        where: Any = {"loc": place, "bbox_to_anchor": self.at(*at)}
+        return self.figure.legend(handles=list(handles), ncols=columns, **where, **style)

@@ -68,12 +68,12 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
 
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
     if number == 1:
-        places = first.positions[0]
-        away = np.hypot(*(partition(places, first.environment.region).centroid - places).T)
-        return (
-            f"The robots stand anywhere in “{first.environment.name}”, on average "
-            f"{amount(float(away.mean()), 'm')} from the centres of mass of their cells."
+        places, environment = first.positions[0], first.environment
+        away = amount(
+            float(np.hypot(*(partition(places, environment.region).centroid - places).T).mean()), "m"
         )
+        where = f"The robots stand anywhere in “{environment.name}”, on average {away}"
+        return f"{where} from the centres of mass of their cells."
     ours, other = pair = _pair(runs, number)
     label, costs = other.record.label, [run.history.mean_distance for run in pair]
     if number in COSTS:
@@ -125,12 +125,9 @@ def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
 
 
 def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
-    hidden = all(
-        (np.hypot(*(run.record.goals[-1] - run.record.positions[-1]).T) < HIDDEN).all()
-        for run in runs
-        if arena.has_goals(run.record)
-    )
     records = [run.record for run in runs]
+    aiming = [record for record in records if arena.has_goals(record)]
+    hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
     finals = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in runs]
     unnamed = (CENTROID, GOAL) if hidden else ()
     return side_by_side(records, [each.label for each in records], finals, theme, unnamed)
@@ -231,19 +228,15 @@ def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
     for start in CLUSTERED:
         pairs = convex.from_starts(start).compared("rapf-shared", "lloyd", "early")
         against_lloyd.append((f"first 20 s, start {start}", pairs, "rapf"))
-    nonconvex = [
-        (
-            f"{label}, {when}, {gains} gains",
-            claims.compared(f"rapf-{gains}", other.format(gains), measure),
-            "rapf",
-        )
-        for label, other, measure, when in (
-            ("RPF", "rpf-{}", "final", "at the end"),
-            ("RPF", "rpf-{}", "first_minute", "first 60 s"),
-            ("LA", "lloyd", "final", "at the end"),
-        )
-        for gains in ("shared", "best")
-    ]
+    nonconvex = []
+    for label, other, measure, when in (
+        ("RPF", "rpf-{}", "final", "at the end"),
+        ("RPF", "rpf-{}", "first_minute", "first 60 s"),
+        ("LA", "lloyd", "final", "at the end"),
+    ):
+        for gains in ("shared", "best"):
+            pairs = claims.compared(f"rapf-{gains}", other.format(gains), measure)
+            nonconvex.append((f"{label}, {when}, {gains} gains", pairs, "rapf"))
     kinds = list(dict.fromkeys(claims.starts))
     by_start = [
         (LABELS[law], _samples((f"start {start}", claims.from_starts(start), law) for start in kinds))
@@ -295,11 +288,10 @@ def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
 
 def gap_samples(results: BeyondResults) -> list[Sample]:
     """Return the gap of every run of every contender in percent, the least median first."""
-    found = []
-    for law in (row.contender for row in ranked_rows(results)):
-        gap = results.outcomes.of(law.key, "gap")
-        found.append(Sample(law.label, style_of(law.controller), 100.0 * gap[np.isfinite(gap)]))
-    return found
+    ranked = [row.contender for row in ranked_rows(results)]
+    gaps = [100.0 * results.outcomes.measured("gap", law.key).of(law.key, "gap") for law in ranked]
+    each = zip(ranked, gaps, strict=True)
+    return [Sample(law.label, style_of(law.controller), gap) for law, gap in each]
 
 
 @plain_style()
@@ -336,13 +328,11 @@ def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
     values = np.concatenate([sample.values for sample in samples])
     low, high = min(float(values.min()), 0.0), float(values.max())
 
-    def root(places: Array) -> Array:
-        return np.asarray(np.sign(places) * np.sqrt(np.abs(places)))
+    def power(places: Array, exponent: float) -> Array:
+        return np.asarray(np.sign(places) * np.abs(places) ** exponent)
 
-    def square(places: Array) -> Array:
-        return np.asarray(np.sign(places) * np.square(places))
-
-    axes.set_xscale("function", functions=(root, square))
+    functions = partial(power, exponent=0.5), partial(power, exponent=2.0)
+    axes.set_xscale("function", functions=functions)
     # a little room to the left of what lies below the reference
     axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
     axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= high]))

@@ -6,6 +6,7 @@ import subprocess
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -71,16 +72,11 @@ def find_references(
     """Return the reference of every map by its name, kept in `folder` or searched for until `stop`."""
     with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    found: dict[str, Reference] = {}
-    missing: dict[str, Question] = {}
-    for each in maps:
-        shape = to_json(each.environment), ROBOTS, TEAM["radius"]
-        question = Question(*shape, plan.lattice, plan.restarts)
-        kept = _kept(folder / f"{each.name}.json", question)
-        if kept is None:
-            missing[each.name] = question
-        else:
-            found[each.name] = kept
+    how = ROBOTS, TEAM["radius"], plan.lattice, plan.restarts
+    wanted = {each.name: Question(to_json(each.environment), *how) for each in maps}
+    kept = {name: _kept(folder / f"{name}.json", question) for name, question in wanted.items()}
+    found = {name: each for name, each in kept.items() if each is not None}
+    missing = {name: question for name, question in wanted.items() if name not in found}
     if missing:
         with progress("references", len(missing), quiet=quiet) as update:
             for number, (name, answer) in enumerate(searched(missing, workers, stop), start=1):
@@ -92,13 +88,11 @@ def find_references(
 
 def _kept(path: Path, question: Question) -> Reference | None:
     """Return the answer in a file, None where there is none to this question."""
-    try:
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
         if content["digest"] == question.digest:
             positions = tuple((float(x), float(y)) for x, y in content["positions_m"])
             return Reference(float(content["mean_distance_m"]), positions, float(content["agreement"]))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        pass
     return None
 
 

@@ -92,10 +92,8 @@ def gaps(result: Result) -> list[str]:
         total = Counter(entry.label for entry in result.entries)
         failed = Counter(entry.label for entry in result.failed)
         whose = ", ".join(f"{label} {count} of {total[label]}" for label, count in failed.most_common())
-        words.append(
-            f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): "
-            f"{_firsts([entry.error or '' for entry in result.failed])}"
-        )
+        why = _firsts([entry.error or "" for entry in result.failed])
+        words.append(f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): {why}")
     if result.damaged:
         reasons = [f"{each.folder} ({each.reason})" for each in result.damaged]
         be = "is" if len(reasons) == 1 else "are"
@@ -106,11 +104,11 @@ def gaps(result: Result) -> list[str]:
     return words
 
 
-def _firsts(texts: Sequence[str], most: int = 3) -> str:
-    """Return the first different texts as a sentence, and how many more there are."""
+def _firsts(texts: Sequence[str]) -> str:
+    """Return the first three different texts as a sentence, and how many more there are."""
     different = list(dict.fromkeys(texts))
-    more = f"; and {len(different) - most} more" if len(different) > most else ""
-    return f"{'; '.join(different[:most])}{more}."
+    more = f"; and {len(different) - 3} more" if len(different) > 3 else ""
+    return f"{'; '.join(different[:3])}{more}."
 
 
 def troubles(result: Result) -> list[str]:
