@@ -15,7 +15,7 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.results import Dependence, plot_gain_grid, plot_gains
 from robocov_app.figures.styles import curve_styles
 from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots

@@ -50,7 +50,6 @@ def _path_style(theme: Theme) -> dict[str, Any]:
 def draw_map(
     axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
 ) -> None:
-    """Draw density, obstacles at a time, s, what of the region is outside the boundary, and its outline."""
     if density and environment.density is not None and not environment.density.uniform:
         low_x, low_y, high_x, high_y = environment.region.bounds
         # limits stay as they are, which imshow would change
@@ -235,7 +234,6 @@ def _failed(record: Record) -> BoolArray:
 
 
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
-    """Return the legend's entries for what `draw_run` draws."""
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
     aims: list[Artist] = []

@@ -61,7 +61,6 @@ def value_limits(low: float, high: float, *, room: float = 0.08, origin: float =
 
 
 def even_ticks(axis: Any, most: int) -> None:
-    """Mark 1, 2, 5 times a power of ten on an axis, at most so many of them."""
     axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
     axis.set_major_formatter("{x:g}")
 
@@ -109,7 +108,6 @@ class Page:
 
     @property
     def room(self) -> float:
-        """Pixels between the margins."""
         return self.size[0] - 2 * self.margin
 
     def at(self, x: float, y: float) -> tuple[float, float]:

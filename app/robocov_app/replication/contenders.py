@@ -114,7 +114,6 @@ def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
 
 
 def paper_contenders(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
-    """Return the paper's contenders, where they are known also RAPF and RPF at their `best` gains."""
     if not best:
         return UNTUNED
     rapf, rpf = (of_paper(f"{name}-best", best[name]) for name in ("rapf", "rpf"))

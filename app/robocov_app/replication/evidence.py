@@ -151,7 +151,6 @@ def failure_text(outcomes: Outcomes, law: LawRow) -> str:
 
 
 def gains_text(controller: str, grid: GainOutcomes) -> str:
-    """Return in words which gains of a baseline are best, and how its defaults and the worst set compare."""
     grid = grid.complete
     if not grid.scenarios:
         return "Gains: its defaults; in every scenario of the tuning some run failed."

@@ -62,7 +62,6 @@ def save(path: Path, text: str) -> None:
 
 
 def save_claims(folder: Path, found: Sequence[Claim]) -> None:
-    """Write ``claims.json``: claims with verdict, estimate, interval, runs, ...; may raise OutputError."""
     text = json.dumps([finite(claim.to_json()) for claim in found], indent=1, ensure_ascii=False)
     save(folder / CLAIMS, text + "\n")
 

@@ -356,7 +356,6 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
 
 
 def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
-    """Return what was reached on the maps and from the kinds of starts that baselines have as well."""
     names = {each.name for each in studies.baseline_maps(plan)}
     starts = plan.beyond.starts
     return outcomes.where([each.map in names and each.start in starts for each in outcomes.scenarios])
@@ -390,7 +389,6 @@ def worst_runs(
 
 
 def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
-    """Compare runs under each disturbance with those without any, by axis, value and controller."""
     ideal = _finals(at / "conditions-ideal")
     found = []
     for axis, (best, *bad) in studies.axes_of_disturbances(plan).items():

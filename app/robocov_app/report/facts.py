@@ -86,7 +86,6 @@ def weighed_text(result: Result) -> str:
 
 
 def gaps(result: Result) -> list[str]:
-    """Return sentences on runs that failed, cannot be read, or are missing."""
     words = []
     if result.failed:
         total = Counter(entry.label for entry in result.entries)
@@ -112,7 +111,6 @@ def _firsts(texts: Sequence[str]) -> str:
 
 
 def troubles(result: Result) -> list[str]:
-    """Return sentences on what did not go well in runs: contacts, robots that got stuck, no rest."""
     fine = result.fine
     moving = [e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine]
     found = {

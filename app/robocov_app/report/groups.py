@@ -14,7 +14,7 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.report.results import Entry, Gains, Result
+from robocov_app.report.results import Entry, Gains, Result, Setting
 from robocov_app.sweep.study import parameter_text
 
 MOST_GROUPS = 8  # controllers with their gains up to which each is shown apart; of more, by controller
@@ -25,7 +25,6 @@ _DIRECT = 12  # letters that a gain and its value may take in a label
 
 T = TypeVar("T")
 K = TypeVar("K")
-Setting: TypeAlias = tuple[object, ...]
 Scales: TypeAlias = Mapping[Entry, float]  # what the costs of runs are divided by
 
 
@@ -39,7 +38,6 @@ class Group:
     entries: tuple[Entry, ...]
 
     def at(self, setting: Setting) -> Group:
-        """Return the part of the group in one setting."""
         return replace(self, entries=tuple(entry for entry in self.entries if entry.setting == setting))
 
 
@@ -110,10 +108,9 @@ def settings(result: Result) -> list[Setting]:
 def setting_label(result: Result, setting: Setting) -> str:
     """Return what tells a setting from the others of the result: at least its map."""
     name, robots, team = setting
-    parts = [str(name)]
+    parts = [name]
     if len({size for _, size, _ in settings(result)}) > 1:
         parts.append(f"{robots} robots")
-    assert isinstance(team, tuple)
     parts += [f"{each.replace('_', ' ')} {parameter_text(each, value)}" for each, value in team]
     return ", ".join(parts)
 
@@ -192,12 +189,10 @@ class Comparison:
 
     @property
     def label(self) -> str:
-        """Name of the ratio: first / second."""
         return f"{self.first.label} / {self.second.label}"
 
     @property
     def pairs(self) -> int:
-        """Number of pairs, on all maps."""
         return sum(len(each.a) for each in self.maps)
 
     def tally(self) -> str:
@@ -224,7 +219,6 @@ class Comparison:
 
 
 def ratio_text(ratio: Interval) -> str:
-    """Return a ratio with its interval, if it has one."""
     known = f" ({ratio.low:.3f} to {ratio.high:.3f})" if np.isfinite(ratio.low) else ""
     return f"{ratio.estimate:.3f}{known}"
 
@@ -237,7 +231,6 @@ def comparisons(groups: Sequence[Group]) -> list[Comparison]:
 
 
 def compared(first: Group, second: Group) -> Comparison | None:
-    """Return how two groups compare on the cases that both have, None where they have none."""
     a, b = (
         {entry.case: entry for entry in group.entries if np.isfinite(entry.final) and entry.final > 0.0}
         for group in (first, second)

@@ -82,7 +82,6 @@ def lives(record: Record) -> list[tuple[float, float | None]]:
 
 
 def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
-    """Return a picture of a map as an SVG element, with its facts as its text."""
     frame = Frame(environment, width, height)
     return _svg(frame, _map_shapes(environment, frame, 0.0), map_sentence(environment))
 

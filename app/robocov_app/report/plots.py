@@ -12,21 +12,13 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
-from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures import results as drawing
+from robocov_app.figures.curves import TIME
 from robocov_app.figures.metrics import share
-from robocov_app.figures.results import Band, Pairs, Sample, plot_cost_bands, plot_final_costs, plot_paired
-from robocov_app.figures.results import quartiles as quartiles_of
+from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import (
-    Comparison,
-    Group,
-    Scales,
-    ratio_text,
-    setting_label,
-    settings,
-    shown_groups,
-)
+from robocov_app.report.groups import Comparison, Group, Scales, ratio_text, setting_label
 from robocov_app.report.pictures import has_path
 from robocov_app.report.replay import ReplayRun
 from robocov_app.report.results import Entry, Result
@@ -54,7 +46,7 @@ class Plot(NamedTuple):
 
 def _parts(result: Result, key: str) -> Iterator[tuple[str, str, list[Group], bool]]:
     """Yield title, key and groups of several settings together, then of each where they are not many."""
-    groups, every = shown_groups(result), settings(result)
+    groups, every = grouped.shown_groups(result), grouped.settings(result)
     if len(every) > 1:
         yield TOGETHER, f"{key}-all", groups, True
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
@@ -84,7 +76,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
             if not rows:
                 continue
             bands.append(Band(group.label, looks[group.label], time, np.array(rows)))
-            low, middle, high = (row[np.isfinite(row)][-1] for row in quartiles_of(bands[-1].values))
+            low, middle, high = (row[np.isfinite(row)][-1] for row in drawing.quartiles(bands[-1].values))
             text = f"{group.label}: {middle:.3f} {unit}".rstrip()
             if len(rows) > 1:
                 text += f" at the end (median of {len(rows)} runs, quartiles {low:.3f} to {high:.3f})"
@@ -92,7 +84,7 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
         if bands:
             about = f"{what} against time, up to {time[-1]:.4g} s. {'; '.join(words)}."
             # the axis tells the unit: names have little room
-            yield _fitting(title, own, about, partial(plot_cost_bands, bands, label=what, unit=""))
+            yield _fitting(title, own, about, partial(drawing.plot_cost_bands, bands, label=what, unit=""))
 
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
@@ -109,7 +101,7 @@ def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
             continue
 
         def drawn(size: tuple[int, int], samples: list[Sample] = samples, what: str = what) -> Figure:
-            return plot_final_costs([("", samples)], what, size[0], 1.0)
+            return drawing.plot_final_costs([("", samples)], what, size[0], 1.0)
 
         words = []
         for label, _, found in samples:
@@ -139,7 +131,7 @@ def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> I
         else:
             rows.append(Pairs(f"{each.pairs} pairs", style, maps[0].a / maps[0].b, each.ratio))
         words = "; ".join(f"{row.label}: ratio {ratio_text(row.interval)}" for row in rows)
-        figure = plot_paired(rows, "ratio of final mean distances (log)", PANEL[0], 1.0)
+        figure = drawing.plot_paired(rows, "ratio of final mean distances (log)", PANEL[0], 1.0)
         yield Plot(each.label, inline_svg(figure, f"{key}-{k}", f"{each.label}, pair by pair. {words}."))
 
 
@@ -187,7 +179,7 @@ def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     ) -> Iterator[Plot]:
         rows = [parameter.dependence(group, scales, styles[group.controller]) for group in some]
         if rows := [row for row in rows if len(row.values)]:
-            figure = plot_gains(rows, parameter.title, PANEL, label, parameter.choices)
+            figure = drawing.plot_gains(rows, parameter.title, PANEL, label, parameter.choices)
             words = "; ".join(_levels_text(row, parameter) for row in rows)
             sentence = f"{label} against {parameter.title}. {words}."
             yield Plot(parameter.title, inline_svg(figure, key, sentence))
@@ -262,7 +254,7 @@ def _grid_plot(
         return None  # a sample of a range
     levels = [[gain.level(place) for place in own] for gain, own in zip(gains, (columns, rows), strict=True)]
     titles = gains[0].title, gains[1].title
-    figure = plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
+    figure = drawing.plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {names[0]} and {names[1]}"
     what = "final distance in m" if label == METRES else RELATIVE
@@ -276,27 +268,20 @@ MOST_ROBOTS = 60  # robots up to which they are
 _MEASURED = 30  # moments of a run, besides its first
 
 
-class _Panel(NamedTuple):
-    title: str
-    label: str
-    unit: str
-    of: Callable[[RunMetrics], Array]
-
-
 def _in_contact(gaps: Array) -> Array:
     """Return gaps in whole millimetres: what is below is the solver's slop, which has no sign."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 
-_PARTS = "parts of the team that hear each other"
-_PANELS = (
-    _Panel("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
-    _Panel("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
-    _Panel("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
-    _Panel("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
-    _Panel("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
-    _Panel("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
-    _Panel("Connectivity", _PARTS, "", lambda m: np.asarray(m.components, float)),
+# title, label, unit and values of each plot of a metric
+_PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
+    ("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
+    ("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
+    ("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
+    ("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
+    ("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
+    ("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
+    ("Connectivity", "parts of the team that hear each other", "", lambda m: np.asarray(m.components, float)),
 )
 
 
@@ -312,24 +297,24 @@ def measure_plots(
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):
         return []
-    labels = {entry: group.label for group in shown_groups(result) for entry in group.entries}
+    labels = {entry: group.label for group in grouped.shown_groups(result) for entry in group.entries}
     spans = [float(run.record.time[-1] - run.record.time[0]) for run in runs]
     measured = [
         run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)
         for run, seconds in zip(runs, spans, strict=True)
     ]
+    parting = any((metrics.components != metrics.components[0]).any() for metrics in measured)
     curves = [
-        (panel, [(metrics.time, panel.of(metrics)) for metrics in measured])
-        for panel in _PANELS
-        if panel.label != _PARTS or any((m.components != m.components[0]).any() for m in measured)
+        (title, label, unit, [(metrics.time, of(metrics)) for metrics in measured])
+        for title, label, unit, of in _PANELS
+        if parting or title != "Connectivity"
     ]
     histories = [run.history for run in runs]
     times = [(each.time, each.mean_time) for each in histories if each and each.mean_time is not None]
     if len(times) == len(runs):
-        what = "mean time until the first robot is there (s)"
-        curves.insert(0, (_Panel("Time to come", what, "s", lambda m: m.time), times))
+        curves.insert(0, ("Time to come", TIME, "s", times))
     plots = []
-    for (title, label, unit, _), found in curves:
+    for title, label, unit, found in curves:
         bands = [
             Band(labels[entry], looks[labels[entry]], time - time[0], np.where(known, values, np.nan)[None])
             for entry, (time, values) in zip(entries, found, strict=True)
@@ -337,7 +322,7 @@ def measure_plots(
         ]
         if not bands:
             continue
-        figure = plot_cost_bands(bands, PANEL, label, unit)
+        figure = drawing.plot_cost_bands(bands, PANEL, label, unit)
         words = []
         for band in bands:
             first, last = band.values[0][np.isfinite(band.values[0])][[0, -1]]

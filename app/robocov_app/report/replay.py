@@ -175,7 +175,6 @@ def _places(record: Record, values: Array, times: Array) -> str:
 
 
 def _headings(record: Record, times: Array) -> str:
-    """Return where robots face at other times as unit vectors, quantised; nan for points."""
     assert record.steering is not None
     angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)

@@ -33,6 +33,8 @@ RESTARTS = 24  # searches of which the best counts
 
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 Gains: TypeAlias = tuple[tuple[str, Value], ...]
+Parameters: TypeAlias = tuple[tuple[str, float | None], ...]
+Setting: TypeAlias = tuple[str, int, Parameters]  # map, number of robots, team: what makes costs comparable
 
 # what is known of a run in numbers, by the names of the columns of a sweep's table
 FIGURES = (
@@ -49,7 +51,7 @@ class Entry:
     controller: str
     label: str  # the controller's name as shown to people
     robots: int
-    team: tuple[tuple[str, float | None], ...]  # parameters of which there are several values; None: no limit
+    team: Parameters  # those of which there are several values; None: no limit
     start: str | None
     seed: int | None
     gains: Gains
@@ -59,18 +61,15 @@ class Entry:
 
     @property
     def final(self) -> float:
-        """Mean distance to the nearest robot at the end, m; nan where there is none."""
         value = self.figures.get("mean_distance_m")
         return float("nan") if value is None else float(value)
 
     def has(self, name: str) -> bool:
-        """Whether a figure is known, and finite."""
         value = self.figures.get(name)
         return value is not None and bool(np.isfinite(value))
 
     @property
-    def setting(self) -> tuple[object, ...]:
-        """Key of comparable costs: map, number of robots, team."""
+    def setting(self) -> Setting:
         return self.map, self.robots, self.team
 
     @property
@@ -108,7 +107,7 @@ class Result:
     facts: Mapping[str, Any]
     loaded: Mapping[Path, Saved]  # runs that were read already
     damaged: tuple[Damaged, ...] = ()  # runs that cannot be read and are no entries
-    references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)  # of settings
+    references: Mapping[Setting, Reference] = field(default_factory=dict)  # of settings
     part: str = ""  # which part of a story it is
 
     @cached_property

@@ -10,15 +10,7 @@ import numpy as np
 from robocov.controllers.gains import value_text
 from robocov.errors import counted
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import (
-    Comparison,
-    Group,
-    gain_text,
-    parted,
-    ratio_text,
-    setting_label,
-    settings,
-)
+from robocov_app.report.groups import Comparison, Group, gain_text, parted, ratio_text, setting_label
 from robocov_app.report.results import RESTARTS, Entry, Result
 
 NOTHING = "–"  # stands where there is no number
@@ -42,7 +34,6 @@ Column: TypeAlias = tuple[str, Callable[[Sequence[Entry]], str]]  # head, and te
 
 
 def controllers_table(result: Result) -> Table:
-    """Return the controllers with their gains, or between which values these are."""
     groups = grouped.shown_groups(result)
     known = {group.controller for group in groups}
     failed = parted(result.failed, lambda entry: entry.controller).items()
@@ -67,8 +58,7 @@ def _gains_table(caption: str, groups: Sequence[Group], result: Result) -> Table
 
 
 def summary_tables(result: Result) -> list[Table]:
-    """Return what came of each group, over everything and in each setting."""
-    groups, every = grouped.shown_groups(result), settings(result)
+    groups, every = grouped.shown_groups(result), grouped.settings(result)
     distance, over_run, *others = _figure_columns(result)
 
     def above(entries: Sequence[Entry]) -> str:
@@ -116,7 +106,6 @@ def summary_tables(result: Result) -> list[Table]:
 
 
 def runs_table(result: Result) -> Table | None:
-    """Return every run in a row of its own, None where they are too many."""
     labels = grouped.labels(result)
     if len(result.fine) > MOST_ROWS or len(result.fine) == len(set(labels.values())):
         return None  # too many, or the summary tells all of them
@@ -173,7 +162,6 @@ def pairs_table(comparisons: Sequence[Comparison]) -> Table:
 
 
 def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
-    """Return a table for each comparison on several maps, one row a map."""
     head = ("Map", "Pairs", "First, m", "Second, m", "Ratio", "First is", "First is lower in")
     tables = []
     for each in comparisons:
@@ -189,7 +177,6 @@ def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
 
 
 def failures_table(result: Result) -> Table | None:
-    """Return the runs that failed, each with its error, and those that cannot be read; None without any."""
     rows: list[tuple[str, ...]] = []
     for entry in result.failed:
         where, gains = setting_label(result, entry.setting), gain_text(entry.gains, result.units)

@@ -38,7 +38,6 @@ def named_colours(theme: Theme) -> dict[str, Colour]:
 
 
 def variables(theme: Theme) -> str:
-    """Return the declarations of a theme's colours, to stand between braces."""
     colours = "".join(f"--rc-{name}:{hex_code(colour)};" for name, colour in named_colours(theme).items())
     return f"color-scheme:{theme.name};{colours}"
 

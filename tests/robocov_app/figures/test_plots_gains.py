@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from robocov_app.figures.gains import (
+from robocov_app.figures.results import (
     MOST_LEVELS,
-    MOST_POINTS,
+    MOST_RUNS,
     Dependence,
     plot_gain_grid,
     plot_gains,
@@ -55,9 +55,9 @@ def test_a_sampled_range_has_points_alone() -> None:
 
 
 def test_of_very_many_runs_some_points_are_drawn() -> None:
-    count = 5 * MOST_POINTS
+    count = 5 * MOST_RUNS
     axes = drawn(np.resize([1.0, 2.0], count), np.ones(count), "k")
-    assert len(axes.lines[0].get_xdata()) <= MOST_POINTS
+    assert len(axes.lines[0].get_xdata()) <= MOST_RUNS
 
 
 def test_a_grid_has_its_numbers_and_the_lowest_is_bold() -> None:

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from reported_results import HOSTILE
 
-from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.figures.results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.figures.results import (
+    Band,
+    Dependence,
+    Sample,
+    plot_cost_bands,
+    plot_final_costs,
+    plot_gain_grid,
+    plot_gains,
+)
 from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT
 from robocov_app.report.svg import inline_svg

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from robocov.observation.region import Region
-from robocov_app.figures.heights import PENTAGON, best_at_heights, plot_heights
 from robocov_app.render.theme import DARK, LIGHT, contrast
+from robocov_app.replication.figures import PENTAGON, best_at_heights, plot_heights
 
 HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
 
