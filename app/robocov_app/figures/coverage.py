@@ -140,11 +140,9 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
     bar.imshow(theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
-    bar.set_xticks([])
-    bar.set_yticks(ticks(limit))
+    bar.set(xticks=[], yticks=ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
     bar.yaxis.tick_right()
     bar.yaxis.set_label_position("right")
-    bar.set_ylabel(f"{_BAR_LABEL} (m)")
 
 
 def _limit(moments: Sequence[Moment]) -> float:
@@ -174,10 +172,9 @@ def _draw_all_curves(
     across = bool(times) and width > 2.4 * height
     drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
     for k, (some, words, unit) in enumerate(drawn):
+        x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
         if across:
             x, y, wide, high = left + k * width / 2, top, width / 2, height
-        else:
-            x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
         longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in some)
         right = min(26 * s + longest, 0.45 * wide)
         axes = page.axes((x + 34 * s, y + 34 * s, wide - 34 * s - right, high - 34 * s - 50 * s))

@@ -96,19 +96,14 @@ class Page:
         self.theme = theme
         fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
         self.scale = fitting if scale is None else scale
+        self.margin = 18.0 * self.scale  # pixels that stay free at the edges
+        self.room = size[0] - 2 * self.margin  # between the margins
+        self._longest_bar = max(min(120 * self.scale, size[0] / 7), 20.0)
         dpi = 100.0 * self.scale
         # the pixels are counted by truncation: a hair more keeps 899.9999 at 900
         inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
         self.figure = Figure(figsize=inches, dpi=dpi, facecolor=tone(theme.background))
         FigureCanvasAgg(self.figure)
-
-    @property
-    def margin(self) -> float:
-        return 18.0 * self.scale
-
-    @property
-    def room(self) -> float:
-        return self.size[0] - 2 * self.margin
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         return x / self.size[0], 1.0 - y / self.size[1]
@@ -207,10 +202,6 @@ class Page:
         else:
             self._scale_bar(left, bottom + 20 * self.scale, zoom)
             self._legend(handles, columns, "upper center", ((begin + end) / 2, bottom + 38 * self.scale))
-
-    @property
-    def _longest_bar(self) -> float:
-        return max(min(120 * self.scale, self.size[0] / 7), 20.0)
 
     def _beside_bar(self, begin: float) -> float:
         """Return the width that the longest scale bar, with its words, leaves a legend in the same line."""

@@ -1,6 +1,8 @@
 """Publication plots: trajectories, cost curves and comparisons, as matplotlib figures (never pyplot's)."""
 
 from collections.abc import Sequence
+from itertools import compress
+from operator import not_
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -196,15 +198,13 @@ def _captions(
     records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
 ) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
-    same: list[str] = []
-    own = [[_cost(each.environment, *known)] for each, *known in zip(records, costs, times, strict=True)]
-    for found in zip(*((each.environment.name, _robots(each), _time(each)) for each in records), strict=True):
-        if len(set(found)) == 1:
-            same.append(found[0])
-        else:
-            for facts, text in zip(own, found, strict=True):
-                facts.append(text)
-    return _line(*same), [_line(*facts) for facts in own]
+    every = [(each.environment.name, _robots(each), _time(each)) for each in records]
+    shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
+    own = [
+        _line(_cost(each.environment, *known), *compress(facts, map(not_, shared)))
+        for each, facts, *known in zip(records, every, costs, times, strict=True)
+    ]
+    return _line(*compress(every[0], shared)), own
 
 
 def _line(*facts: str) -> str:

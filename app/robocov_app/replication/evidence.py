@@ -4,7 +4,6 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +12,13 @@ from robocov.controllers import controller_kind, gain_values, information_of, ma
 from robocov.controllers.gains import value_text
 from robocov_app.figures.statistics import Interval, bootstrap
 from robocov_app.replication.claims import amount, capitalised, share_above_zero
-from robocov_app.replication.contenders import OWN, Contender
+from robocov_app.replication.contenders import ASSETS, OWN, Contender
 from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import BeyondResults
 from robocov_app.report.groups import parted
 
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
 OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs
-
-ASSETS = Path(__file__).parent / "assets"
 
 _NOT_READ = "; made from what is generally known of it, not from its text."
 

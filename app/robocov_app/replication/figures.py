@@ -38,8 +38,8 @@ from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
 from robocov_app.replication import outcomes as reached
 from robocov_app.replication.claims import CLUSTERED, amount
-from robocov_app.replication.contenders import LABELS, OURS, OWN, TARGETS, TEAMS
-from robocov_app.replication.evidence import ASSETS, ranked_rows
+from robocov_app.replication.contenders import ASSETS, LABELS, OURS, OWN, TARGETS, TEAMS
+from robocov_app.replication.evidence import ranked_rows
 from robocov_app.replication.outcomes import FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import BeyondResults, Degradation, FigureRun, PaperResults
 from robocov_app.sweep.study import UNITS
@@ -201,16 +201,6 @@ Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
 
 # what is said of the figures, by their names
 CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
-
-# what the axes of disturbances are called
-AXES = {
-    "loss": "Messages lost",
-    "delay": "Delay of messages",
-    "communication_range": "Communication range",
-    "position_noise": "Noise of own position",
-    "sensing_noise": "Noise of range sensor",
-    "failure_rate": "Failures of each robot",
-}
 
 _TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
 _BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
@@ -382,7 +372,7 @@ def _panel(
         look: Any = {"linewidth": 1.6, "linestyle": style.dashes, "marker": style.mark, "markersize": 5.5}
         axes.plot(x, y, label=rows[0].label, color=colour, zorder=3, **look)
     unit = f" ({UNITS[name]})" if UNITS[name] else ""
-    axes.set_title(f"{AXES[name]}{unit}", fontsize=TEXT, color=tone(theme.ink), loc="left")
+    axes.set_title(f"{CAPTIONS[f'axis-{name}']}{unit}", fontsize=TEXT, color=tone(theme.ink), loc="left")
     axes.set_xticks(range(len(values)), ["no limit" if v is None else f"{v:g}" for v in values])
     axes.set_xlim(-0.4, len(values) - 0.6)
     quiet_axes(axes, theme, grid="y")

@@ -24,8 +24,8 @@ from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
 from robocov_app.replication import claims, contenders, evidence, figures, step_times, studies
 from robocov_app.replication.claims import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
-from robocov_app.replication.contenders import LABELS, OURS
-from robocov_app.replication.evidence import ASSETS, Evidence
+from robocov_app.replication.contenders import ASSETS, LABELS, OURS
+from robocov_app.replication.evidence import Evidence
 from robocov_app.replication.outcomes import Outcomes, Scenario
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults

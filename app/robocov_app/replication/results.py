@@ -91,7 +91,6 @@ class FigureRun:
 class PaperResults:
     """Results of the paper's claims."""
 
-    plan: Plan
     figures: Mapping[str, FigureRun]  # by "case/controller"
     gains: Mapping[str, GainOutcomes]  # by controller
     convex: Outcomes  # in convex regions
@@ -230,7 +229,8 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
         sweeps |= studies.conditions_studies(plan)
     runs = sum(map(len, sweeps.values()))
     # which gains will be the best is not known yet, and how many runs these are does not depend on it
-    left = {name: len(study) - min(runs_there(folder, name), len(study)) for name, study in sweeps.items()}
+    there = {name: len([*(folder / "studies" / name / "runs").glob("[!.]*")]) for name in sweeps}
+    left = {name: max(len(study) - there[name], 0) for name, study in sweeps.items()}
     if not any(left.values()):
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
@@ -257,14 +257,8 @@ def expected_contenders(plan: Plan) -> tuple[Contender, ...]:
 
 
 def grid_is_done(folder: Path, plan: Plan) -> bool:
-    tuning = studies.gains_study(plan)
-    return runs_there(folder, "gains", tuning) == len(tuning)
-
-
-def runs_there(folder: Path, name: str, study: Study | None = None) -> int:
-    """Return how many runs of a sweep are there, with or without a table; of a `study` its own alone."""
-    there = {each.name for each in (folder / "studies" / name / "runs").glob("[!.]*")}
-    return len(there if study is None else there.intersection(task.name for task in tasks_of(study)))
+    runs = folder / "studies" / "gains" / "runs"
+    return all((runs / task.name).exists() for task in tasks_of(studies.gains_study(plan)))
 
 
 def partition_record() -> Record:
@@ -278,8 +272,7 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, F
     """Do the runs that the figures show; raise as `run_study`, and InputError when one of them failed."""
     found: dict[str, FigureRun] = {}
     for name, study in studies.figure_studies(plan).items():
-        target = run_study(study, folder, name, options)
-        for row, run in _figure_runs(target):
+        for row, run in _figure_runs(run_study(study, folder, name, options)):
             case = "other" if row["start"] == "other" else name.removeprefix("figures-")
             found[f"{case}/{row['controller']}"] = run
     return found
@@ -305,7 +298,7 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
     counts = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
     worst = worst_runs(claims.study, outcomes, RAPF_SHARED, WORST)
-    return PaperResults(plan, figures, gains, in_convex, outcomes, papers, known, worst, **counts)
+    return PaperResults(figures, gains, in_convex, outcomes, papers, known, worst, **counts)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -314,20 +307,19 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     Without the paper's own part the paper's controllers are run here, with their best gains if the grids of
     gains have been run before.
     """
+    gains: dict[str, GainOutcomes] = {}
     known: dict[str, Reference] = {}
     if paper is not None:
         known |= paper.references
         papers, claims = paper.contenders, paper.claims
     else:
-        grids: Mapping[str, GainOutcomes] = {}
         if grid_is_done(folder, plan):
             # nothing is left to be done of it: the table is made sure of
-            grids, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
-        papers = paper_contenders(best_gains(grids))
+            gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
+        papers, gains = paper_contenders(best_gains(gains)), {}
         contest = studies.claims_contest(plan, papers)
         known |= references_of(contest.study.maps, folder, plan, options)
         claims = read_outcomes(run_study(contest.study, folder, "claims", options), contest, known)
-    gains: dict[str, GainOutcomes] = {}
     if (tuning := studies.baseline_gains_study(plan)) is not None:
         gains, _ = _run_grid(tuning, BASELINE_GAINS, folder, plan, options)
     contests = studies.beyond_contests(plan, best_gains(gains), papers)
