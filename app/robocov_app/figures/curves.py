@@ -90,11 +90,7 @@ def _draw_end_labels(
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:
-    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit.
-
-    >>> spread(np.array([5.0, 5.0, 20.0]), 4.0, 0.0, 30.0).tolist()
-    [3.0, 7.0, 20.0]
-    """
+    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit."""
     from scipy.optimize import isotonic_regression
 
     order, steps = np.argsort(heights, kind="stable"), gap * np.arange(len(heights))

@@ -66,11 +66,7 @@ def even_ticks(axis: Any, most: int) -> None:
 
 
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
-    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it.
-
-    >>> cut_to("Lloyd's algorithm", len, 8)
-    "Lloyd's…"
-    """
+    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it: "Lloyd's…"."""
     kept = text
     while len(kept) > 1 and width_of(text if kept == text else f"{kept}…") > room:
         kept = kept[:-1]

@@ -160,11 +160,7 @@ def quartiles(values: Array) -> Array:
 
 
 def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[float], float]:
-    """Return the middle of each row, the middle of each group's name, and the total height.
-
-    >>> laid_rows([("", 2)])
-    ([0.5, 1.5], [-0.5], 2.0)
-    """
+    """Return the middle of each row, the middle of each group's name, and the total height, in rows."""
     places: list[float] = []
     heads: list[float] = []
     at = 0.0

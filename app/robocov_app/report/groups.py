@@ -144,11 +144,7 @@ def dependences(result: Result) -> dict[str, list[str]]:
 
 
 def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> str:
-    """Return gains as a line of text.
-
-    >>> gain_text([("k_rep", 0.3), ("attraction_limit", None)], {"k_rep": "N m³"})
-    'k_rep 0.3 N m³, attraction_limit none'
-    """
+    """Return gains as a line of text: "k_rep 0.3 N m³, attraction_limit none"."""
     known = [(name, value, "" if value is None else units.get(name, "")) for name, value in gains]
     return ", ".join(f"{name} {value_text(value)} {unit}".rstrip() for name, value, unit in known)
 

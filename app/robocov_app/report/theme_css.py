@@ -7,13 +7,7 @@ from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_o
 
 
 def hex_code(colour: Colour) -> str:
-    """Return a colour as CSS writes it.
-
-    >>> hex_code((136, 204, 238))
-    '#88ccee'
-    """
-    red, green, blue = colour
-    return f"#{red:02x}{green:02x}{blue:02x}"
+    return f"#{bytes(colour).hex()}"
 
 
 def named_colours(theme: Theme) -> dict[str, Colour]:
