@@ -164,7 +164,7 @@ def record_html(record: Record) -> str:
     """Return a replay of a run, with its cost where that does not take long."""
     run = ReplayRun(record, _history_to_show(record), f"{record.label} on {record.environment.name}")
     width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
-    replay = replay_html([run], standalone=False)
+    replay = replay_html([run])
     style = f"<style>{_RUN_CSS}</style>"
     return f'{style}<div class="robocov-run" style="max-width:{width:.0f}px">{replay}</div>'
 

@@ -15,7 +15,8 @@ from robocov.mapfile import save_map
 from robocov.metrics.results import read_results
 from robocov.record import Record
 from robocov_app.cli import main
-from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.results import Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures.styles import curve_styles
 from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
@@ -151,12 +152,14 @@ def test_values_of_words_are_told_where_they_are_many() -> None:
 def test_words_have_even_places_and_no_line_between_them() -> None:
     places, values = np.repeat([0.0, 1.0, 2.0], 4), np.arange(12.0)
     words = ("centroid", "sensing", "median")
-    axes = plot_gains([Dependence("RAPF", "rapf", places, values)], "target", words=words).axes[0]
+    row = Dependence("RAPF", curve_styles(["rapf"])["rapf"], places, values)
+    axes = plot_gains([row], "target", (420, 290), "cost", words).axes[0]
     assert [tick.get_text() for tick in axes.get_xticklabels()] == list(words)
     _, medians = axes.lines
     assert medians.get_linestyle() == "None"
     assert medians.get_ydata().tolist() == [1.5, 5.5, 9.5]
-    grid = plot_gain_grid(["centroid", "median"], [0.3, None], np.arange(4.0).reshape(2, 2), ("target", "k"))
+    values = np.arange(4.0).reshape(2, 2)
+    grid = plot_gain_grid((420, 290), ["centroid", "median"], [0.3, None], values, ("target", "k"))
     assert [tick.get_text() for tick in grid.axes[0].get_xticklabels()] == ["centroid", "median"]
     assert [tick.get_text() for tick in grid.axes[0].get_yticklabels()] == ["0.3", "none"]
 

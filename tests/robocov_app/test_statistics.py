@@ -6,9 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
-from robocov.errors import ParameterError
 from robocov_app.figures.statistics import (
-    Interval,
     bootstrap,
     bootstrap_by,
     mean_with_t_interval,
@@ -65,7 +63,7 @@ def test_a_t_interval_of_four_values_holds_the_truth_as_often_as_it_says() -> No
     rng = np.random.default_rng(5)
     found = [mean_with_t_interval(rng.normal(size=4)) for _ in range(1000)]
     assert 0.93 <= np.mean([each.low <= 0.0 <= each.high for each in found]) <= 0.97
-    assert str(mean_with_t_interval([1.0, 1.0, 1.0])) == "1"  # three times the same is one value
+    assert np.isnan(mean_with_t_interval([1.0, 1.0, 1.0]).low)  # three times the same is one value
 
 
 def test_one_cluster_has_no_interval() -> None:
@@ -76,8 +74,6 @@ def test_one_cluster_has_no_interval() -> None:
     ):
         assert np.isnan(found.low)
         assert np.isnan(found.high)
-    assert str(bootstrap([1.5])) == "1.5"
-    assert str(Interval(1.0, 0.5, 2.0)) == "1 (0.5 to 2)"
 
 
 @pytest.mark.filterwarnings("ignore:The BCa confidence interval")
@@ -89,23 +85,6 @@ def test_resamples_without_a_value_do_not_count() -> None:
 def test_spread() -> None:
     assert spread([1.0, 3.0]) == pytest.approx(np.sqrt(2.0) / 2.0)
     assert spread([2.0, 2.0, 2.0]) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: bootstrap([]), r"values: shape \(0,\)"),
-        (lambda: bootstrap([[1.0]]), "values: shape"),
-        (lambda: bootstrap([1.0, np.nan]), r"values\[1\]: nan"),
-        (lambda: bootstrap([1.0], clusters=["a", "b"]), "clusters: 2 labels of 1 values"),
-        (lambda: spread([1.0]), "values: 1, but at least two"),
-        (lambda: spread([-1.0, 1.0]), "their mean is 0"),
-        (lambda: bootstrap_by(len, []), "clusters: none"),
-    ],
-)
-def test_what_cannot_be_taken_is_refused(call, words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        call()
 
 
 @given(st.integers(1, 200), st.integers(1, 3), st.booleans())

@@ -68,7 +68,7 @@ class Arguments(JsonOption):
 
 def command(options: Arguments) -> int:
     """Run the study and write all that comes of it."""
-    from robocov_app.replication import beyond_claims, claims, pages, results
+    from robocov_app.replication import claims, pages, results
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
     from robocov_app.sweep.executors import processors
@@ -96,7 +96,7 @@ def command(options: Arguments) -> int:
             runs = paper.figures if paper else results.run_figures(out, plan, runner)
             if with_beyond:
                 beyond = results.run_beyond(out, plan, runner, paper)
-                more = beyond_claims.beyond_claims(beyond)
+                more = claims.beyond_claims(beyond)
                 pages.save_claims(out, (*found, *more))
             first = results.partition_record()
             images = pages.save_paper_figures(out, runs, first, paper, quiet=quiet)

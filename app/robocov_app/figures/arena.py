@@ -17,7 +17,7 @@ from matplotlib.transforms import ScaledTranslation
 from robocov.arrays import Array, BoolArray
 from robocov.environment import Environment
 from robocov.record import Record
-from robocov_app.figures.page import tone
+from robocov_app.figures.page import figure_of, tone
 from robocov_app.render.density import density_label, shading
 from robocov_app.render.layout import fitted_radii, line_crowding, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, MovingObstacle, are_centroids, moving_obstacles
@@ -50,9 +50,14 @@ def _path_style(theme: Theme) -> dict[str, Any]:
 def draw_map(
     axes: Axes, environment: Environment, theme: Theme, *, density: bool = True, time: float = 0.0
 ) -> None:
-    """Draw density, obstacles at a time, s, what of the region is outside the boundary, and its outline."""
-    if density:
-        _draw_density(axes, environment, theme)
+    if density and environment.density is not None and not environment.density.uniform:
+        low_x, low_y, high_x, high_y = environment.region.bounds
+        # limits stay as they are, which imshow would change
+        extent = low_x, high_x, low_y, high_y
+        image = AxesImage(axes, extent=extent, origin="lower", interpolation="bilinear", zorder=1.5)
+        image.set_data(shading(environment, _DOTS, theme))
+        axes.add_image(image)
+        image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
     for part in environment.at(time).blocked.geoms:
         rings = [np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)]
         outline = Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
@@ -65,13 +70,9 @@ def draw_map(
 
 
 def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle, theme: Theme) -> None:
-    shape = Polygon(
-        np.asarray(obstacle.polygon.exterior.coords),
-        facecolor=tone(theme.moving_obstacle) if not obstacle.polygon.interiors else "none",
-        edgecolor=tone(theme.obstacle_edge),
-        linewidth=1.4,
-        zorder=2.1,
-    )
+    ring, hollow = np.asarray(obstacle.polygon.exterior.coords), bool(obstacle.polygon.interiors)
+    fill: Any = {"facecolor": "none" if hollow else tone(theme.moving_obstacle)}
+    shape = Polygon(ring, edgecolor=tone(theme.obstacle_edge), linewidth=1.4, zorder=2.1, **fill)
     axes.add_patch(shape)
     shape.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
     axes.plot(*obstacle.path.T, zorder=2.2, **_path_style(theme))
@@ -84,18 +85,6 @@ def _draw_motion(axes: Axes, environment: Environment, obstacle: MovingObstacle,
     axes.annotate("", xy=end, xytext=begin, arrowprops=arrow, zorder=2.3)
 
 
-def _draw_density(axes: Axes, environment: Environment, theme: Theme) -> None:
-    if environment.density is None or environment.density.uniform:
-        return
-    low_x, low_y, high_x, high_y = environment.region.bounds
-    # limits stay as they are, which imshow would change
-    extent = low_x, high_x, low_y, high_y
-    image = AxesImage(axes, extent=extent, origin="lower", interpolation="bilinear", zorder=1.5)
-    image.set_data(shading(environment, _DOTS, theme))
-    axes.add_image(image)
-    image.set_clip_path(Polygon(environment.region.vertices, transform=axes.transData))
-
-
 def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     """Draw map, final cells, trajectories, starts, final positions and where robots head."""
     draw_map(axes, record.environment, theme, time=float(record.time[-1]))
@@ -106,28 +95,23 @@ def draw_run(axes: Axes, record: Record, theme: Theme, colours: str) -> None:
     hues = robot_hues(n, working[cells.adjacency])
     paper = colours == "paper"
     tint = theme.paper_tint if paper else theme.tint
-    each = zip(outlines, hues[working[owners]].tolist(), strict=True)
-    polygons = [
-        (cell, tone(mix(theme.background, theme.robots[hue], tint))) for cell, hue in each if len(cell) > 2
-    ]
+    areas = [k for k, outline in enumerate(outlines) if len(outline) > 2]
     style: Any = {"edgecolors": tone(theme.cell_edge), "linewidths": 0.8, "zorder": 1}
-    fills = [fill for _, fill in polygons]
-    axes.add_collection(
-        PolyCollection([cell for cell, _ in polygons], facecolors=fills, **style), autolim=False
-    )
+    style["facecolors"] = [
+        tone(mix(theme.background, theme.robots[hue], tint)) for hue in hues[working[owners[areas]]].tolist()
+    ]
+    axes.add_collection(PolyCollection([outlines[k] for k in areas], **style), autolim=False)
     ways = [record.positions[record.present[:, robot], robot] for robot in range(n)]
-    colour = [tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)]
-    style = {"capstyle": "round", "joinstyle": "round", "zorder": 4}
-    axes.add_collection(
-        LineCollection(ways, colors=colour, linewidths=1.6 * line_crowding(n), **style), autolim=False
-    )
+    style = {"capstyle": "round", "joinstyle": "round", "zorder": 4, "linewidths": 1.6 * line_crowding(n)}
+    style["colors"] = [tone(colour) for colour in _line_colours(n, hues.tolist(), theme, paper)]
+    axes.add_collection(LineCollection(ways, **style), autolim=False)
     # of one that joins, where it does
     begin = record.positions[np.argmax(record.present, axis=0), np.arange(n)][there]
     starts_apart = mark_size(_in_points(axes, begin), 3.2, _START)
     axes.plot(*begin.T, zorder=5, **_start_style(theme, starts_apart))
-    robots = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
+    own = [theme.final if paper else theme.robots[hue] for hue in hues.tolist()]
     failed = _failed(record)
-    robots = [wreck_colour(theme) if failed[robot] else robots[robot] for robot in there.tolist()]
+    robots = [wreck_colour(theme) if failed[robot] else own[robot] for robot in there.tolist()]
     drawn = draw_robots(axes, last[there], record.team.radius[there], robots, theme, (there + 1).tolist())
     if record.steering is not None:
         facing = {
@@ -155,19 +139,15 @@ def draw_robots(
     numbers: Sequence[int] | None = None,
 ) -> list[float]:
     """Draw robots at (n, 2) m as discs with numbers, 1, 2, 3 by default; return their radii in points."""
-    drawn = _disc_points(axes, places, radius)
-    axes.scatter(
-        places[:, 0],
-        places[:, 1],
-        s=[(2 * r) ** 2 for r in drawn],
-        c=[tone(fill) for fill in fills],
-        edgecolors=tone(theme.robot_ring),
-        linewidths=[min(1.1, 0.25 * r) for r in drawn],
-        zorder=7,
-        clip_on=False,
-    )
+    unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
+    true = radius * float(unit[1, 0] - unit[0, 0])
+    # readable where there is room, in a crowd down to true size
+    drawn: list[float] = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC).tolist()
+    style: Any = {"c": [tone(fill) for fill in fills], "edgecolors": tone(theme.robot_ring)}
+    style |= {"s": [(2 * r) ** 2 for r in drawn], "linewidths": [min(1.1, 0.25 * r) for r in drawn]}
+    axes.scatter(*places.T, zorder=7, clip_on=False, **style)
     numbers = range(1, len(places) + 1) if numbers is None else numbers
-    style: Any = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
+    style = {"fontweight": "bold", "ha": "center", "va": "center_baseline", "zorder": 8}
     for robot, (x, y), r, fill in zip(numbers, places.tolist(), drawn, fills, strict=True):
         size = r * (1.25, 1.1, 0.85, 0.65)[min(len(str(robot)), 4) - 1]
         if size >= _SMALLEST_NUMBER:
@@ -179,11 +159,11 @@ def _draw_noses(
     axes: Axes, places: Array, facing: Mapping[int, float], radii: Mapping[int, float], theme: Theme
 ) -> None:
     """Draw where robots face, rad, as triangles at discs of radii in points, both by row."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
     for robot, heading in facing.items():
         off = 1.25 * radii[robot] / 72.0  # inches
-        shift = ScaledTranslation(off * np.cos(heading), off * np.sin(heading), figure.dpi_scale_trans)
+        shift = ScaledTranslation(
+            off * np.cos(heading), off * np.sin(heading), figure_of(axes).dpi_scale_trans
+        )
         where: Any = {"transform": axes.transData + shift, "zorder": 6, "clip_on": False}
         marker = (3, 0, float(np.degrees(heading)) - 90.0)
         size = 0.9 * radii[robot]
@@ -191,19 +171,9 @@ def _draw_noses(
 
 
 def _line_colours(n: int, hues: list[int], theme: Theme, paper: bool) -> list[Colour]:
-    if paper:
-        return [theme.trajectory] * n
-    if n > ONE_HUE_EACH:
-        return [mix(theme.trajectory, theme.background, 0.25)] * n
+    if paper or n > ONE_HUE_EACH:
+        return [theme.trajectory if paper else mix(theme.trajectory, theme.background, 0.25)] * n
     return [theme.trail(hue) for hue in hues]
-
-
-def _disc_points(axes: Axes, places: Array, radius: Array) -> list[float]:
-    """Return each robot's radius in points: readable where there is room, in a crowd down to true size."""
-    unit = _in_points(axes, np.array([[0.0, 0.0], [1.0, 0.0]]))
-    true = radius * float(unit[1, 0] - unit[0, 0])
-    drawn: list[float] = fitted_radii(_in_points(axes, places), true, _SMALLEST_DISC, _DISC).tolist()
-    return drawn
 
 
 def _in_points(axes: Axes, places: Array) -> Array:
@@ -218,29 +188,19 @@ def has_goals(record: Record) -> bool:
 
 
 def _start_style(theme: Theme, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "marker": "o",
-        "markersize": size,
-        "markerfacecolor": "none",
-        "markeredgecolor": tone(theme.start),
-        "markeredgewidth": min(1.5, 0.25 * size),
-    }
+    style = {"linestyle": "none", "marker": "o", "markersize": size, "markerfacecolor": "none"}
+    return style | {"markeredgecolor": tone(theme.start), "markeredgewidth": min(1.5, 0.25 * size)}
 
 
 def _aim_style(plus: bool, theme: Theme, size: float) -> dict[str, Any]:
-    return {
-        "linestyle": "none",
-        "label": CENTROID if plus else GOAL,
-        "marker": "+" if plus else "x",
-        "markersize": size if plus else 0.8 * size,
-        "markeredgecolor": tone(theme.ink if plus else theme.final),
-        "markeredgewidth": min(1.2 if plus else 1.6, 0.2 * size),
-    }
+    if plus:
+        style = {"label": CENTROID, "marker": "+", "markersize": size, "markeredgecolor": tone(theme.ink)}
+        return style | {"linestyle": "none", "markeredgewidth": min(1.2, 0.2 * size)}
+    style = {"label": GOAL, "marker": "x", "markersize": 0.8 * size, "markeredgecolor": tone(theme.final)}
+    return style | {"linestyle": "none", "markeredgewidth": min(1.6, 0.2 * size)}
 
 
 def label_of(handle: Artist) -> str:
-    """Return what a legend's entry says."""
     return str(handle.get_label())
 
 
@@ -260,14 +220,12 @@ def map_handles(environment: Environment, theme: Theme, *, density: bool = True)
 
 
 def robot_handle(label: str, fill: Colour, theme: Theme) -> Artist:
-    """Return the legend's entry for a robot."""
     style: Any = {"linestyle": "none", "marker": "o", "markersize": 8.0}
     colours: Any = {"markerfacecolor": tone(fill), "markeredgecolor": tone(theme.robot_ring)}
     return Line2D([], [], label=label, **style, **colours)
 
 
 def wreck_colour(theme: Theme) -> Colour:
-    """Return the colour of robots that have failed."""
     return mix(theme.background, theme.ink, 0.3)
 
 
@@ -276,7 +234,6 @@ def _failed(record: Record) -> BoolArray:
 
 
 def run_handles(record: Record, theme: Theme, colours: str) -> list[Artist]:
-    """Return the legend's entries for what `draw_run` draws."""
     paper, n = colours == "paper", record.positions.shape[1]
     line = _line_colours(n, list(range(n)), theme, paper)[0]
     aims: list[Artist] = []

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -62,14 +62,6 @@ class Moment:
         return cls(record.environment, record.team[rows], field, record.label, facts, numbers, time)
 
 
-class _Rooms(NamedTuple):
-    """Boxes of a page's parts, in pixels."""
-
-    curves: Box | None
-    maps: Box
-    bar: float  # height at which the scale of colours is
-
-
 @plain_style()
 def plot_coverage(
     curves: Sequence[Curve],
@@ -92,25 +84,44 @@ def plot_coverage(
     low_x, low_y = bounds[:, :2].min(axis=0).tolist()
     high_x, high_y = bounds[:, 2:].max(axis=0).tolist()
     aspect = (high_x - low_x) / (high_y - low_y)
-    limit = _limit(moments)
-    beside = len(moments) == 1 and aspect < 1.9
+    limit, maps = _limit(moments), len(moments)
     handles = _handles(moments, theme)
-    page, rooms = _laid_out(theme, size, aspect, len(moments), bool(curves), beside, handles)
-    s = page.scale
-    bar_left = _draw_bar(page, limit, rooms)
-    free = page.size[0] if rooms.bar > 40 * s else bar_left
-    page.title(title, 26, free - 2 * page.margin)
-    if rooms.curves is not None:
+    page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
+    s, margin = page.scale, page.margin
+    beside = bool(curves) and maps == 1 and aspect < 1.9
+    below = bool(curves) and not beside
+    part = 0.5 if beside else 1.0
+    footer = page.footer_height(handles, (1.0 - part) * page.size[0] + margin)
+    room, head, highest = part * page.size[0] - 2 * margin, 46 * s, 290 * s
+    if size is None:
+        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / aspect)))) if maps > 3 else maps
+        slot = (room - (columns - 1) * 16 * s) / columns
+        tall = -(-maps // columns) * (min(slot / aspect, 760) + 66 * s) - 16 * s
+        above = 2 * head + highest if below else head
+        least = 480 * s if maps == 1 and aspect < 1.9 else 320
+        page = Page((page.size[0], int(np.clip(above + tall + footer, least, 2600))), theme, 1.3)
+    width, height = page.size
+    curves_room: Box = (margin, head, 0.5 * width - margin, height - head)
+    maps_room: Box = ((1.0 - part) * width + margin, head, room, height - head - footer)
+    bar_y = 26 * s  # of the scale of colours
+    if below:
+        high = highest if size is None else min(highest, 0.4 * (height - head - footer))
+        end = head + high
+        curves_room = margin, head, width - 2 * margin, high
+        maps_room, bar_y = (margin, end + head, room, height - footer - end - head), end + 24 * s
+    bar_left = _draw_bar(page, limit, maps_room, bar_y, maps_room[0] if below or not curves else 0.5 * width)
+    page.title(title, 26, (width if below else bar_left) - 2 * margin)
+    if curves:
         weighed = any(density_label(moment.environment) for moment in moments)
-        _draw_all_curves(page, curves, times, rooms.curves, WEIGHED if weighed else DISTANCE)
-    panels = _panels(rooms.maps, len(moments), aspect, 50 * s, 16 * s)
+        _draw_all_curves(page, curves, times, curves_room, WEIGHED if weighed else DISTANCE)
+    panels = _panels(maps_room, maps, aspect, 50 * s, 16 * s)
     for moment, (box, slot) in zip(moments, panels, strict=True):
         axes = page.map_axes(box, low_x, low_y, high_x, high_y)
         _draw_moment(axes, moment, limit, theme, box, s)
         page.text(moment.title, box[0], box[1] - 35 * s, points=TEXT + 1.5, bold=True, room=slot)
         page.text(moment.facts, box[0], box[1] - 14 * s, colour=theme.faint, room=slot)
     boxes = [box for box, _ in panels]
-    page.footer(handles, boxes, boxes[0][2] / (high_x - low_x), rooms.maps[0])
+    page.footer(handles, boxes, boxes[0][2] / (high_x - low_x), maps_room[0])
     return page.figure
 
 
@@ -129,11 +140,9 @@ def plot_distances(moment: Moment, axes: Axes, theme: Theme | str = LIGHT) -> No
     axes.set_aspect("equal")
     bar = axes.inset_axes((1.03, 0.0, 0.035, 1.0))
     bar.imshow(theme.heat_table(256)[:, None], origin="lower", aspect="auto", extent=(0.0, 1.0, 0.0, limit))
-    bar.set_xticks([])
-    bar.set_yticks(ticks(limit))
+    bar.set(xticks=[], yticks=ticks(limit), ylabel=f"{_BAR_LABEL} (m)")
     bar.yaxis.tick_right()
     bar.yaxis.set_label_position("right")
-    bar.set_ylabel(f"{_BAR_LABEL} (m)")
 
 
 def _limit(moments: Sequence[Moment]) -> float:
@@ -155,38 +164,6 @@ def _handles(moments: Sequence[Moment], theme: Theme) -> list[Artist]:
     return handles
 
 
-def _laid_out(
-    theme: Theme,
-    size: tuple[int, int] | None,
-    aspect: float,
-    maps: int,
-    with_curves: bool,
-    beside: bool,
-    handles: Sequence[Artist],
-) -> tuple[Page, _Rooms]:
-    page = Page(size or (1500, 1000), theme, 1.3 if size is None else None)
-    s, margin, below = page.scale, page.margin, with_curves and not beside
-    part = 0.5 if with_curves and beside else 1.0
-    footer = page.footer_height(handles, (1.0 - part) * page.size[0] + margin)
-    room, head, highest = part * page.size[0] - 2 * margin, 46 * s, 290 * s
-    if size is None:
-        columns = min(maps, max(1, round(np.sqrt(maps * 1.6 / aspect)))) if maps > 3 else maps
-        slot = (room - (columns - 1) * 16 * s) / columns
-        tall = -(-maps // columns) * (min(slot / aspect, 760) + 66 * s) - 16 * s
-        above = 2 * head + highest if below else head
-        least = 480 * s if beside else 320
-        page = Page((page.size[0], int(np.clip(above + tall + footer, least, 2600))), theme, 1.3)
-    width, height = page.size
-    if below:
-        high = highest if size is None else min(highest, 0.4 * (height - head - footer))
-        cut = head + high
-        maps_room = margin, cut + head, room, height - footer - cut - head
-        return page, _Rooms((margin, head, width - 2 * margin, high), maps_room, cut + 24 * s)
-    curves = (margin, head, 0.5 * width - margin, height - head) if with_curves else None
-    maps_room = (1.0 - part) * width + margin, head, room, height - head - footer
-    return page, _Rooms(curves, maps_room, 26 * s)
-
-
 def _draw_all_curves(
     page: Page, curves: Sequence[Curve], times: Sequence[Curve], room: Box, label: str
 ) -> None:
@@ -195,10 +172,9 @@ def _draw_all_curves(
     across = bool(times) and width > 2.4 * height
     drawn = [(curves, label, "m"), *([(times, TIME, "s")] if times else [])]
     for k, (some, words, unit) in enumerate(drawn):
+        x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
         if across:
             x, y, wide, high = left + k * width / 2, top, width / 2, height
-        else:
-            x, y, wide, high = left, top + k * height / len(drawn), width, height / len(drawn)
         longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in some)
         right = min(26 * s + longest, 0.45 * wide)
         axes = page.axes((x + 34 * s, y + 34 * s, wide - 34 * s - right, high - 34 * s - 50 * s))
@@ -245,10 +221,13 @@ def _draw_moment(axes: Axes, moment: Moment, limit: float, theme: Theme, box: Bo
     arena.draw_robots(axes, places, moment.team.radius, [theme.final] * len(places), theme, moment.numbers)
 
 
-def _draw_bar(page: Page, limit: float, rooms: _Rooms) -> float:
-    """Draw the scale of colours above the right edge of the maps; return where it begins."""
+def _draw_bar(page: Page, limit: float, maps: Box, middle: float, least: float) -> float:
+    """Draw the scale of colours above the right edge of the maps; return where it, or its words, begin.
+
+    Words that would reach to the left of `least` px are left out.
+    """
     theme, s = page.theme, page.scale
-    right, width, middle = rooms.maps[0] + rooms.maps[2] - 14 * s, 190 * s, rooms.bar
+    right, width = maps[0] + maps[2] - 14 * s, 190 * s
     axes = page.axes((right - width, middle - 9 * s, width, 10 * s))
     axes.imshow(theme.heat_table(256)[None], aspect="auto", extent=(0.0, limit, 0.0, 1.0))
     for side in axes.spines.values():
@@ -259,7 +238,7 @@ def _draw_bar(page: Page, limit: float, rooms: _Rooms) -> float:
     axes.tick_params(colors=tone(theme.faint), labelcolor=tone(theme.ink), length=2.5, pad=1.5)
     left = right - width - 12 * s
     wide = page.text_width(_BAR_LABEL)
-    if left - wide > (rooms.maps[0] if rooms.bar > 40 * s or rooms.curves is None else page.size[0] * 0.5):
+    if left - wide > least:
         page.text(_BAR_LABEL, left, middle - 4 * s, align="right")
         left -= wide
     return left

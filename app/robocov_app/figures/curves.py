@@ -45,7 +45,14 @@ def draw_curves(
     """Draw curves, the first lowest and widest, and quartile `bands`; labels at the ends are pushed apart."""
     chosen = styles_of([controller for _, controller, _, _ in curves]) if styles is None else styles
     around = list(bands or [None] * len(curves))
-    _frame(axes, curves, theme, [band for band in around if band is not None], label)
+    lines = [np.asarray(curve[3]) for curve in curves] + [edge for band in around if band for edge in band]
+    shown = np.concatenate([line[np.isfinite(line)] for line in lines])
+    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
+    axes.set_ylim(*value_limits(float(shown.min()), float(shown.max())))
+    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
+    even_ticks(axes.xaxis, 8)
+    even_ticks(axes.yaxis, 6)
+    quiet_axes(axes, theme, "time (s)", label, grid="y")
     for (_, _, time, _), style, band in zip(curves, chosen, around, strict=True):
         if band is not None:
             axes.fill_between(time, *band, color=tone(style.colour(theme)), alpha=0.16, linewidth=0.0)
@@ -58,10 +65,8 @@ def draw_curves(
             dashes = 0, tuple(2.2 * weight / width * part for part in dashes[1])
         axes.plot(time, values, color=colour, linewidth=width, linestyle=dashes, dash_capstyle="butt")
         last = int(np.nonzero(np.isfinite(values))[0][-1])
-        size = weight * (6.5 + 2.0 * above)
-        axes.plot(
-            time[last], values[last], style.mark, color=colour, markersize=size, clip_on=False, zorder=5
-        )
+        end: Any = {"markersize": weight * (6.5 + 2.0 * above), "clip_on": False, "zorder": 5}
+        axes.plot(time[last], values[last], style.mark, color=colour, **end)
         ends.append((float(time[last]), float(values[last]), colour, end_label(curve, unit)))
     _draw_end_labels(axes, ends)
 
@@ -74,64 +79,22 @@ def _draw_end_labels(
     point, line_height = dpi / 72 / box.width, 1.45 * TEXT * dpi / 72
     places = axes.transData.transform([(x, y) for x, y, _, _ in ends])[:, 1]
     heights = spread(places, line_height, float(box.y0), float(box.y1))
-    words: Any = {"fontsize": TEXT, "fontweight": "bold", "va": "center", "ha": "left"}
+    words: Any = {"textcoords": axes.transAxes, "annotation_clip": False, "va": "center", "ha": "left"}
+    words |= {"fontsize": TEXT, "fontweight": "bold"}
     for (x, y, colour, text), place, height in zip(ends, places, heights, strict=True):
         fraction = (height - box.y0) / box.height
-        axes.annotate(
-            text,
-            xy=(x, y),
-            xytext=(1.0 + 12 * point, fraction),
-            textcoords=axes.transAxes,
-            xycoords="data",
-            annotation_clip=False,
-            color=colour,
-            **words,
-        )
+        axes.annotate(text, (x, y), (1.0 + 12 * point, fraction), color=colour, **words)
         if abs(height - place) > 0.3 * line_height:
-            axes.plot(
-                [1.0 + 4 * point, 1.0 + 10 * point],
-                [(place - box.y0) / box.height, fraction],
-                transform=axes.transAxes,
-                color=colour,
-                linewidth=0.8,
-                clip_on=False,
-            )
-
-
-def _frame(
-    axes: Axes, curves: Sequence[Curve], theme: Theme, bands: Sequence[tuple[Array, Array]], label: str
-) -> None:
-    lines = [*(np.asarray(curve[3]) for curve in curves), *(edge for band in bands for edge in band)]
-    values = np.concatenate([line[np.isfinite(line)] for line in lines])
-    times = np.concatenate([np.asarray(curve[2]) for curve in curves])
-    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
-    axes.set_xlim(float(times.min()), max(float(times.max()), float(times.min()) + 1e-9))
-    even_ticks(axes.xaxis, 8)
-    even_ticks(axes.yaxis, 6)
-    quiet_axes(axes, theme, "time (s)", label, grid="y")
+            line = [1.0 + 4 * point, 1.0 + 10 * point], [(place - box.y0) / box.height, fraction]
+            axes.plot(*line, transform=axes.transAxes, color=colour, linewidth=0.8, clip_on=False)
 
 
 def spread(heights: Array, gap: float, low: float, high: float) -> Array:
-    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit.
+    """Return (m,) heights at least `gap` apart, near to the given ones, from `low` to `high` if they fit."""
+    from scipy.optimize import isotonic_regression
 
-    >>> spread(np.array([5.0, 5.0, 20.0]), 4.0, 0.0, 30.0).tolist()
-    [3.0, 7.0, 20.0]
-    """
-    order = np.argsort(heights, kind="stable")
-    blocks: list[list[float]] = []  # sum of wanted first heights, number of members
-    for rank in order.tolist():
-        blocks.append([float(heights[rank]), 1.0])
-        while len(blocks) > 1:
-            (above, m), (below, k) = blocks[-1], blocks[-2]
-            bottom = below / k - 0.5 * gap * (k - 1)
-            if above / m - 0.5 * gap * (m - 1) - (bottom + gap * (k - 1)) >= gap - 1e-9:
-                break
-            blocks[-2:] = [[below + above, k + m]]
-    placed: list[float] = []
-    for total, count in blocks:
-        first = total / count - 0.5 * gap * (count - 1)
-        placed += [first + gap * k for k in range(int(count))]
+    order, steps = np.argsort(heights, kind="stable"), gap * np.arange(len(heights))
+    placed = isotonic_regression(heights[order] - steps).x + steps
     result = np.empty(len(heights))
-    steps = gap * np.arange(len(heights))
     result[order] = np.minimum(np.maximum(placed, low + steps), (high - steps)[::-1])
     return result

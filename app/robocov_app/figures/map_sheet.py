@@ -8,39 +8,31 @@ from matplotlib.figure import Figure
 from robocov.environment import Environment
 from robocov_app.figures.arena import draw_map, map_handles
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, Page, check_some
+from robocov_app.figures.page import HEADING, Page
 from robocov_app.render.layout import columns_for
 from robocov_app.render.theme import LIGHT, Theme, theme_named
 
 MOST = 60  # maps on a sheet: more would be too small to be seen
-_WIDTH, _HIGHEST = 1600, 1600  # pixels of a sheet for which no size is asked, across and at most down
+_WIDTH, _HIGHEST = 1600, 1600  # pixels of a sheet, across and at most down
 
 
 @plain_style()
-def plot_maps(
-    environments: Sequence[Environment],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "",
-) -> Figure:
-    """Plot the first `MOST` maps side by side at one scale, each under its name; the page has `size` px."""
-    check_some("maps", environments)
+def plot_maps(environments: Sequence[Environment], theme: Theme | str = LIGHT) -> Figure:
+    """Plot the first `MOST` maps side by side at one scale, each under its name."""
     theme = theme_named(theme)
-    drawn = list(environments)[:MOST]
-    if len(drawn) < len(environments):
-        title = f"{title}  ·  {len(drawn)} of {len(environments)}".removeprefix("  ·  ")
+    drawn = environments[:MOST]
+    title = f"{len(drawn)} of {len(environments)}" if len(drawn) < len(environments) else ""
     bounds = np.array([environment.region.bounds for environment in drawn])
     wide, high = (bounds[:, 2:] - bounds[:, :2]).max(axis=0).tolist()
     handles = {str(each.get_label()): each for one in drawn for each in map_handles(one, theme)}
     entries = [*handles.values()]
-    page = Page(size or (_WIDTH, _HIGHEST), theme, 1.5 if size is None else None)
+    page = Page((_WIDTH, _HIGHEST), theme, 1.5)
     above, top = 26 * page.scale, (46 if title else 8) * page.scale
-    columns = columns_for(len(drawn), wide / high, size or (1600, 1200), above)
-    if size is None:
-        slot = (_WIDTH - page.margin) / columns - page.margin
-        rows = -(-len(drawn) // columns)
-        tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
-        page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
+    columns = columns_for(len(drawn), wide / high, (1600, 1200), above)
+    slot = (_WIDTH - page.margin) / columns - page.margin
+    rows = -(-len(drawn) // columns)
+    tall = top + rows * (above + slot * high / wide + 14 * page.scale) + page.footer_height(entries)
+    page = Page((_WIDTH, int(np.clip(tall, 320, _HIGHEST))), theme, 1.5)
     below = page.footer_height(entries)
     panels = page.panels(len(drawn), columns, wide / high, 0.0, above, top, below)
     for environment, (low_x, low_y, *_), (box, room) in zip(drawn, bounds.tolist(), panels, strict=True):

@@ -10,8 +10,8 @@ from robocov.arrays import Array
 from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import Page, check_some
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.figures.page import Page
+from robocov_app.render.theme import Theme, theme_named
 
 
 class Measured(NamedTuple):
@@ -23,7 +23,6 @@ class Measured(NamedTuple):
 
 
 def share(area: Callable[[RunMetrics], Array]) -> Callable[[RunMetrics], Array]:
-    """Return an area as a percentage of the free area."""
     return lambda metrics: np.asarray(100.0 * area(metrics) / metrics.free_area)
 
 
@@ -37,19 +36,13 @@ PANELS: tuple[tuple[str, str, Callable[[RunMetrics], Array]], ...] = (
 
 
 @plain_style()
-def plot_metrics(
-    runs: Sequence[Measured],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] = (1200, 800),
-    title: str = "Metrics",
-) -> Figure:
+def plot_metrics(runs: Sequence[Measured], theme: Theme | str, title: str) -> Figure:
     """Plot the metrics of runs against time, each curve named with its value at the end."""
-    check_some("runs", runs)
     theme = theme_named(theme)
-    page = Page(size, theme)
+    page = Page((1200, 800), theme)
     s = page.scale
     page.title(title, 26)
-    width, height = size[0] / 2, (size[1] - 40 * s) / 2
+    width, height = 600.0, 400.0 - 20 * s
     for k, (label, unit, of) in enumerate(PANELS):
         curves = [(each.label, each.controller, each.metrics.time, of(each.metrics)) for each in runs]
         longest = max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)

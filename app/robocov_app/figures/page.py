@@ -18,18 +18,14 @@ from robocov_app.render.theme import Colour, Theme
 
 HEADING, TITLE, TEXT, SMALL = 14.0, 12.5, 9.5, 8.5  # text sizes in points
 Box: TypeAlias = tuple[float, float, float, float]  # left, top, width and height in pixels
-# which part of a legend is where it is put
-Place: TypeAlias = Literal["upper left", "upper center", "center right"]
 
 
 def tone(colour: Colour) -> tuple[float, float, float]:
-    """Return a colour as matplotlib wants it."""
     red, green, blue = colour
     return red / 255, green / 255, blue / 255
 
 
 def figure_of(axes: Axes) -> Figure:
-    """Return the figure that axes are on."""
     return cast("Figure", axes.get_figure(root=True))
 
 
@@ -65,17 +61,12 @@ def value_limits(low: float, high: float, *, room: float = 0.08, origin: float =
 
 
 def even_ticks(axis: Any, most: int) -> None:
-    """Mark 1, 2, 5 times a power of ten on an axis, at most so many of them."""
     axis.set_major_locator(MaxNLocator(nbins=most, steps=[1, 2, 5, 10]))
     axis.set_major_formatter("{x:g}")
 
 
 def cut_to(text: str, width_of: Callable[[str], float], room: float) -> str:
-    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it.
-
-    >>> cut_to("Lloyd's algorithm", len, 8)
-    "Lloyd's…"
-    """
+    """Return a text, cut so that it is no wider than `room` unless that leaves nothing of it: "Lloyd's…"."""
     kept = text
     while len(kept) > 1 and width_of(text if kept == text else f"{kept}…") > room:
         kept = kept[:-1]
@@ -101,24 +92,16 @@ class Page:
         self.theme = theme
         fitting = min(max(min(size[0] / 960, size[1] / 640), 0.8), 6.0)
         self.scale = fitting if scale is None else scale
+        self.margin = 18.0 * self.scale  # pixels that stay free at the edges
+        self.room = size[0] - 2 * self.margin  # between the margins
+        self._longest_bar = max(min(120 * self.scale, size[0] / 7), 20.0)
         dpi = 100.0 * self.scale
         # the pixels are counted by truncation: a hair more keeps 899.9999 at 900
         inches = ((size[0] + 1e-3) / dpi, (size[1] + 1e-3) / dpi)
         self.figure = Figure(figsize=inches, dpi=dpi, facecolor=tone(theme.background))
         FigureCanvasAgg(self.figure)
 
-    @property
-    def margin(self) -> float:
-        """Pixels that stay free at the edges."""
-        return 18.0 * self.scale
-
-    @property
-    def room(self) -> float:
-        """Pixels between the margins."""
-        return self.size[0] - 2 * self.margin
-
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return a pixel as fractions of the figure, which hold for every resolution."""
         return x / self.size[0], 1.0 - y / self.size[1]
 
     def axes(self, box: Box) -> Axes:
@@ -130,8 +113,7 @@ class Page:
     def map_axes(self, box: Box, low_x: float, low_y: float, high_x: float, high_y: float) -> Axes:
         """Return axes without ticks that show a part of the world, m, in a box of its shape."""
         axes = self.axes(box)
-        axes.set_xlim(low_x, high_x)
-        axes.set_ylim(low_y, high_y)
+        axes.set(xlim=(low_x, high_x), ylim=(low_y, high_y))
         axes.set_axis_off()
         return axes
 
@@ -183,14 +165,12 @@ class Page:
             written.set_text(text.rstrip(" ·") + "…")
 
     def text_width(self, text: str, *, points: float = TEXT, bold: bool = False) -> float:
-        """Return how wide a line would be, in pixels."""
         written = self.figure.text(0, 0, text, fontsize=points, fontweight="bold" if bold else "normal")
         width = self.width_of(written)
         written.remove()
         return width
 
     def width_of(self, artist: Any) -> float:
-        """Return how wide a text or legend is, in pixels."""
         return float(artist.get_window_extent(self.figure.canvas.get_renderer()).width)  # type: ignore[attr-defined]
 
     def footer_height(self, handles: Sequence[Artist], begin: float | None = None) -> float:
@@ -219,10 +199,6 @@ class Page:
             self._scale_bar(left, bottom + 20 * self.scale, zoom)
             self._legend(handles, columns, "upper center", ((begin + end) / 2, bottom + 38 * self.scale))
 
-    @property
-    def _longest_bar(self) -> float:
-        return max(min(120 * self.scale, self.size[0] / 7), 20.0)
-
     def _beside_bar(self, begin: float) -> float:
         """Return the width that the longest scale bar, with its words, leaves a legend in the same line."""
         return self.size[0] - self.margin - begin - self._longest_bar - 80 * self.scale
@@ -231,12 +207,8 @@ class Page:
         """Draw a bar of a round length; return where its words end."""
         length = round_length(self._longest_bar / zoom)
         tick, right = 4 * self.scale, left + length * zoom
-        for (x1, y1), (x2, y2) in (
-            ((left, y), (right, y)),
-            ((left, y - tick), (left, y + tick)),
-            ((right, y - tick), (right, y + tick)),
-        ):
-            (a, b), (c, d) = self.at(x1, y1), self.at(x2, y2)
+        for x1, x2, half in ((left, right, 0.0), (left, left, tick), (right, right, tick)):
+            (a, b), (c, d) = self.at(x1, y - half), self.at(x2, y + half)
             self.figure.add_artist(Line2D([a, c], [b, d], color=tone(self.theme.ink), linewidth=1.3))
         words = right + 8 * self.scale
         self.text(length_label(length), words, y, points=SMALL, bold=True)
@@ -253,20 +225,14 @@ class Page:
                 break
         return columns, float(extent.width), float(extent.height)
 
-    def _legend(
-        self, handles: Sequence[Artist], columns: int, place: Place, at: tuple[float, float]
-    ) -> Legend:
-        return self.figure.legend(
-            handles=list(handles),
-            loc=place,
-            bbox_to_anchor=self.at(*at),
-            ncols=columns,
-            frameon=False,
-            fontsize=SMALL,
-            labelcolor=tone(self.theme.ink),
-            borderaxespad=0.0,
-            borderpad=0.0,
-            columnspacing=1.6,
-            handletextpad=0.6,
-            handlelength=1.6,
-        )
+    def _legend(self, handles: Sequence[Artist], columns: int, place: str, at: tuple[float, float]) -> Legend:
+        """Draw a legend of which the `place`, as in "upper left", is `at` a pixel."""
+        style: Any = {
+            "frameon": False,
+            "fontsize": SMALL,
+            "labelcolor": tone(self.theme.ink),
+            "borderpad": 0.0,
+        }
+        style |= {"borderaxespad": 0.0, "columnspacing": 1.6, "handletextpad": 0.6, "handlelength": 1.6}
+        where: Any = {"loc": place, "bbox_to_anchor": self.at(*at)}
+        return self.figure.legend(handles=list(handles), ncols=columns, **where, **style)

@@ -1,25 +1,27 @@
-"""Plots of many runs together: cost bands, and rows of final costs and of pairs of controllers.
+"""Plots of many runs together: cost bands, rows of final costs and of pairs, what results depend on.
 
-They take plain numbers. What a result depends on (gains, team sizes) is in `robocov_app.figures.gains`.
-Heights of rows are counted from the top; names stand to the left, level, names of groups above their rows.
+They take plain numbers. Heights of rows are counted from the top; names stand to the left, level, names of
+groups above their rows.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from robocov.arrays import Array
-from robocov.errors import ParameterError, shown
-from robocov_app.figures.curves import DISTANCE, Curve, draw_curves, end_label
+from robocov.controllers.gains import Value, value_text
+from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import (
+    SMALL,
     TEXT,
     Page,
-    check_some,
     cut_to,
     even_ticks,
     figure_of,
@@ -28,8 +30,8 @@ from robocov_app.figures.page import (
     value_limits,
 )
 from robocov_app.figures.statistics import Interval
-from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.render.theme import LIGHT, Theme, theme_named
+from robocov_app.figures.styles import CurveStyle
+from robocov_app.render.theme import LIGHT, Theme
 
 _REACH = 1.5  # so much farther than its pairs an axis of ratios goes for their intervals
 _USUAL = 700.0  # width of a page in pixels from which on lines have their full width
@@ -40,110 +42,82 @@ _BESIDE = 13.0  # points between a row's name and the axis, where its mark stand
 _HALF = 0.27  # half of the height of a box, in rows
 # where an axis of ratios may have its marks; and beyond, powers of ten
 _RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0)
+MOST_LEVELS = 15  # different values of a gain up to which medians are drawn; more are a sample of a range
+MOST_LETTERS = 28  # of a name on an axis or in a legend
+MOST_RUNS = 600  # points that are drawn of a controller over a gain; of more, every so many-th
+_WIDE = 8.0  # an axis is logarithmic when its highest value is so many times its lowest
 
 
 class Band(NamedTuple):
     """Runs of one controller over time (T,) s: `values` (m, T) has a row for each, nan where it has none."""
 
     label: str
-    controller: str
+    style: CurveStyle
     time: Array
     values: Array
 
 
 class Sample(NamedTuple):
-    """One value of each of several runs: label, controller's name, (m,) values."""
+    """One value of each of several runs, (m,)."""
 
     label: str
-    controller: str
+    style: CurveStyle
     values: Array
 
 
 class Pairs(NamedTuple):
-    """Ratios (m,) of two controllers in pairs of runs, and the typical one; the colour is the first one's."""
+    """Ratios (m,) of two controllers in pairs of runs, all above 0, and the typical one."""
 
     label: str
-    controller: str
+    style: CurveStyle
     ratios: Array
     interval: Interval
 
 
 @plain_style()
-def plot_cost_bands(
-    bands: Sequence[Band],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
-    *,
-    scale: float | None = None,
-    styles: Sequence[CurveStyle] | None = None,
-    label: str = DISTANCE,
-    unit: str = "m",
-) -> Figure:
+def plot_cost_bands(bands: Sequence[Band], size: tuple[int, int], label: str, unit: str) -> Figure:
     """Plot values against time: of several runs their median and quartiles, of one run its line."""
-    check_some("bands", bands)
-    for band in bands:
-        if band.values.ndim != 2 or band.values.shape[1] != len(band.time):
-            raise ParameterError(
-                f"band {shown(band.label)}: values of shape {band.values.shape}, but a row for each run with "
-                f"{len(band.time)} columns was wanted"
-            )
-        if not np.isfinite(band.values).any():
-            wanted = "at least one in each was wanted"
-            raise ParameterError(f"band {shown(band.label)}: no finite value, but {wanted}")
-    theme = theme_named(theme)
-    looks = styles_of([band.controller for band in bands]) if styles is None else styles
+    page = Page(size, LIGHT, 1.0)
     curves, around = [], []
-    for band in bands:
-        low, middle, high = quartiles(band.values)
-        curves.append((band.label, band.controller, band.time, middle))
-        around.append((low, high) if len(band.values) > 1 else None)
-    page = Page(size or (1000, 560), theme, scale if size else scale or 1.25)
-    s = page.scale
-    most = 0.5 * page.size[0] - 30 * s
-    curves = [_fitting(curve, page, unit, most) for curve in curves]
-    right = 30 * s + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
-    left, top = 44 * s, (72 if title else 44) * s
-    if title:
-        page.title(title, 22)
-    axes = page.axes((left, top, page.size[0] - left - right, page.size[1] - top - 50 * s))
+    for name, style, time, values in bands:
+        low, middle, high = quartiles(values)
+        around.append((low, high) if len(values) > 1 else None)
+
+        def width_of(name: str, time: Array = time, middle: Array = middle) -> float:
+            return page.text_width(end_label((name, "", time, middle), unit), bold=True)
+
+        # what stands at a curve's end takes no more than half of the page
+        curves.append((cut_to(name, width_of, 0.5 * size[0] - 30), style.name, time, middle))
+    right = 30 + max(page.text_width(end_label(curve, unit), bold=True) for curve in curves)
+    axes = page.axes((44, 44, size[0] - 44 - right, size[1] - 94))
     # lines as in a picture of the usual size would fill a small one
-    weight = 1.0 if size is None or size[0] >= _USUAL * (scale or 1.0) else 0.7
-    draw_curves(axes, curves, theme, styles=looks, bands=around, label=label, unit=unit, weight=weight)
-    return figure_of(axes)
+    weight, styles = 1.0 if size[0] >= _USUAL else 0.7, [band.style for band in bands]
+    draw_curves(axes, curves, LIGHT, styles=styles, bands=around, label=label, unit=unit, weight=weight)
+    return page.figure
 
 
 @plain_style()
 def plot_final_costs(
     rows: Sequence[tuple[str, Sequence[Sample]]],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int | None] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
-    styles: Sequence[CurveStyle] | None = None,
-    label: str = DISTANCE,
+    label: str,
+    width: int,
+    scale: float,
+    theme: Theme = LIGHT,
     origin: float = 0.0,
 ) -> Figure:
     """Plot samples as boxes on their side, every value as a point, in groups such as maps, from the top.
 
     Boxes span the quartiles, whiskers 1.5 times as much; below `FEW` values only points and median stand.
-    A height of None is what they need. The axis begins at `origin` unless all values are far from it.
+    The axis begins at `origin` unless all values are far from it. What is not finite is left out.
     """
     samples = [sample for _, group in rows for sample in group]
-    _check_samples(samples)
-    theme = theme_named(theme)
     places, heads, total = laid_rows([(name, len(group)) for name, group in rows])
-    names = [sample.label for sample in samples]
-    axes, names = rows_page(total, names, theme, size, title, scale)
-    looks: list[CurveStyle] = []
-    for _, group in rows:
-        looks += styles_of([each.controller for each in group]) if styles is None else styles[: len(group)]
-    for sample, place, look in zip(samples, places, looks, strict=True):
-        draw_box(axes, np.sort(sample.values[np.isfinite(sample.values)]), place, look, theme)
-    _row_frame(axes, places, names, total, theme, label, looks)
-    values = np.concatenate([sample.values[np.isfinite(sample.values)] for sample in samples])
-    low, high = float(values.min()), float(values.max())
+    axes, names = rows_page(total, [sample.label for sample in samples], theme, width, scale)
+    finite = [np.sort(sample.values[np.isfinite(sample.values)]) for sample in samples]
+    for sample, values, place in zip(samples, finite, places, strict=True):
+        draw_box(axes, values, place, sample.style, theme)
+    _row_frame(axes, places, names, total, theme, label, [sample.style for sample in samples])
+    low, high = (float(end) for end in (min(map(np.min, finite)), max(map(np.max, finite))))
     axes.set_xlim(*value_limits(low, high, room=0.06, origin=origin))
     even_ticks(axes.xaxis, 6)
     box, ink = axes.get_position(), tone(theme.ink)
@@ -156,29 +130,12 @@ def plot_final_costs(
 
 
 @plain_style()
-def plot_paired(
-    pairs: Sequence[Pairs],
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int | None] | None = None,
-    title: str = "",
-    *,
-    scale: float | None = None,
-    label: str = "ratio of final mean distances",
-    styles: Sequence[CurveStyle] | None = None,
-) -> Figure:
+def plot_paired(pairs: Sequence[Pairs], label: str, width: int, scale: float, theme: Theme = LIGHT) -> Figure:
     """Plot ratios pair by pair, with the median and its 95 % interval, on a logarithmic axis."""
-    _check_samples([Sample(each.label, each.controller, each.ratios) for each in pairs])
-    for each in pairs:
-        if not (each.ratios > 0).all():
-            raise ParameterError(f"pairs {shown(each.label)}: ratios above 0 were wanted")
-    theme = theme_named(theme)
     places, _, total = laid_rows([("", len(pairs))])
-    names = [each.label for each in pairs]
-    axes, names = rows_page(total, names, theme, size, title, scale)
-    known = curve_styles(each.controller for each in pairs)
-    looks = [known[each.controller] for each in pairs] if styles is None else styles
-    for each, look, place in zip(pairs, looks, places, strict=True):
-        _draw_points(axes, np.sort(each.ratios), place, tone(look.colour(theme)), theme)
+    axes, names = rows_page(total, [each.label for each in pairs], theme, width, scale)
+    for each, place in zip(pairs, places, strict=True):
+        _draw_points(axes, np.sort(each.ratios), place, tone(each.style.colour(theme)), theme)
         ratio = each.interval
         if np.isfinite(ratio.low):
             line: Any = {"linewidth": 2.4, "solid_capstyle": "butt", "zorder": 4}
@@ -193,38 +150,17 @@ def plot_paired(
     return figure_of(axes)
 
 
-def quartiles(values: Array) -> tuple[Array, Array, Array]:
-    """Return quartiles and the median between, (T,), over finite rows of (m, T); nan for none."""
+def quartiles(values: Array) -> Array:
+    """Return the quartiles and the median between, (3, T), over finite rows of (m, T); nan for none."""
     kept = np.where(np.isfinite(values), values, np.nan)
     result = np.full((3, values.shape[1]), np.nan)
     some = ~np.isnan(kept).all(axis=0)
     result[:, some] = np.nanpercentile(kept[:, some], [25, 50, 75], axis=0)
-    return result[0], result[1], result[2]
-
-
-def _fitting(curve: Curve, page: Page, unit: str, room: float) -> Curve:
-    """Return a curve with its name cut so that what stands at its end takes no more than `room` pixels."""
-
-    def width_of(label: str) -> float:
-        return page.text_width(end_label((label, *curve[1:]), unit), bold=True)
-
-    return cut_to(curve[0], width_of, room), *curve[1:]
-
-
-def _check_samples(samples: Sequence[Sample]) -> None:
-    check_some("samples", samples)
-    for sample in samples:
-        if not np.isfinite(sample.values).any():
-            wanted = "at least one was wanted"
-            raise ParameterError(f"sample {shown(sample.label)}: no finite value, but {wanted}")
+    return result
 
 
 def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[float], float]:
-    """Return the middle of each row, the middle of each group's name, and the total height.
-
-    >>> laid_rows([("", 2)])
-    ([0.5, 1.5], [-0.5], 2.0)
-    """
+    """Return the middle of each row, the middle of each group's name, and the total height, in rows."""
     places: list[float] = []
     heads: list[float] = []
     at = 0.0
@@ -238,27 +174,16 @@ def laid_rows(groups: Sequence[tuple[str, int]]) -> tuple[list[float], list[floa
 
 
 def rows_page(
-    total: float,
-    names: Sequence[str],
-    theme: Theme,
-    size: tuple[int, int | None] | None,
-    title: str,
-    scale: float | None,
+    total: float, names: Sequence[str], theme: Theme, width: int, scale: float
 ) -> tuple[Axes, list[str]]:
     """Return axes on a page high enough for `total` rows, and the names as they fit to the left of them."""
-    width, height = size or (800, None)
-    # how high it is depends on the scale, not the other way round
-    page = Page((width, 200), theme, scale or min(max(width / 640, 0.8), 6.0))
-    s = page.scale
+    page = Page((width, 200), theme, scale)
     short = [cut_to(name, page.text_width, 0.42 * width) for name in names]
-    left = max(page.text_width(name) for name in short) + 32 * s
-    above, below = (36 if title else 8) * s, 46 * s
-    if height is None:
-        height = round(above + _ROW * s * total + below)
-    page = Page((width, height), theme, s)
-    if title:
-        page.title(title, 20)
-    return page.axes((left, above, width - left - 16 * s, height - above - below)), short
+    left = max(page.text_width(name) for name in short) + 32 * scale
+    above, below = 8 * scale, 46 * scale
+    height = round(above + _ROW * scale * total + below)
+    page = Page((width, height), theme, scale)
+    return page.axes((left, above, width - left - 16 * scale, height - above - below)), short
 
 
 def _row_frame(
@@ -348,3 +273,127 @@ def _scattered(count: int) -> Array:
         numbers += part * (rest % 2)
         rest, part = rest // 2, part / 2
     return numbers
+
+
+class Dependence(NamedTuple):
+    """Values of one controller's runs against a gain, (m,) each: nan is no limit, and a word its number."""
+
+    label: str
+    style: CurveStyle
+    gains: Array
+    values: Array
+
+
+@plain_style()
+def plot_gains(
+    dependences: Sequence[Dependence], gain: str, size: tuple[int, int], label: str, words: Sequence[str] = ()
+) -> Figure:
+    """Plot values against a gain, one colour and mark a controller, with a line through medians.
+
+    The axis of the gain is logarithmic where it spans much; null has a place of its own at the right. A gain
+    that is one of `words` has even places, and no line.
+    """
+    axes = _page_axes(size)
+    null = _gain_axis(axes, np.concatenate([each.gains for each in dependences]), words)
+    for each in dependences:
+        _draw_dependence(axes, each, null, joined=not words)
+    values = np.concatenate([each.values for each in dependences])
+    axes.set_ylim(*value_limits(float(values.min()), float(values.max())))
+    even_ticks(axes.yaxis, 6)
+    quiet_axes(axes, LIGHT, cut_to(gain, len, MOST_LETTERS), label, grid="y")
+    if len(dependences) > 1:
+        axes.legend(frameon=False, fontsize=SMALL, labelcolor=tone(LIGHT.ink), borderaxespad=0.2)
+    return figure_of(axes)
+
+
+@plain_style()
+def plot_gain_grid(
+    on: Axes | tuple[int, int],
+    first: Sequence[Value],
+    second: Sequence[Value],
+    values: Array,
+    gains: tuple[str, str],
+    theme: Theme = LIGHT,
+) -> Figure:
+    """Plot values (rows, columns) over a grid of two gains as a heat map with its numbers; nan for none.
+
+    `on`: axes, or the size of a page of its own in px. `first`, `second`: the gains' values, ascending, None
+    for no limit.
+    """
+    axes = on if isinstance(on, Axes) else _page_axes(on)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    colours = theme.quiet_heat
+    # numbers tell three digits, and a tenth of the way between the lowest and the highest
+    digits = [2 - math.floor(math.log10(abs(size))) for size in (high, 10.0 * (high - low)) if size]
+    decimals = min(max(0, *digits), 4) if digits else 2
+    for row, column in np.argwhere(np.isfinite(values)).tolist():
+        part = (values[row, column] - low) / (high - low) if high > low else 0.0
+        colour = tone(colours[round(part * (len(colours) - 1))])
+        # a hair's breadth of the page between cells
+        box = (column - 0.48, row - 0.48), 0.96, 0.96
+        axes.add_patch(Rectangle(*box, facecolor=colour, linewidth=0.0))
+        weight = "bold" if values[row, column] == low else "normal"
+        text = f"{values[row, column]:.{decimals}f}"
+        style: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": tone(theme.ink)}
+        axes.text(column, row, text, fontweight=weight, **style)
+    axes.set_xlim(-0.5, len(first) - 0.5)
+    axes.set_ylim(-0.5, len(second) - 0.5)
+    axes.set_xticks(range(len(first)), [value_text(value, digits=4) for value in first])
+    axes.set_yticks(range(len(second)), [value_text(value, digits=4) for value in second])
+    x, y = (cut_to(gain, len, MOST_LETTERS) for gain in gains)
+    quiet_axes(axes, theme, x, y)
+    axes.tick_params(length=0.0)
+    return figure_of(axes)
+
+
+def _page_axes(size: tuple[int, int]) -> Axes:
+    return Page(size, LIGHT, 1.0).axes((52, 34, size[0] - 70, size[1] - 84))
+
+
+def _gain_axis(axes: Axes, gains: Array, words: Sequence[str]) -> float | None:
+    """Set the scale of the axis; return where null stands on it, None where there is no null."""
+    if words:
+        axes.set_xlim(-0.5, len(words) - 0.5)
+        axes.set_xticks(range(len(words)), list(words))
+        return None
+    finite = gains[np.isfinite(gains)]
+    levels = np.unique(finite)
+    logarithmic = len(levels) > 1 and levels[0] > 0 and levels[-1] / levels[0] >= _WIDE
+    low, high = (float(levels[0]), float(levels[-1])) if len(levels) else (0.0, 0.0)
+    unlimited = bool(np.isnan(gains).any())
+    if logarithmic:
+        axes.set_xscale("log")
+        room = (high / low) ** 0.07
+        end = high * room**3 if unlimited else high
+        axes.set_xlim(low / room, end * room)
+    else:
+        room = 0.07 * (high - low) if high > low else 0.5 * max(abs(high), 1.0)
+        end = high + 3 * room if unlimited else high
+        axes.set_xlim(low - room, end + room)
+    null = [end] if unlimited else []
+    ticks = levels.tolist()
+    if len(levels) > 8:
+        locator = LogLocator(subs=(1.0, 3.0)) if logarithmic else MaxNLocator(6, steps=[1, 2, 5, 10])
+        ticks = [float(value) for value in locator.tick_values(low, high) if low <= value <= high]
+    axes.xaxis.set_major_locator(FixedLocator([*ticks, *null]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    texts = [value_text(value, digits=4) for value in ticks]
+    axes.set_xticklabels([*texts, *("none" for _ in null)])
+    return end if unlimited else None
+
+
+def _draw_dependence(axes: Axes, each: Dependence, null: float | None, *, joined: bool) -> None:
+    style, label = each.style, cut_to(each.label, len, MOST_LETTERS)
+    colour = tone(style.colour(LIGHT))
+    where = each.gains if null is None else np.where(np.isnan(each.gains), null, each.gains)
+    step = -(-len(where) // MOST_RUNS)
+    dots: Any = {"color": colour, "markeredgewidth": 0.0, "linestyle": "none"}
+    axes.plot(where[::step], each.values[::step], style.mark, markersize=3.6, alpha=0.5, **dots)
+    levels = np.unique(where)
+    if len(levels) > MOST_LEVELS:
+        axes.plot([], [], style.mark, markersize=5.0, label=label, **dots)
+        return
+    medians = np.array([np.median(each.values[where == level]) for level in levels])
+    dashes = style.dashes if joined else "none"
+    line: Any = {"color": colour, "linestyle": dashes, "linewidth": 2.0, "label": label}
+    axes.plot(levels, medians, marker=style.mark, markersize=6.5, **line)

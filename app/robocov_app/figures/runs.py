@@ -1,6 +1,8 @@
 """Publication plots: trajectories, cost curves and comparisons, as matplotlib figures (never pyplot's)."""
 
 from collections.abc import Sequence
+from itertools import compress
+from operator import not_
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,7 +15,7 @@ from robocov.record import Record
 from robocov_app.figures.arena import draw_map, draw_run, label_of, map_handles, run_handles, ticks_in_metres
 from robocov_app.figures.curves import Curve, draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import HEADING, TEXT, TITLE, Box, Page, check_some, figure_of
+from robocov_app.figures.page import HEADING, TEXT, TITLE, Page, check_some, figure_of
 from robocov_app.render.density import cost_label, mean_label
 from robocov_app.render.layout import columns_for, united
 from robocov_app.render.theme import LIGHT, Theme, theme_named
@@ -55,7 +57,8 @@ def plot_trajectories(
     `axes`: None makes a page of `size` px. `colours`: those of the paper, or a hue for each robot.
     `mean_distance`, m, and `mean_time`, s, of the final positions are for the title.
     """
-    _check_colours(colours)
+    if colours not in ("paper", "robots"):
+        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
     theme = theme_named(theme)
     if axes is None:
         facts = [_cost(record.environment, mean_distance, mean_time), _time(record), _robots(record)]
@@ -78,17 +81,7 @@ def plot_comparison(
     mean_times: Sequence[float | None] | None = None,
 ) -> Figure:
     """Plot runs side by side at one scale, with final mean distances, m, and times, s, in the titles."""
-    _check_colours(colours)
-    costs = list(mean_distances) if mean_distances is not None else [None] * len(records)
-    if not records or len(costs) != len(records):
-        raise ParameterError(
-            f"comparison: {len(records)} runs and {len(costs)} mean distances, "
-            f"but at least one run and one distance for each was wanted"
-        )
-    times = list(mean_times) if mean_times is not None else [None] * len(records)
-    if len(times) != len(records):
-        wanted = "one time for each was wanted"
-        raise ParameterError(f"comparison: {len(records)} runs and {len(times)} mean times, but {wanted}")
+    costs, times = (known or [None] * len(records) for known in (mean_distances, mean_times))
     theme = theme_named(theme)
     bounds = np.array([record.environment.region.bounds for record in records])
     limits = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
@@ -167,11 +160,6 @@ def plot_cost(
     return figure_of(axes)
 
 
-def _check_colours(colours: str) -> None:
-    if colours not in ("paper", "robots"):
-        raise ParameterError(f"colours: {shown(colours)}, but 'paper' or 'robots' was wanted")
-
-
 def _map_page(
     environment: Environment,
     theme: Theme,
@@ -193,37 +181,30 @@ def _map_page(
     width = min(page.room, room_y * aspect)
     height = width / aspect
     box = (page.size[0] - width) / 2, above + (room_y - height) / 2, width, height
-    _titles(page, box, title, facts)
+    for text, up, points, bold, colour in (
+        (title, 38, TITLE, True, theme.ink),
+        (facts, 16, TEXT, False, theme.faint),
+    ):
+        # above a narrow map lines may be wider than it
+        wide = min(page.text_width(text, points=points, bold=bold), page.room)
+        start = box[0] if wide <= width else max(box[0] + (width - wide) / 2, page.margin)
+        y = box[1] - up * page.scale
+        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
     page.footer(handles, [box], width / (high_x - low_x))
     return page.map_axes(box, low_x, low_y, high_x, high_y)
-
-
-def _titles(page: Page, box: Box, title: str, facts: str) -> None:
-    """Write two lines above `box`; above a narrow map they may be wider than it."""
-    left, top, width, _ = box
-    for text, up, points, bold, colour in (
-        (title, 38, TITLE, True, page.theme.ink),
-        (facts, 16, TEXT, False, page.theme.faint),
-    ):
-        wide = min(page.text_width(text, points=points, bold=bold), page.room)
-        start = left if wide <= width else max(left + (width - wide) / 2, page.margin)
-        y = top - up * page.scale
-        page.text(text, start, y, points=points, bold=bold, colour=colour, room=page.room)
 
 
 def _captions(
     records: Sequence[Record], costs: Sequence[float | None], times: Sequence[float | None]
 ) -> tuple[str, list[str]]:
     """Return what is true of all runs, for the page's title, and of each, what is not."""
-    same: list[str] = []
-    own = [[_cost(each.environment, *known)] for each, *known in zip(records, costs, times, strict=True)]
-    for found in zip(*((each.environment.name, _robots(each), _time(each)) for each in records), strict=True):
-        if len(set(found)) == 1:
-            same.append(found[0])
-        else:
-            for facts, text in zip(own, found, strict=True):
-                facts.append(text)
-    return _line(*same), [_line(*facts) for facts in own]
+    every = [(each.environment.name, _robots(each), _time(each)) for each in records]
+    shared = [len(set(found)) == 1 for found in zip(*every, strict=True)]
+    own = [
+        _line(_cost(each.environment, *known), *compress(facts, map(not_, shared)))
+        for each, facts, *known in zip(records, every, costs, times, strict=True)
+    ]
+    return _line(*compress(every[0], shared)), own
 
 
 def _line(*facts: str) -> str:

@@ -44,7 +44,6 @@ class CurveStyle(NamedTuple):
     mark: str
 
     def colour(self, theme: Theme) -> Colour:
-        """Return the colour in a theme."""
         kind, _, number = self.name.rpartition("-")
         return theme.others[int(number)] if kind == "other" else theme.controller(self.name)
 
@@ -56,11 +55,7 @@ def curve_styles(controllers: Iterable[str]) -> dict[str, CurveStyle]:
 
 
 def styles_of(controllers: Sequence[str]) -> list[CurveStyle]:
-    """Return a style for each of several curves: another colour, dashes and mark for a controller's variants.
-
-    >>> [(style.name, style.mark) for style in styles_of(["rapf", "rapf", "mine"])]
-    [('rapf', 'o'), ('other-1', 'v'), ('other-0', 'D')]
-    """
+    """Return a style for each curve: another colour, dashes and mark for each of a controller's variants."""
     spare = [CurveStyle(f"other-{k}", *look) for k, look in enumerate(VARIANTS)]
     free = itertools.cycle(spare)
     first = {

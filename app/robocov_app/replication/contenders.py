@@ -1,11 +1,15 @@
 """Compared controllers with their gains: the paper's, other authors', and our own."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 
 from robocov.controllers import CONTROLLERS, gain_values, make_controller
 from robocov.controllers.gains import Value, value_text
+
+ASSETS = Path(__file__).parent / "assets"
 
 PAPER = ("rapf", "rpf", "lloyd")  # controllers of the paper's claims
 OURS = ("atlas", "atlas-shared")  # the project's own controllers; the goals are for the first
@@ -38,7 +42,6 @@ class Contender:
 
     @property
     def all_gains(self) -> dict[str, Value]:
-        """All gains, the controller's defaults among them."""
         return dict(gain_values(make_controller(self.controller, self.gains)))
 
     @property
@@ -48,12 +51,10 @@ class Contender:
 
 
 def of_paper(key: str, gains: Mapping[str, Value]) -> Contender:
-    """Return a contender of the paper's claims."""
     return Contender(key, LABELS[key], key.partition("-")[0], dict(gains))
 
 
 def with_gains(name: str, gains: Mapping[str, Value]) -> Contender:
-    """Return a registered controller with other gains than its defaults."""
     return Contender(name, CONTROLLERS[name].label, name, dict(gains))
 
 
@@ -81,45 +82,22 @@ OWN = tuple(with_gains(name, {}) for name in OURS)
 
 
 def grid(**values: Sequence[Value]) -> tuple[dict[str, Value], ...]:
-    """Return all combinations of values of gains."""
     return tuple(dict(zip(values, each, strict=True)) for each in product(*values.values()))
 
 
-# Sets of gains that are tried of each baseline; what they do not name has its default. One to three gains
-# vary that decide where a controller ends, not how hard a robot is driven or how finely something is sampled.
-# What a baseline is for stays: `poduri` keeps two neighbours, `range-limited` a range, `barrier` a safe gap.
-# Defaults of `robocov.controllers` are the best sets of the full study; those before them are among these.
+# sets of gains that are tried of each baseline
 GRIDS: Mapping[str, tuple[dict[str, Value], ...]] = {
-    "howard": grid(k_robots=(3.0, 10.0, 30.0), k_obs=(0.3, 1.0, 3.0)),
-    "poduri": grid(link_range=(4.0, 6.0, 12.0), k_cover=(3.0, 10.0, 30.0), k_obs=(0.1, 0.3)),
-    "dispersion": (
-        *grid(reach=(3.5, 4.25, 5.0, 6.0, 7.0), k_disperse=(1.0,)),
-        *grid(reach=(5.0,), k_disperse=(0.3, 3.0)),
-    ),
-    "range-limited": grid(interaction_range=(4.0, 6.0, 9.0, 12.0)),
-    # with a detour of 2 it does not get out of a trap any more
-    "tangentbug": (*grid(detour=(4.0, 8.0, 16.0), moved=(0.5,)), {"detour": 4.0, "moved": 0.25}),
-    # a higher gamma lets robots of 2 m/s into the safe gap
-    "barrier": (*grid(gamma=(5.0, 20.0), braking=(0.8,)), {"gamma": 20.0, "braking": 0.5}),
-    "visibility": grid(k_area=(0.05, 0.1, 0.3), jump=(0.3,)),
-    "boosting": (*grid(boost=("phi", "p", "neighbours"), decay=(0.1,)), {"boost": "phi", "decay": 0.3}),
-    "adaptive": grid(learning=(1.0, 3.0, 10.0)),
-    "diffeomorphism": grid(shrink=(1e2, 1e3, 1e4)),
-    "geodesic-lloyd": grid(exponent=(1.0, 1.5, 2.0)),
-    "frontier-median": grid(beta=(0.02, 0.05, 0.15)),
-    "greedy-submodular": grid(threshold=(0.003, 0.01, 0.03)),
-    "voronoi-graph": grid(threshold=(0.003, 0.01, 0.03)),
+    name: tuple(each for part in parts for each in grid(**part))
+    for name, parts in tomllib.loads((ASSETS / "grids.toml").read_text(encoding="utf-8")).items()
 }
 
 
 def baselines(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
-    """Return all registered controllers of other authors, each with its `best` gains or its defaults."""
     others = [name for name in CONTROLLERS if name not in (*PAPER, *OURS)]
     return tuple(with_gains(name, best.get(name, {})) for name in others)
 
 
 def paper_contenders(best: Mapping[str, Mapping[str, Value]]) -> tuple[Contender, ...]:
-    """Return the paper's contenders, where they are known also RAPF and RPF at their `best` gains."""
     if not best:
         return UNTUNED
     rapf, rpf = (of_paper(f"{name}-best", best[name]) for name in ("rapf", "rpf"))
@@ -138,19 +116,16 @@ def distinct_gains(contenders: Sequence[Contender]) -> dict[str, list[dict[str, 
     found: dict[str, list[dict[str, Value]]] = {}
     for each in contenders:
         sets = found.setdefault(each.controller, [])
-        if each.all_gains not in sets:
-            sets.append(each.all_gains)
+        sets += [each.all_gains] * (each.all_gains not in sets)
     return found
 
 
 def potential_text(gains: Mapping[str, Value], no_limit: str = "") -> str:
     """Return gains of the potential, numbers all: "(k_rep 1, rho_0 2)"; `no_limit`: unlimited attraction."""
-    parts = []
-    for name, value in gains.items():
-        if isinstance(value, str) or name == "height":
-            continue
-        if value is not None:
-            parts.append(f"{name} {value_text(value)}")
-        elif no_limit:
-            parts.append(no_limit if name == "attraction_limit" else f"{name} none")
+    known = {name: each for name, each in gains.items() if not isinstance(each, str) and name != "height"}
+    parts = [
+        no_limit if each is None and name == "attraction_limit" else f"{name} {value_text(each)}"
+        for name, each in known.items()
+        if each is not None or no_limit
+    ]
     return f"({', '.join(parts)})"

@@ -4,7 +4,6 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -12,16 +11,14 @@ import numpy as np
 from robocov.controllers import controller_kind, gain_values, information_of, make_controller
 from robocov.controllers.gains import value_text
 from robocov_app.figures.statistics import Interval, bootstrap
-from robocov_app.replication.beyond_claims import capitalised
-from robocov_app.replication.claims import amount, share_above_zero
-from robocov_app.replication.contenders import OURS, Contender
-from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes, Scenario
+from robocov_app.replication.claims import amount, capitalised, share_above_zero
+from robocov_app.replication.contenders import ASSETS, OWN, Contender
+from robocov_app.replication.outcomes import Comparison, GainOutcomes, Outcomes
 from robocov_app.replication.results import BeyondResults
+from robocov_app.report.groups import parted
 
 WORST_MAPS = 3  # so many maps are named on which a controller does worst
 OFTEN = 0.05  # a failure is told of a controller when it happens in more than 5 % of its runs
-
-ASSETS = Path(__file__).parent / "assets"
 
 _NOT_READ = "; made from what is generally known of it, not from its text."
 
@@ -76,7 +73,6 @@ def account_of(controller: str) -> Account:
 
 
 def law_rows(outcomes: Outcomes, contenders: Iterable[Contender]) -> list[LawRow]:
-    """Return a row for each contender that has runs."""
     rows = []
     for each in contenders:
         fine = outcomes.measured("gap", each.key)
@@ -107,10 +103,7 @@ def ranked_rows(results: BeyondResults) -> list[LawRow]:
 
 
 def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
-    """Return what is said of every controller, in the order in which the rows have its best contender."""
-    own: dict[str, list[LawRow]] = {}
-    for row in rows:
-        own.setdefault(row.contender.controller, []).append(row)
+    own = parted(rows, lambda row: row.contender.controller)
     return [
         Evidence(
             account_of(name),
@@ -125,26 +118,20 @@ def evidence(results: BeyondResults, rows: Iterable[LawRow]) -> list[Evidence]:
 
 
 def duels(results: BeyondResults, rows: Sequence[LawRow]) -> list[tuple[str, str, Comparison]]:
-    """Return each of our controllers against these contenders, in the scenarios of both."""
-    labels = {each.key: each.label for each in results.contenders}
-    found = []
-    for ours in OURS:
-        for other in (row.contender for row in rows):
-            pairs = None if other.key == ours else results.outcomes.compared(ours, other.key)
-            if pairs is not None:
-                found.append((labels[ours], other.label, pairs))
-    return found
+    both = [(ours, row.contender) for ours in OWN for row in rows if row.contender.key != ours.key]
+    pairs = [
+        (ours.label, other.label, results.outcomes.compared(ours.key, other.key)) for ours, other in both
+    ]
+    return [(first, second, found) for first, second, found in pairs if found is not None]
 
 
 def failure_text(outcomes: Outcomes, law: LawRow) -> str:
-    """Return in words where a contender does worst, and what else goes wrong in its runs."""
     key = law.contender.key
     medians = sorted(outcomes.median_by_map(key).items(), key=lambda item: -item[1])[:WORST_MAPS]
     highest = ", ".join(f"{name} {amount(high, '%')}" for name, high in medians)
-    parts = [f"Highest medians: {highest}."]
     gap = outcomes.of(key, "gap")
     worst = int(np.nanargmax(gap))
-    parts.append(f"Worst run: {amount(gap[worst], '%')} above the reference ({outcomes.scenarios[worst]}).")
+    words = f"Highest medians: {highest}. Worst run: {amount(gap[worst], '%')} above the reference"
     troubles = "; ".join(
         f"{words} in {amount(share, '%')} of the runs"
         for share, words in (
@@ -154,23 +141,13 @@ def failure_text(outcomes: Outcomes, law: LawRow) -> str:
         )
         if share > OFTEN
     )
-    if troubles:
-        parts.append(f"{capitalised(troubles)}.")
-    elif law.touched == 0.0:
-        parts.append("No contact in any run.")
-    return " ".join(parts)
-
-
-def worst_text(outcomes: Outcomes, scenario: Scenario, law: str, others: Mapping[str, str]) -> str:
-    """Return in words how far a law and `others`, labels by key, ended above the reference in a scenario."""
-    k = outcomes.scenarios.index(scenario)
-    gaps = {key: amount(outcomes.of(key, "gap")[k], "%") for key in (law, *others)}
-    beside = ", ".join(f"{label} {gaps[key]}" for key, label in others.items())
-    return f"{gaps[law]} above the reference ({beside})"
+    more = (
+        f" {capitalised(troubles)}." if troubles else " No contact in any run." if law.touched == 0.0 else ""
+    )
+    return f"{words} ({outcomes.scenarios[worst]}).{more}"
 
 
 def gains_text(controller: str, grid: GainOutcomes) -> str:
-    """Return in words which gains of a baseline are best, and how its defaults and the worst set compare."""
     grid = grid.complete
     if not grid.scenarios:
         return "Gains: its defaults; in every scenario of the tuning some run failed."

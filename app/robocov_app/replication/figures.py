@@ -1,10 +1,13 @@
-"""The paper's figures 1 to 8 on environments of the same kinds, ready for print, and what they show in words.
+"""The paper's figures 1 to 8 on environments of the same kinds, plots of the claims, and those beyond it.
 
 Starts are green, final positions blue, trajectories red; RAPF's cost is blue, RPF's red, as in the paper.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -12,46 +15,46 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import ConnectionPatch, Polygon, Rectangle
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
+from robocov.arrays import Array
 from robocov.environment import Environment
+from robocov.errors import counted
+from robocov.locational import Distance, Sensing, value
+from robocov.locational.best_points import best_points
 from robocov.metrics import CostHistory
+from robocov.observation.region import Region
 from robocov.record import Record
-from robocov.voronoi import partition
+from robocov.voronoi import VoronoiPartition, partition
 from robocov_app.figures import arena
 from robocov_app.figures.curves import draw_curves, end_label
 from robocov_app.figures.files import plain_style
-from robocov_app.figures.page import SMALL, TITLE, Page, tone
+from robocov_app.figures.page import SMALL, TEXT, TITLE, Box, Page, quiet_axes, tone
+from robocov_app.figures.results import Pairs, Sample, plot_final_costs, plot_gain_grid, plot_paired
+from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
 from robocov_app.render.layout import united
 from robocov_app.render.scene import CENTROID, GOAL
 from robocov_app.render.theme import LIGHT, Theme, mix, theme_named
-from robocov_app.replication.claims import amount
-from robocov_app.replication.outcomes import FIRST_MINUTE, matched_distance, mean_until
-from robocov_app.replication.results import FigureRun
+from robocov_app.replication import outcomes as reached
+from robocov_app.replication.claims import CLUSTERED, amount
+from robocov_app.replication.contenders import ASSETS, LABELS, OURS, OWN, TARGETS, TEAMS
+from robocov_app.replication.evidence import ranked_rows
+from robocov_app.replication.outcomes import FIRST_MINUTE, Comparison, GainOutcomes, Outcomes
+from robocov_app.replication.results import BeyondResults, Degradation, FigureRun, PaperResults
+from robocov_app.sweep.study import UNITS
 
 DOTS = 3.0  # scale of the pages: 300 dots an inch
 WIDE, NARROW = 2148, 1050  # pixels of two columns of a journal (7.16 inches) and of one (3.5 inches)
 HIDDEN = 0.25  # m from its centroid within which a robot's disc hides it, on a map of ten metres
 ARRIVED = 0.05  # a cost has arrived when it stays within 5 % of its last value
 
-# the paper's figures, in its order: the case of each, and what is to be seen
-FIGURES = {
-    1: (
-        "partition",
-        "A Voronoi partition of a convex region: robots in blue, the centres of mass of their cells as dots.",
-    ),
-    2: ("convex", "A convex region without obstacles: (a) RAPF, (b) LA."),
-    3: ("convex", "The cost of both against time."),
-    4: ("a", "A first non-convex environment: (a) RAPF, (b) RPF, from the same starts."),
-    5: ("a", "The cost of both against time."),
-    6: ("b", "A second non-convex environment, the same starts as in figure 4: (a) RAPF, (b) RPF."),
-    7: ("b", "The cost of both against time."),
-    8: ("other", "The second environment again, from other starts: (a) RAPF, (b) RPF."),
-}
+# the paper's figures, in its order, and the case that each shows
+FIGURES = {1: "partition", 2: "convex", 3: "convex", 4: "a", 5: "a", 6: "b", 7: "b", 8: "other"}
 COSTS = (3, 5, 7)  # figures of the cost against time; all but the first of the others show trajectories
 
 
 def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme: Theme | str) -> Figure:
-    """Draw a figure of the paper: of `runs` by "case/controller", figure 1 the first moment of `first`."""
     theme = theme_named(theme)
     if number == 1:
         return partition_figure(first, theme)
@@ -60,18 +63,17 @@ def draw_figure(number: int, runs: Mapping[str, FigureRun], first: Record, theme
 
 
 def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -> str:
-    """Return what a figure shows here, in words with numbers; parameters as for `draw_figure`."""
     if number == 1:
-        places = first.positions[0]
-        away = np.hypot(*(partition(places, first.environment.region).centroid - places).T)
-        return (
-            f"The robots stand anywhere in “{first.environment.name}”, on average "
-            f"{amount(float(away.mean()), 'm')} from the centres of mass of their cells."
+        places, environment = first.positions[0], first.environment
+        away = amount(
+            float(np.hypot(*(partition(places, environment.region).centroid - places).T).mean()), "m"
         )
+        where = f"The robots stand anywhere in “{environment.name}”, on average {away}"
+        return f"{where} from the centres of mass of their cells."
     ours, other = pair = _pair(runs, number)
     label, costs = other.record.label, [run.history.mean_distance for run in pair]
     if number in COSTS:
-        early, shared = [mean_until(run.history, FIRST_MINUTE) for run in pair], min(map(len, costs))
+        early, shared = [reached.mean_until(run.history, FIRST_MINUTE) for run in pair], min(map(len, costs))
         below, at_rest = costs[0][1:shared] < costs[1][1:shared], [arrival(run.history) for run in pair]
         return (
             f"Averaged over the first {FIRST_MINUTE:g} s RAPF has {early[0]:.3f} m, {label} "
@@ -86,7 +88,7 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -
     )
     if number == 8:
         ends = {name: run.record.positions[-1] for name, run in runs.items()}
-        moved = [matched_distance(ends[f"b/{law}"], ends[f"other/{law}"]) for law in ("rapf", "rpf")]
+        moved = [reached.matched_distance(ends[f"b/{law}"], ends[f"other/{law}"]) for law in ("rapf", "rpf")]
         words += (
             f" Between the ends of figure 6 and these, robots are {amount(moved[0], 'm')} apart with RAPF "
             f"and {amount(moved[1], 'm')} with RPF (matched with the least sum of distances)."
@@ -96,7 +98,6 @@ def describe_figure(number: int, runs: Mapping[str, FigureRun], first: Record) -
 
 @plain_style()
 def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
-    """Draw the Voronoi partition of a run's first moment with robots and centroids (figure 1)."""
     environment, robots = first.environment, first.positions[0]
     ink, edge = tone(theme.ink), tone(theme.cell_edge)
     dot: Any = {"linestyle": "none", "marker": "o", "markersize": 4.0, "color": ink}
@@ -119,13 +120,9 @@ def partition_figure(first: Record, theme: Theme = LIGHT) -> Figure:
 
 
 def trajectories_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
-    """Draw runs on one map side by side: (a), (b), ... (figures 2, 4, 6, 8)."""
-    hidden = all(
-        (np.hypot(*(run.record.goals[-1] - run.record.positions[-1]).T) < HIDDEN).all()
-        for run in runs
-        if arena.has_goals(run.record)
-    )
     records = [run.record for run in runs]
+    aiming = [record for record in records if arena.has_goals(record)]
+    hidden = all((np.hypot(*(each.goals[-1] - each.positions[-1]).T) < HIDDEN).all() for each in aiming)
     finals = [f"mean distance {run.history.mean_distance[-1]:.3f} m" for run in runs]
     unnamed = (CENTROID, GOAL) if hidden else ()
     return side_by_side(records, [each.label for each in records], finals, theme, unnamed)
@@ -156,7 +153,6 @@ def side_by_side(
 
 @plain_style()
 def cost_figure(runs: Sequence[FigureRun], theme: Theme = LIGHT) -> Figure:
-    """Draw the cost of runs against time (figures 3, 5, 7)."""
     both = [(run.record, run.history) for run in runs]
     curves = [(run.label, run.controller, cost.time, cost.mean_distance) for run, cost in both]
     page = Page((WIDE, 1050), theme, DOTS)
@@ -189,7 +185,7 @@ def arrival(history: CostHistory) -> float:
 
 
 def _pair(runs: Mapping[str, FigureRun], number: int) -> tuple[FigureRun, FigureRun]:
-    case, _ = FIGURES[number]
+    case = FIGURES[number]
     return runs[f"{case}/rapf"], runs[f"{case}/{'lloyd' if case == 'convex' else 'rpf'}"]
 
 
@@ -198,3 +194,400 @@ def _difference_text(mine: float, theirs: float) -> str:
     if abs(change) < 0.0005:
         return "the same"
     return f"{amount(abs(change), '%')} {'less' if change < 0 else 'more'}"
+
+
+# how every plot is drawn, by its name; those without a run are left out
+Plots: TypeAlias = Mapping[str, Callable[[], Figure]]
+
+# what is said of the figures, by their names
+CAPTIONS: Mapping[str, str] = tomllib.loads((ASSETS / "captions.toml").read_text(encoding="utf-8"))
+
+_TICKS = (0.0, 1.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 400.0, 800.0)  # of the axis of gaps, %
+_BESIDE = 0.11  # how far controllers stand beside each other, in distances between two values
+_SIZE = (1180, 720)  # of the plot of degradations, px
+
+
+def paper_plots(results: PaperResults, theme: Theme | str) -> Plots:
+    convex, claims, theme = results.convex, results.claims, theme_named(theme)
+    against_lloyd = [("at the end", convex.compared("rapf-shared", "lloyd"), "rapf")]
+    for start in CLUSTERED:
+        pairs = convex.from_starts(start).compared("rapf-shared", "lloyd", "early")
+        against_lloyd.append((f"first 20 s, start {start}", pairs, "rapf"))
+    nonconvex = []
+    for label, other, measure, when in (
+        ("RPF", "rpf-{}", "final", "at the end"),
+        ("RPF", "rpf-{}", "first_minute", "first 60 s"),
+        ("LA", "lloyd", "final", "at the end"),
+    ):
+        for gains in ("shared", "best"):
+            pairs = claims.compared(f"rapf-{gains}", other.format(gains), measure)
+            nonconvex.append((f"{label}, {when}, {gains} gains", pairs, "rapf"))
+    kinds = list(dict.fromkeys(claims.starts))
+    by_start = [
+        (LABELS[law], _samples((f"start {start}", claims.from_starts(start), law) for start in kinds))
+        for law in ("rapf-shared", "rpf-shared")
+    ]
+    gaps = [("", _samples((label, claims, law) for law, label in LABELS.items()))]
+    known = all(grid.complete.scenarios for grid in results.gains.values())
+    against = "RAPF by the other law, pair by pair (1: equal)"
+    return _drawn(
+        {
+            "claim-1-convex": _pairs_plot(against_lloyd, "RAPF by LA, pair by pair (1: equal)", theme),
+            "claim-2-nonconvex": _pairs_plot(nonconvex, against, theme),
+            "claim-3-gains": partial(gains_plot, results.gains, theme) if known else None,
+            "claim-4-starts": _boxes_plot(by_start, theme),
+            "claim-6-gap": _boxes_plot(gaps, theme),
+        }
+    )
+
+
+def beyond_plots(results: BeyondResults, theme: Theme | str) -> Plots:
+    theme, outcomes, teams = theme_named(theme), results.outcomes, results.teams
+    laws = [row.contender for row in ranked_rows(results)]
+    ours = OWN[0].key
+    others = [law for law in laws if law.key != ours]
+    duels = [(law.label, outcomes.compared(ours, law.key), law.controller) for law in others]
+    targets = [(law.label, results.targets.compared(law.key, TARGETS[0].key), "rapf") for law in TARGETS[1:]]
+    times = [
+        (law.label, teams.compared(law.key, other.key, "time"), law.controller)
+        for other, law in zip(TEAMS[::2], TEAMS[1::2], strict=True)
+    ]
+    samples, size = gap_samples(results), (WIDE, round(0.41 * WIDE))
+    # both over the density
+    weighed = results.density.pictures[0].record.environment
+    pictures = [replace(each.record, environment=weighed) for each in results.density.pictures]
+    finals = [f"mean distance by φ {cost:.3f} m" for cost in results.density.costs]
+    known = any(np.isfinite(each.ratio.estimate) for each in results.degradations)
+    return _drawn(
+        {
+            "beyond-gaps": partial(gaps_plot, samples, theme) if samples else None,
+            "beyond-pairs": _pairs_plot(duels, "ours by the other's, pair by pair (1: equal)", theme),
+            "beyond-heights": partial(plot_heights, size, theme, 0.68 * DOTS),
+            "beyond-targets": _pairs_plot(targets, "by the centroid, pair by pair (1: equal)", theme),
+            "beyond-density": partial(side_by_side, pictures, ("knows φ", "ignores φ"), finals, theme),
+            "beyond-teams": _pairs_plot(times, "mean time, by time to by distance (1: equal)", theme),
+            "beyond-conditions": partial(plot_degradations, results.degradations, theme) if known else None,
+        }
+    )
+
+
+def gap_samples(results: BeyondResults) -> list[Sample]:
+    ranked = [row.contender for row in ranked_rows(results)]
+    gaps = [100.0 * results.outcomes.measured("gap", law.key).of(law.key, "gap") for law in ranked]
+    each = zip(ranked, gaps, strict=True)
+    return [Sample(law.label, style_of(law.controller), gap) for law, gap in each]
+
+
+@plain_style()
+def gains_plot(gains: Mapping[str, GainOutcomes], theme: Theme) -> Figure:
+    """Draw the mean of J/J_ref - 1, in percent, over the gains of the repulsion: RPF, RAPF at each k_att."""
+    rpf, rapf = gains["rpf"].complete, gains["rapf"].complete
+    attracted = ((f"RAPF, k_att = {k:g}", rapf.with_gain("k_att", k)) for k in rapf.levels("k_att"))
+    panels = [("RPF", rpf), *attracted]
+    first, second = rpf.levels("k_rep"), rpf.levels("rho_0")
+    columns = 3 if len(panels) > 4 else 2
+    rows = -(-len(panels) // columns)
+    left, right, above, below = 44 * DOTS, 10 * DOTS, 52 * DOTS, 44 * DOTS
+    width = WIDE / columns - left - right
+    height = len(second) * 24 * DOTS
+    page = Page((WIDE, round(rows * (height + above + below))), theme, DOTS)
+    for number, (name, part) in enumerate(panels):
+        row, column = divmod(number, columns)
+        x, y = left + column * (width + left + right), above + row * (height + above + below)
+        values = np.full((len(second), len(first)), np.nan)
+        for each, excess in zip(part.gains, part.excess, strict=True):
+            at = second.index(float(each["rho_0"] or 0.0)), first.index(float(each["k_rep"] or 0.0))
+            values[at] = 100.0 * (excess.mean() - 1.0)
+        axes = page.axes((x, y, width, height))
+        plot_gain_grid(axes, first, second, values, ("k_rep (N m³)", "rho_0 (m)"), theme)
+        page.text(name, x - left / 2, y - 36 * DOTS, points=TITLE, bold=True)
+    return page.figure
+
+
+@plain_style()
+def gaps_plot(samples: Sequence[Sample], theme: Theme) -> Figure:
+    """Draw the gaps of all contenders as boxes, in percent, on an axis of square roots."""
+    figure = plot_final_costs([("", samples)], "J/J_ref − 1 at the end (%)", WIDE, DOTS, theme)
+    (axes,) = figure.axes
+    values = np.concatenate([sample.values for sample in samples])
+    low, high = min(float(values.min()), 0.0), float(values.max())
+
+    def power(places: Array, exponent: float) -> Array:
+        return np.asarray(np.sign(places) * np.abs(places) ** exponent)
+
+    functions = partial(power, exponent=0.5), partial(power, exponent=2.0)
+    axes.set_xscale("function", functions=functions)
+    # a little room to the left of what lies below the reference
+    axes.set_xlim(-((float(np.sqrt(-low)) + 0.2) ** 2), 1.06 * high)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in _TICKS if tick <= high]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter("{x:g}")
+    return figure
+
+
+@plain_style()
+def plot_degradations(found: Sequence[Degradation], theme: Theme | str = LIGHT) -> Figure:
+    """Plot final costs, one at least, by those of the runs without the disturbance: a panel for each axis."""
+    theme = theme_named(theme)
+    names = list(dict.fromkeys(each.axis for each in found))
+    styles = curve_styles(each.controller for each in found)
+    quiet = mix(theme.background, theme.ink, 0.7)
+    columns = min(3, len(names))
+    width, height = (_SIZE[0] - 40) / columns, (_SIZE[1] - 110) / -(-len(names) // columns)
+    ends = [value for each in found for value in (each.ratio.estimate, each.ratio.low, each.ratio.high)]
+    bottom, top = min(1.0, float(np.nanmin(ends))), max(1.05, float(np.nanmax(ends)))
+    room = 0.06 * (top - bottom)
+    page = Page(_SIZE, theme, scale=1.0)
+    page.title("Coverage when things go wrong", 26)
+    words = "final mean distance, as a multiple of the same run's in which that does not go wrong"
+    page.text(words, page.margin, 50, colour=quiet, room=page.room)
+    for k, name in enumerate(names):
+        row, column = divmod(k, columns)
+        box = (20 + column * width + 44, 74 + row * height + 26, width - 60, height - 84)
+        axes = page.axes(box)
+        axes.set_ylim(bottom - room, top + room)
+        _panel(axes, name, [each for each in found if each.axis == name], styles, theme)
+    handles, labels = page.figure.axes[0].get_legend_handles_labels()
+    place: Any = {"loc": "center right", "bbox_to_anchor": page.at(_SIZE[0] - page.margin, 26)}
+    look: Any = {"frameon": False, "fontsize": SMALL, "labelcolor": tone(theme.ink)}
+    page.figure.legend(handles, labels, ncols=len(handles), **place, **look)
+    pairs = counted(max(each.runs for each in found), "pair")
+    words = f"medians of {pairs} of runs, and 95 % intervals; only robots that work count"
+    page.text(words, page.margin, _SIZE[1] - 18, points=SMALL, colour=quiet)
+    return page.figure
+
+
+def _panel(
+    axes: Axes, name: str, part: Sequence[Degradation], styles: Mapping[str, CurveStyle], theme: Theme
+) -> None:
+    values = list(dict.fromkeys(each.value for each in part))
+    axes.axhline(1.0, color=tone(mix(theme.background, theme.ink, 0.35)), linewidth=1.0, zorder=1)
+    for k, (controller, style) in enumerate(styles.items()):
+        rows = [each for each in part if each.controller == controller]
+        x = np.array([values.index(each.value) for each in rows]) + _BESIDE * (k - (len(styles) - 1) / 2)
+        y = np.array([each.ratio.estimate for each in rows])
+        ends = np.array([[each.ratio.low, each.ratio.high] for each in rows])
+        off, colour = np.nan_to_num(np.abs(ends - y[:, None]).T), tone(style.colour(theme))
+        axes.errorbar(x, y, off, fmt="none", ecolor=colour, elinewidth=1.4, capsize=2.5, zorder=3)
+        look: Any = {"linewidth": 1.6, "linestyle": style.dashes, "marker": style.mark, "markersize": 5.5}
+        axes.plot(x, y, label=rows[0].label, color=colour, zorder=3, **look)
+    unit = f" ({UNITS[name]})" if UNITS[name] else ""
+    axes.set_title(f"{CAPTIONS[f'axis-{name}']}{unit}", fontsize=TEXT, color=tone(theme.ink), loc="left")
+    axes.set_xticks(range(len(values)), ["no limit" if v is None else f"{v:g}" for v in values])
+    axes.set_xlim(-0.4, len(values) - 0.6)
+    quiet_axes(axes, theme, grid="y")
+
+
+def style_of(controller: str) -> CurveStyle:
+    """Return the style of a controller among many: ours stands out, baselines are alike."""
+    style = curve_styles([controller])[controller]
+    if not style.name.startswith("other"):
+        return style
+    return style._replace(name="other-0" if controller in OURS else "other-2")
+
+
+def _drawn(plots: Mapping[str, Callable[[], Figure] | None]) -> Plots:
+    return {name: draw for name, draw in plots.items() if draw is not None}
+
+
+def _pairs_plot(
+    rows: Iterable[tuple[str, Comparison | None, str]], label: str, theme: Theme
+) -> Callable[[], Figure] | None:
+    """Return how pairs are drawn: words, comparison, and the controller that the style is of."""
+    known = [(words, each, style_of(controller)) for words, each, controller in rows if each is not None]
+    pairs = [Pairs(words, style, each.ratios, each.ratio) for words, each, style in known]
+
+    def draw() -> Figure:
+        figure = plot_paired(pairs, label, WIDE, DOTS, theme)
+        (axes,) = figure.axes
+        low, high = axes.get_xlim()
+        if sum(low <= tick <= high for tick in axes.get_xticks()) < 3:
+            # where all ratios are near 1, the marks of a logarithmic axis are too far apart
+            step = next(step for step in (0.01, 0.02, 0.05, 0.1) if (high - low) / step <= 8)
+            axes.set_xticks(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)
+        return figure
+
+    return draw if pairs else None
+
+
+def _samples(rows: Iterable[tuple[str, Outcomes, str]]) -> list[Sample]:
+    """Return J/J_ref of contenders: words, outcomes, contender."""
+    each = [(words, law, outcomes.measured("gap", law).of(law, "gap") + 1.0) for words, outcomes, law in rows]
+    known = [(words, law.partition("-")[0], values) for words, law, values in each if len(values)]
+    styles = styles_of([controller for _, controller, _ in known])
+    return [Sample(words, style, values) for (words, _, values), style in zip(known, styles, strict=True)]
+
+
+def _boxes_plot(rows: Iterable[tuple[str, Sequence[Sample]]], theme: Theme) -> Callable[[], Figure] | None:
+    there = [row for row in rows if row[1]]
+    label = "J/J_ref at the end (1: the centralised reference)"
+    return partial(plot_final_costs, there, label, WIDE, DOTS, theme, origin=1.0) if there else None
+
+
+# The best place for a sensor over a cell, by its height: the optimum of equation (14).
+
+PENTAGON = ((0.0, 0.0), (4.0, 0.0), (5.0, 2.0), (2.0, 4.0), (-1.0, 1.5))  # a cell without any symmetry, m
+# heights are written beside the path, rounded, where their places are so far apart, as a part of it
+_APART = 0.13
+_LOW, _HIGH = 0.01, 100.0  # the range of the plot, m
+_LIMIT = 1e-7  # so high, relative to the cell's size, a sensor is as good as on the ground
+
+
+class AtHeight(NamedTuple):
+    """The best place, m, at a height, m; `missed`: the part of its value missed over the centroid."""
+
+    height: float
+    x: float
+    y: float
+    from_centroid: float
+    missed: float
+
+
+def best_at_heights(heights: Sequence[float]) -> list[AtHeight]:
+    """Return the best places over the cell at ascending heights, m, and in the limits 0, inf."""
+    cell = _cell()
+    size, (centroid,) = float(np.sqrt(cell.mass[0])), cell.centroid
+    rows = []
+    for height in (0.0, *heights, np.inf):
+        place, missed = centroid, float("nan")
+        if height < np.inf:
+            place = best_points(cell, Sensing(height or _LIMIT * size))[0]
+            if height > 0.0:
+                offsets = np.array([place, centroid])[:, None] - cell.generators
+                best, plain = (value(cell.edges, each, Sensing(height))[0] for each in offsets)
+                missed = float(1.0 - plain / best)
+        away = float(np.hypot(*(place - centroid)))
+        rows.append(AtHeight(height, float(place[0]), float(place[1]), away, missed))
+    return rows
+
+
+@plain_style()
+def plot_heights(size: tuple[int, int], theme: Theme, scale: float) -> Figure:
+    """Plot the path of the optimum of f = 1/(r²+h²) over a cell, from h → 0 to the centroid for h → ∞.
+
+    From left to right: the cell; what happens in it, enlarged; how far the optimum is from the centroid.
+    """
+    cell = _cell()
+    path = best_at_heights(np.geomspace(_LOW, _HIGH, 240).tolist())
+    marked = _apart(best_at_heights([n * 10.0**k for k in (-1, 0, 1) for n in (1, 2, 3, 5)]))
+    median = best_points(cell, Distance())[0]
+    page = Page(size, theme, scale)
+    wide, high = size
+    top, bottom = 44 * scale, 46 * scale
+    tall, begin = high - top - bottom, page.margin + 26 * scale
+    room = wide - page.margin - begin
+    left, middle, right = (
+        page.axes((begin + part * room, top, share * room, tall))
+        for part, share in ((0.0, 0.30), (0.37, 0.26), (0.68, 0.32))
+    )
+    heads = "the cell (m)", "the frame in it (m)", "from the optimum to the centroid (mm)"
+    for part, words in zip((0.0, 0.37, 0.68), heads, strict=True):
+        page.text(words, begin + part * room, top - 16 * scale)
+    window = _window(np.array([[row.x, row.y] for row in path] + [median]), 0.26 * room / tall)
+    _draw_cell(left, cell, window, theme)
+    _draw_path(middle, path, marked, median, window, theme)
+    x, y, width, height = window
+    for part in (0.0, 1.0):
+        ray: Any = {"xyA": (x + width, y + part * height), "xyB": (0.0, part)}
+        ray |= {"coordsA": left.transData, "coordsB": middle.transAxes, "color": tone(theme.faint)}
+        page.figure.add_artist(ConnectionPatch(**ray, linewidth=0.8))
+    _draw_distance(right, path, marked, theme)
+    return page.figure
+
+
+def _apart(rows: Sequence[AtHeight]) -> list[AtHeight]:
+    """Return the limits, and what is far enough from them and from each other to have words beside it."""
+    first, *inner, last = rows
+    least = _APART * first.from_centroid
+    kept = [first]
+    for row in inner:
+        if row.from_centroid >= least and kept[-1].from_centroid - row.from_centroid >= least:
+            kept.append(row)
+    return [*kept, last]
+
+
+def _cell() -> VoronoiPartition:
+    region = Region(np.array(PENTAGON))
+    return partition(region.centroid[None], region)
+
+
+def _window(points: Array, aspect: float) -> Box:
+    """Return x, y, width and height of what is enlarged: all points, with room for words at the right."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    width, height = (high - low) * (1.9, 1.3)
+    width, height = max(width, height * aspect), max(height, width / aspect)
+    return float(low[0] - 0.2 * width), float((low[1] + high[1] - height) / 2.0), float(width), float(height)
+
+
+def _draw_cell(axes: Axes, cell: VoronoiPartition, window: Box, theme: Theme) -> None:
+    ring = cell.polygons[0]
+    fill = tone(mix(theme.background, theme.robots[1], theme.tint))
+    axes.add_patch(Polygon(ring, facecolor=fill, edgecolor=tone(theme.boundary), linewidth=1.6))
+    x, y, width, height = window
+    axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=tone(theme.ink), linewidth=1.2))
+    axes.set_aspect("equal")
+    axes.margins(0.02)
+    axes.autoscale_view()
+    _plain(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, integer=True))
+
+
+def _draw_path(
+    axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], median: Array, window: Box, theme: Theme
+) -> None:
+    line, faint = tone(theme.final), tone(theme.faint)
+    axes.plot([row.x for row in path], [row.y for row in path], color=line, linewidth=2.4, zorder=2)
+    for row in marked[1:-1]:
+        axes.plot(row.x, row.y, "o", color=line, markersize=5.5, markeredgewidth=0.0, zorder=3)
+    ends: list[tuple[AtHeight, str, Any]] = [
+        (marked[0], "h → 0", {"marker": "o", "markerfacecolor": tone(theme.background)}),
+        (marked[-1], "h → ∞: the centroid", {"marker": "P", "markerfacecolor": line}),
+    ]
+    for row, _, look in ends:
+        axes.plot(row.x, row.y, markersize=9.5, markeredgecolor=line, markeredgewidth=1.8, zorder=4, **look)
+    beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
+    words = [(row, f"h = {row.height:g} m") for row in marked[1:-1]] + [(row, text) for row, text, _ in ends]
+    for row, text in words:
+        axes.annotate(text, (row.x, row.y), (11, -1), color=tone(theme.ink), zorder=5, **beside)
+    x, y = median.tolist()
+    axes.plot(x, y, "D", color=faint, markersize=6.0, zorder=3)
+    axes.annotate("median\n(f = r)", (x, y), (-9, 0), ha="right", color=faint, **beside)
+    x, y, width, height = window
+    axes.set_xlim(x, x + width)
+    axes.set_ylim(y, y + height)
+    axes.set_aspect("equal")
+    _plain(axes, theme)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(4, prune="both"))
+    for side in axes.spines.values():
+        side.set(visible=True, color=tone(theme.ink), linewidth=1.2)
+
+
+def _draw_distance(axes: Axes, path: Sequence[AtHeight], marked: Sequence[AtHeight], theme: Theme) -> None:
+    line, highest = tone(theme.final), 1e3 * path[0].from_centroid
+    inner = path[1:-1]
+    axes.axhline(highest, color=tone(theme.faint), linewidth=1.0, linestyle=(0, (4, 3)))
+    style: Any = {"marker": "o", "linestyle": "none", "markersize": 5.5, "markeredgewidth": 0.0}
+    for rows, look in ((inner, {"linewidth": 2.4}), (marked[1:-1], style)):
+        millimetres = [1e3 * row.from_centroid for row in rows]
+        axes.plot([row.height for row in rows], millimetres, color=line, **look)
+    axes.set_xscale("log")
+    axes.set_xlim(inner[0].height, inner[-1].height)
+    axes.set_ylim(0.0, 1.12 * highest)
+    axes.xaxis.set_major_formatter("{x:g}")
+    quiet_axes(axes, theme, "height h (m)", grid="y")
+    axes.tick_params(length=3.0, left=True)
+    axes.minorticks_off()
+    worst = max(inner, key=lambda row: row.missed)
+    style = {"fontsize": SMALL, "color": tone(theme.ink), "ha": "left", "va": "bottom"}
+    style |= {"bbox": {"facecolor": tone(theme.background), "edgecolor": "none", "pad": 2.0}}
+    words = f"A sensor over the centroid misses\nat most {100.0 * worst.missed:.2g} % of what it could\n"
+    words += f"tell, at h = {worst.height:.2g} m."
+    axes.annotate(words, (0.04, 0.07), xycoords="axes fraction", **style)
+
+
+def _plain(axes: Axes, theme: Theme) -> None:
+    quiet_axes(axes, theme)
+    axes.tick_params(length=3.0, left=True)
+    axes.minorticks_off()

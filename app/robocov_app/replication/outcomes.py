@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,15 +55,13 @@ class Outcomes:
     """Results of every contender in each of m scenarios; nan where its run failed.
 
     Measures are ``final`` (m), ``gap`` (J/J_ref - 1), ``early`` and ``first_minute`` (m, time averages),
-    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), and ``time`` (s).
+    ``stuck`` (robots), ``contacts``, ``settled`` (s, nan where it did not), ``time`` (s), all (m,), and
+    ``placement``, (m, n, 2) m at the end.
     """
 
     scenarios: tuple[Scenario, ...]
-    values: Mapping[tuple[str, str], Array]  # (m,) by contender and measure
-    placements: Mapping[str, Array] = field(default_factory=dict)  # (m, n, 2) m at the end, by contender
-    shares: Mapping[str, float] = field(
-        default_factory=dict
-    )  # by map, side of a robot's share as a square, m
+    values: Mapping[tuple[str, str], Array]  # by contender and measure
+    sides: Mapping[str, float] = field(default_factory=dict)  # m, of a robot's share as a square, by map
 
     def of(self, contender: str, measure: str) -> Array:
         """Return what a contender reached, (m,); all nan where it did not take part."""
@@ -72,30 +70,21 @@ class Outcomes:
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """The map of each scenario."""
         return tuple(scenario.map for scenario in self.scenarios)
 
     @property
     def starts(self) -> tuple[str, ...]:
-        """The start of each scenario."""
         return tuple(scenario.start for scenario in self.scenarios)
 
     def where(self, chosen: Sequence[bool] | BoolArray) -> Outcomes:
-        """Return some of the scenarios."""
-        chosen = np.array(chosen, dtype=bool)
-        return Outcomes(
-            tuple(scenario for scenario, kept in zip(self.scenarios, chosen, strict=True) if kept),
-            {key: values[chosen] for key, values in self.values.items()},
-            {contender: places[chosen] for contender, places in self.placements.items()},
-            self.shares,
-        )
+        kept = {key: values[np.array(chosen, dtype=bool)] for key, values in self.values.items()}
+        return Outcomes(tuple(compress(self.scenarios, chosen)), kept, self.sides)
 
     def measured(self, measure: str, *contenders: str) -> Outcomes:
         """Return the scenarios in which all of these contenders have a finite value."""
         return self.where(np.all([np.isfinite(self.of(each, measure)) for each in contenders], axis=0))
 
     def from_starts(self, *starts: str) -> Outcomes:
-        """Return the scenarios that begin from these starts."""
         return self.where([start in starts for start in self.starts])
 
     def median_by_map(self, contender: str, measure: str = "gap") -> dict[str, float]:
@@ -107,19 +96,18 @@ class Outcomes:
     def placement_spreads(self, contender: str) -> dict[str, float]:
         """Return by map the median matched distance of ends from different starts, by a robot's share."""
         found: dict[str, list[float]] = {}
-        ends = zip(self.scenarios, self.placements.get(contender, ()), strict=False)
+        ends = zip(self.scenarios, self.values.get((contender, "placement"), ()), strict=False)
         for (one, first), (other, second) in combinations(ends, 2):
             apart = one.map == other.map and one.start != other.start
             if apart and np.isfinite(first).all() and np.isfinite(second).all():
                 found.setdefault(one.map, []).append(matched_distance(first, second))
-        return {name: float(np.median(apart)) / self.shares[name] for name, apart in found.items()}
+        return {name: float(np.median(apart)) / self.sides[name] for name, apart in found.items()}
 
     def compared(self, first: str, second: str, measure: str = "final") -> Comparison | None:
         """Return how `first` compares with `second`; None where they never met."""
         fine = self.measured(measure, first, second)
-        if not fine.scenarios:
-            return None
-        return Comparison(fine, first, fine.of(first, measure), fine.of(second, measure))
+        both = fine.of(first, measure), fine.of(second, measure)
+        return Comparison(fine, first, *both) if fine.scenarios else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +121,10 @@ class Comparison:
 
     @cached_property
     def ratios(self) -> Array:
-        """The first's value by the second's, (m,)."""
         return self.a / self.b
 
     @cached_property
     def ratio(self) -> Interval:
-        """Median of the ratios."""
         return bootstrap(self.ratios, clusters=self.fine.maps)
 
     @cached_property
@@ -153,17 +139,13 @@ def joined(parts: Sequence[Outcomes]) -> Outcomes:
     scenarios = tuple(dict.fromkeys(scenario for part in parts for scenario in part.scenarios))
     place = {scenario: k for k, scenario in enumerate(scenarios)}
     values: dict[tuple[str, str], Array] = {}
-    placements: dict[str, Array] = {}
-    shares: dict[str, float] = {}
+    sides: dict[str, float] = {}
     for part in parts:
         rows = [place[scenario] for scenario in part.scenarios]
         for key, own in part.values.items():
-            values.setdefault(key, np.full(len(scenarios), np.nan))[rows] = own
-        for contender, places in part.placements.items():
-            missing = np.full((len(scenarios), *places.shape[1:]), np.nan)
-            placements.setdefault(contender, missing)[rows] = places
-        shares |= part.shares
-    return Outcomes(scenarios, values, placements, shares)
+            values.setdefault(key, np.full((len(scenarios), *own.shape[1:]), np.nan))[rows] = own
+        sides |= part.sides
+    return Outcomes(scenarios, values, sides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,17 +162,14 @@ class GainOutcomes:
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """The map of each scenario."""
         return tuple(scenario.map for scenario in self.scenarios)
 
     @property
     def complete(self) -> GainOutcomes:
-        """The scenarios in which no run failed."""
         return self.where(np.asarray(np.isfinite(self.excess).all(axis=0)))
 
     def where(self, chosen: Sequence[bool] | BoolArray) -> GainOutcomes:
-        """Return some of the scenarios."""
-        kept = tuple(each for each, wanted in zip(self.scenarios, chosen, strict=True) if wanted)
+        kept = tuple(compress(self.scenarios, chosen))
         return GainOutcomes(kept, self.gains, self.excess[:, np.array(chosen, dtype=bool)])
 
     def best(self, columns: Sequence[int] | None = None) -> int:
@@ -198,14 +177,17 @@ class GainOutcomes:
         excess = self.excess if columns is None else self.excess[:, list(columns)]
         return int(np.argmin(excess[:, np.isfinite(excess).all(axis=0)].mean(axis=1)))
 
+    def levels(self, gain: str) -> list[float]:
+        """Return the different values of a gain, ascending."""
+        return sorted({float(gains[gain] or 0.0) for gains in self.gains if gain in gains})
+
     def with_gain(self, name: str, value: float) -> GainOutcomes:
         """Return the part of the grid in which one gain has this value."""
-        rows = [k for k, gains in enumerate(self.gains) if gains.get(name) == value]
-        return GainOutcomes(self.scenarios, tuple(self.gains[k] for k in rows), self.excess[rows])
+        chosen = [gains.get(name) == value for gains in self.gains]
+        return GainOutcomes(self.scenarios, tuple(compress(self.gains, chosen)), self.excess[chosen])
 
 
 def best_gains(found: Mapping[str, GainOutcomes]) -> dict[str, Mapping[str, Value]]:
-    """Return the best gains of each controller, but for those with a failed run in every scenario."""
     return {name: grid.gains[grid.best()] for name, grid in found.items() if grid.complete.scenarios}
 
 
@@ -215,11 +197,11 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
     laws = {each.key: _law(each.controller, each.all_gains) for each in contest.contenders}
     measures = (*COLUMNS, "early", "first_minute", "gap")
     values = {(key, measure): np.full(len(scenarios), np.nan) for key in laws for measure in measures}
-    placements = {key: np.full((len(scenarios), ROBOTS, 2), np.nan) for key in laws}
+    values |= {(key, "placement"): np.full((len(scenarios), ROBOTS, 2), np.nan) for key in laws}
     for at, row in _rows(folder, scenarios):
         here = _law(row["controller"], row)
         for key in (key for key, law in laws.items() if law == here):
-            placements[key][at] = results.record(row["run"]).positions[-1]
+            values[key, "placement"][at] = results.record(row["run"]).positions[-1]
             for measure, column in COLUMNS.items():
                 if row.get(column) is not None:
                     values[key, measure][at] = row[column]
@@ -228,14 +210,13 @@ def read_outcomes(folder: Path, contest: Contest, references: Mapping[str, Refer
             values[key, "first_minute"][at] = mean_until(history, FIRST_MINUTE)
             if reference is not None:
                 values[key, "gap"][at] = values[key, "final"][at] / reference.mean_distance - 1.0
-    shares = {each.name: float(np.sqrt(each.environment.free_area / ROBOTS)) for each in contest.study.maps}
-    return Outcomes(scenarios, values, placements, shares)
+    sides = {each.name: float(np.sqrt(each.environment.free_area / ROBOTS)) for each in contest.study.maps}
+    return Outcomes(scenarios, values, sides)
 
 
 def read_gain_outcomes(
     folder: Path, study: Study, references: Mapping[str, Reference]
 ) -> dict[str, GainOutcomes]:
-    """Return what each controller of a sweep reached with every set of its gains."""
     scenarios = scenarios_of(study)
     choices = {name: study.gains_of(name).choices for name in study.controllers}
     excess = {name: np.full((len(sets), len(scenarios)), np.nan) for name, sets in choices.items()}
@@ -249,7 +230,6 @@ def read_gain_outcomes(
 
 
 def scenarios_of(study: Study) -> tuple[Scenario, ...]:
-    """Return the scenarios of a sweep, in the order of its table."""
     begins = [(each.name, start) for each in study.maps for start in study.starts_on(each)]
     return tuple(Scenario(*begin, seed) for begin in begins for seed in study.seeds)
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from robocov import __version__
 from robocov.files.atomic import written
@@ -23,13 +22,12 @@ from robocov.metrics import SETTLED_DISTANCE, SETTLED_WINDOW
 from robocov.record import Record, versions
 from robocov_app.figures.files import save_figure
 from robocov_app.figures.statistics import RESAMPLES
-from robocov_app.replication import beyond_claims, claims, contenders, evidence, step_times, studies
+from robocov_app.replication import claims, contenders, evidence, figures, step_times, studies
 from robocov_app.replication.claims import LEAST_MAPS, Claim, Criterion, amount, described, verdict_counts
-from robocov_app.replication.contenders import LABELS, OURS
-from robocov_app.replication.evidence import ASSETS, Evidence
-from robocov_app.replication.figures import FIGURES, describe_figure, draw_figure
+from robocov_app.replication.contenders import ASSETS, LABELS, OURS
+from robocov_app.replication.evidence import Evidence
+from robocov_app.replication.outcomes import Outcomes, Scenario
 from robocov_app.replication.plan import FULL, NON_CONVEX, ROBOTS, TEAM, Plan
-from robocov_app.replication.plots import WORDS, beyond_plots, paper_plots
 from robocov_app.replication.results import BeyondResults, FigureRun, PaperResults
 from robocov_app.report.pictures import run_picture
 from robocov_app.report.replay import ReplayRun, asset, replay_css, replay_js, replay_part, script
@@ -59,13 +57,11 @@ class Image(NamedTuple):
 
 
 def save(path: Path, text: str) -> None:
-    """Write a text, whole or not at all; may raise OutputError."""
     with written(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def save_claims(folder: Path, found: Sequence[Claim]) -> None:
-    """Write ``claims.json``: claims with verdict, estimate, interval, runs, ...; may raise OutputError."""
     text = json.dumps([finite(claim.to_json()) for claim in found], indent=1, ensure_ascii=False)
     save(folder / CLAIMS, text + "\n")
 
@@ -75,26 +71,23 @@ def save_paper_figures(
 ) -> dict[str, Image]:
     """Write the paper's figures to ``figures/``, and the plots of the claims, without `results` none."""
 
-    def drawn(theme: str) -> Mapping[str, Callable[[], Figure]]:
-        figures = {f"figure-{number}": partial(draw_figure, number, runs, first, theme) for number in FIGURES}
-        return figures if results is None else {**figures, **paper_plots(results, theme)}
+    def drawn(theme: str) -> figures.Plots:
+        own = {
+            f"figure-{number}": partial(figures.draw_figure, number, runs, first, theme)
+            for number in figures.FIGURES
+        }
+        return own if results is None else {**own, **figures.paper_plots(results, theme)}
 
-    told = {number: describe_figure(number, runs, first) for number in FIGURES}
-    words = {f"figure-{number}": f"{shows} {told[number]}" for number, (_, shows) in FIGURES.items()}
-    return _save_figures(folder, drawn, words, quiet=quiet)
+    seen = {f"figure-{number}": figures.describe_figure(number, runs, first) for number in figures.FIGURES}
+    return _save_figures(folder, drawn, seen, quiet=quiet)
 
 
 def save_beyond_figures(folder: Path, results: BeyondResults, *, quiet: bool) -> dict[str, Image]:
-    """Write the figures beyond the paper to ``figures/``; may raise OutputError."""
-    return _save_figures(folder, partial(beyond_plots, results), {}, quiet=quiet)
+    return _save_figures(folder, partial(figures.beyond_plots, results), {}, quiet=quiet)
 
 
 def _save_figures(
-    folder: Path,
-    drawn: Callable[[str], Mapping[str, Callable[[], Figure]]],
-    words: Mapping[str, str],
-    *,
-    quiet: bool,
+    folder: Path, drawn: Callable[[str], figures.Plots], seen: Mapping[str, str], *, quiet: bool
 ) -> dict[str, Image]:
     target = folder / "figures"
     with for_results(target):
@@ -108,7 +101,8 @@ def _save_figures(
                 save_figure(figure, target / f"{name}.{suffix}")
             save_figure(dark[name](), target / f"{name}-dark.png")
             size = round(figure.bbox.width), round(figure.bbox.height)
-            found[name] = Image(name, *size, words.get(name) or WORDS[name])
+            words = f"{figures.CAPTIONS[name]} {seen.get(name, '')}".rstrip()
+            found[name] = Image(name, *size, words)
             update(number)
     return found
 
@@ -135,8 +129,8 @@ def paper_page(
         "beyond": beyond,
         "images": images,
         "figures": [
-            (number, shows, images[f"figure-{number}"], describe_figure(number, runs, first))
-            for number, (_, shows) in FIGURES.items()
+            (number, figures.CAPTIONS[name], images[name], figures.describe_figure(number, runs, first))
+            for number, name in ((number, f"figure-{number}") for number in figures.FIGURES)
         ],
         "replay": Markup(replay_part(replays, panes, _REPLAY_BUDGET)),
         "replay_script": Markup(script(f"{replay_js()}startReplays();")),
@@ -148,12 +142,6 @@ def paper_page(
         gap = outcomes.measured("gap", "rapf-shared").of("rapf-shared", "gap")
         medians = {law: outcomes.median_by_map(law) for law in LABELS}
         others = {"rapf-best": "at its best gains", "lloyd": "LA", "rpf-shared": "RPF"}
-        failures = []
-        for scenario, record in results.worst:
-            stuck = outcomes.of("rapf-shared", "stuck")[outcomes.scenarios.index(scenario)]
-            rest = f"{stuck:.0f} of {len(record.team)} robots rest away from their goals"
-            words = evidence.worst_text(outcomes, scenario, "rapf-shared", others)
-            failures.append((scenario, _picture(record), f"{words}; {rest}."))
         context |= {
             "best": best,
             "maps_in_all": len({*outcomes.maps}) + len({*results.convex.maps}) + len(plan.tuning),
@@ -162,40 +150,52 @@ def paper_page(
                 name: {law: gaps[name] for law, gaps in medians.items() if name in gaps}
                 for name in dict.fromkeys(outcomes.maps)
             },
-            "failures": failures,
+            "failures": _failures(results.worst, outcomes, "rapf-shared", others),
             "above": [float((gap > bound).mean()) for bound in (0.25, 0.5, 1.0)],
         }
     return _rendered("paper.html.jinja", plan, context)
 
 
 def beyond_page(images: Mapping[str, Image], results: BeyondResults) -> str:
-    """Return ``beyond.html``."""
-    found, rows = beyond_claims.beyond_claims(results), evidence.ranked_rows(results)
+    found, rows = claims.beyond_claims(results), evidence.ranked_rows(results)
     each, tuned = evidence.evidence(results, rows), bool(results.plan.beyond.tuning)
+    goal_claims, rival_claims = (
+        [claim for claim in found if claim.part == part] for part in (claims.GOALS, claims.RIVALS)
+    )
     beside = ("rapf-best", "rapf-default", "lloyd")
     others = {law.key: law.label for law in results.contenders if law.key in beside}
     context: dict[str, Any] = {
         "results": results,
         "found": found,
-        "goals": beyond_claims.beyond_goals(results),
-        "unseen": beyond_claims.beyond_unseen(results),
-        "goal_claims": [claim for claim in found if claim.part == beyond_claims.GOALS],
-        "rival_claims": [claim for claim in found if claim.part == beyond_claims.RIVALS],
+        "goals": [claim for claim in goal_claims if claim.key != "goal-unseen"],
+        "unseen": next((claim for claim in found if claim.key == "goal-unseen"), None),
+        "goal_claims": goal_claims,
+        "rival_claims": rival_claims,
         "rows": rows,
         "controllers": [(one, _strips(one, each)) for one in each],
-        "failures": [
-            (
-                scenario,
-                _picture(record),
-                f"{evidence.worst_text(results.outcomes, scenario, OURS[0], others)}.",
-            )
-            for scenario, record in results.worst
-        ],
+        "failures": _failures(results.worst, results.outcomes, OURS[0], others),
         "images": images,
         "tuned": tuned,
         "tuning": results.plan if tuned else FULL,
     }
     return _rendered("beyond.html.jinja", results.plan, context)
+
+
+def _failures(
+    worst: Sequence[tuple[Scenario, Record]], outcomes: Outcomes, law: str, others: Mapping[str, str]
+) -> list[tuple[Scenario, Markup, str]]:
+    """Return runs with their pictures, and how far they and those of `others`, labels by key, ended above."""
+    found = []
+    for scenario, record in worst:
+        k = outcomes.scenarios.index(scenario)
+        gaps = {key: amount(outcomes.of(key, "gap")[k], "%") for key in (law, *others)}
+        beside = ", ".join(f"{label} {gaps[key]}" for key, label in others.items())
+        words = f"{gaps[law]} above the reference ({beside})"
+        if law not in OURS:
+            stuck = outcomes.of(law, "stuck")[k]
+            words += f"; {stuck:.0f} of {len(record.team)} robots rest away from their goals"
+        found.append((scenario, Markup(run_picture(record, None, 300, 240, numbers=True)), f"{words}."))
+    return found
 
 
 def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
@@ -206,7 +206,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
     environment.filters.update(span=span, g="{:g}".format, amount=amount)
     environment.filters["unbroken"] = lambda text: Markup(_unbroken(str(text)))
     known = environment.globals.update
-    known(t=claims, rules=beyond_claims, contender=contenders, studies=studies, timing=step_times)
+    known(t=claims, contender=contenders, studies=studies, timing=step_times)
     known(bar=interval_bar, amount=amount, described=described, counts=verdict_counts)
     known(account_of=evidence.account_of, units=UNITS, team=TEAM, robots=ROBOTS)
     known(settled=(SETTLED_DISTANCE, SETTLED_WINDOW), resamples=RESAMPLES, least_maps=LEAST_MAPS)
@@ -217,11 +217,7 @@ def _rendered(template: str, plan: Plan, context: Mapping[str, Any]) -> str:
 
 
 def span(numbers: Sequence[int]) -> str:
-    """Return whole numbers, those in a row by their ends.
-
-    >>> span((1, 2, 3)), span((5,)), span((1, 3))
-    ('1 to 3', '5', '1, 3')
-    """
+    """Return whole numbers, those in a row by their ends: "1 to 3"."""
     if len(numbers) > 2 and list(numbers) == list(range(numbers[0], numbers[-1] + 1)):
         return f"{numbers[0]} to {numbers[-1]}"
     return ", ".join(str(number) for number in numbers)
@@ -230,10 +226,6 @@ def span(numbers: Sequence[int]) -> str:
 def _unbroken(value: Any) -> Any:
     """Return a text in which no line breaks between a number and its unit."""
     return _UNIT.sub("\N{NO-BREAK SPACE}", value) if type(value) is str else value
-
-
-def _picture(record: Record) -> Markup:
-    return Markup(run_picture(record, None, 300, 240, numbers=True))
 
 
 def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
@@ -248,8 +240,8 @@ def _strips(one: Evidence, each: Sequence[Evidence]) -> Markup:
 def interval_bar(criterion: Criterion) -> Markup:
     """Return an SVG element: the wanted range shaded, the interval a line, the estimate a mark."""
     interval, wide, edge = criterion.interval, 320.0, 14.0
-    known = [value for value in (interval.estimate, interval.low, interval.high) if math.isfinite(value)]
-    ends = [value for value in (criterion.low, criterion.high) if math.isfinite(value)]
+    known = [*filter(math.isfinite, (interval.estimate, interval.low, interval.high))]
+    ends = [*filter(math.isfinite, (criterion.low, criterion.high))]
     if not known or not ends:
         return Markup("")
     low, high = min(known + ends), max(known + ends)

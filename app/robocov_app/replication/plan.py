@@ -64,7 +64,6 @@ class BeyondPlan:
     huge: int = 200
 
     def seeds_of(self, controller: str) -> tuple[int, ...]:
-        """Return the seeds of the starts of a controller's runs."""
         return dict(zip(OURS, (self.own_seeds, self.shared_seeds), strict=True)).get(controller, self.seeds)
 
 

@@ -6,6 +6,7 @@ import subprocess
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -57,39 +58,25 @@ class Searching:
     failing = "the search failed"
 
     def __call__(self, questions: list[Question], line: worker.Line) -> Reference:
-        """Search for one; takes some seconds."""
         from robocov.optimum import optimum
 
-        asked, environment = questions[-1], from_json(dict(questions[-1].document))
-        how: Any = {name: getattr(asked, name) for name in ("radius", "lattice", "restarts", "seed")}
-        best = optimum(environment, asked.robots, **how)
-        positions = tuple((float(x), float(y)) for x, y in best.positions)
+        asked = asdict(questions[-1])
+        best = optimum(from_json(asked.pop("document")), asked.pop("robots"), **asked)
+        positions = tuple((x, y) for x, y in best.positions.tolist())
         return Reference(float(best.mean_distance), positions, float(best.agreement()))
 
 
 def find_references(
-    maps: Sequence[StudyMap],
-    folder: Path,
-    plan: Plan,
-    *,
-    workers: int,
-    quiet: bool,
-    stop: Interruption,
-    robots: int = ROBOTS,
-    radius: float = TEAM["radius"],
+    maps: Sequence[StudyMap], folder: Path, plan: Plan, workers: int, stop: Interruption, *, quiet: bool
 ) -> dict[str, Reference]:
     """Return the reference of every map by its name, kept in `folder` or searched for until `stop`."""
     with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    found: dict[str, Reference] = {}
-    missing: dict[str, Question] = {}
-    for each in maps:
-        question = Question(to_json(each.environment), robots, radius, plan.lattice, plan.restarts)
-        kept = _kept(folder / f"{each.name}.json", question)
-        if kept is None:
-            missing[each.name] = question
-        else:
-            found[each.name] = kept
+    how = ROBOTS, TEAM["radius"], plan.lattice, plan.restarts
+    wanted = {each.name: Question(to_json(each.environment), *how) for each in maps}
+    kept = {name: _kept(folder / f"{name}.json", question) for name, question in wanted.items()}
+    found = {name: each for name, each in kept.items() if each is not None}
+    missing = {name: question for name, question in wanted.items() if name not in found}
     if missing:
         with progress("references", len(missing), quiet=quiet) as update:
             for number, (name, answer) in enumerate(searched(missing, workers, stop), start=1):
@@ -101,30 +88,20 @@ def find_references(
 
 def _kept(path: Path, question: Question) -> Reference | None:
     """Return the answer in a file, None where there is none to this question."""
-    try:
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         content = json.loads(path.read_bytes())
-        if content["digest"] != question.digest:
-            return None
-        positions = tuple((float(x), float(y)) for x, y in content["positions_m"])
-        return Reference(float(content["mean_distance_m"]), positions, float(content["agreement"]))
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return None
+        if content["digest"] == question.digest:
+            positions = tuple((float(x), float(y)) for x, y in content["positions_m"])
+            return Reference(float(content["mean_distance_m"]), positions, float(content["agreement"]))
+    return None
 
 
 def _keep(path: Path, question: Question, answer: Reference) -> None:
-    content = {
-        "format": _FORMAT,
-        "digest": question.digest,
-        "map": question.document.get("name"),
-        "robots": question.robots,
-        "radius_m": question.radius,
-        "lattice": question.lattice,
-        "restarts": question.restarts,
-        "seed": question.seed,
-        "mean_distance_m": answer.mean_distance,
-        "agreement": answer.agreement,
-        "positions_m": [list(point) for point in answer.positions],
-    }
+    content = {"format": _FORMAT, "digest": question.digest, "map": question.document.get("name")}
+    content |= {"robots": question.robots, "radius_m": question.radius, "lattice": question.lattice}
+    content |= {"restarts": question.restarts, "seed": question.seed}
+    content |= {"mean_distance_m": answer.mean_distance, "agreement": answer.agreement}
+    content["positions_m"] = answer.positions
     with written(path) as part:
         part.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 

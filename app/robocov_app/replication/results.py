@@ -3,11 +3,11 @@
 import json
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from itertools import compress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -64,6 +64,10 @@ class RunnerOptions:
     stop: Interruption
     keep_versions: bool = False
 
+    def raise_if_stopped(self) -> None:
+        if self.stop.requested:
+            raise Interrupted
+
 
 @dataclass(frozen=True)
 class Forecast:
@@ -87,7 +91,6 @@ class FigureRun:
 class PaperResults:
     """Results of the paper's claims."""
 
-    plan: Plan
     figures: Mapping[str, FigureRun]  # by "case/controller"
     gains: Mapping[str, GainOutcomes]  # by controller
     convex: Outcomes  # in convex regions
@@ -149,27 +152,20 @@ def open_folder(folder: Path, plan: Plan) -> None:
         with written(mark) as part:
             part.write_text(json.dumps({**_HEAD, "plan": plan.name}) + "\n", encoding="utf-8")
         return
-    try:
-        content = json.loads(mark.read_bytes())
-        named = content["plan"] if content["format"] == _HEAD["format"] else None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        named = None
-    if named == plan.name:
-        return
     words = "the folder is not empty, and what is in it is no study of the paper"
-    if named is not None:
-        words = f"holds the {named} study, but the {plan.name} one was asked for"
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        content = json.loads(mark.read_bytes())
+        if content["format"] == _HEAD["format"]:
+            if content["plan"] == plan.name:
+                return
+            words = f"holds the {content['plan']} study, but the {plan.name} one was asked for"
     raise InputError(f"{folder}: {words}; another --out was wanted")
 
 
 def run_study(study: Study, folder: Path, name: str, options: RunnerOptions) -> Path:
-    """Do the runs of a sweep that are left, in ``studies/`` under its name; return that folder."""
     target = folder / "studies" / name
-    names = ("workers", "scheduler", "keep_versions", "quiet", "stop")
-    how: Any = {option: getattr(options, option) for option in names}
-    totals = sweep(study, target, title=f"paper: {name}", **how)
-    if totals.interrupted or options.stop.requested:
-        raise Interrupted
+    sweep(study, target, title=f"paper: {name}", **vars(options))
+    options.raise_if_stopped()
     return target
 
 
@@ -202,8 +198,7 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
                 tell.say(note)
             for _ in worked_off(tasks.values(), lambda: LocalPool(workers), count, options.stop, keep):
                 tell(count)
-    if options.stop.requested:
-        raise Interrupted
+    options.raise_if_stopped()
     quiet = options.quiet or options.scheduler is None  # then all has been told
     for name, study in sweeps.items():
         run_study(study, folder, name, replace(options, quiet=quiet))
@@ -212,11 +207,9 @@ def run_together(sweeps: Mapping[str, Study], folder: Path, options: RunnerOptio
 def references_of(
     maps: Sequence[StudyMap], folder: Path, plan: Plan, options: RunnerOptions
 ) -> dict[str, Reference]:
-    """Return the centralised reference of every map by its name, searched for where it is not there yet."""
-    at, workers, quiet = folder / "references", options.workers, options.quiet
-    found = find_references(maps, at, plan, workers=workers, quiet=quiet, stop=options.stop)
-    if options.stop.requested:
-        raise Interrupted
+    how = options.workers, options.stop
+    found = find_references(maps, folder / "references", plan, *how, quiet=options.quiet)
+    options.raise_if_stopped()
     return found
 
 
@@ -236,7 +229,8 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
         sweeps |= studies.conditions_studies(plan)
     runs = sum(map(len, sweeps.values()))
     # which gains will be the best is not known yet, and how many runs these are does not depend on it
-    left = {name: len(study) - min(runs_there(folder, name), len(study)) for name, study in sweeps.items()}
+    there = {name: len([*(folder / "studies" / name / "runs").glob("[!.]*")]) for name in sweeps}
+    left = {name: max(len(study) - there[name], 0) for name, study in sweeps.items()}
     if not any(left.values()):
         return Forecast(runs, 0, 0.0, {})
     each: dict[str, float] = {}
@@ -257,23 +251,14 @@ def forecast(folder: Path, plan: Plan, workers: int, *, claims: bool, beyond: bo
 
 def expected_contenders(plan: Plan) -> tuple[Contender, ...]:
     """Return the paper's contenders with any gains for the best, distinct where that can be."""
-    guesses = (
-        (*UNTUNED, *(laws.of_paper(f"{law}-best", grid[k]) for law, grid in studies.gain_sets(plan).items()))
-        for k in (0, -1)
-    )
+    grids = studies.gain_sets(plan).items()
+    guesses = (paper_contenders({law: grid[k] for law, grid in grids}) for k in (0, -1))
     return max(guesses, key=lambda guess: sum(map(len, laws.distinct_gains(guess).values())))
 
 
 def grid_is_done(folder: Path, plan: Plan) -> bool:
-    """Return whether all runs of the paper's grids of gains are there."""
-    tuning = studies.gains_study(plan)
-    return runs_there(folder, "gains", tuning) == len(tuning)
-
-
-def runs_there(folder: Path, name: str, study: Study | None = None) -> int:
-    """Return how many runs of a sweep are there, with or without a table; of a `study` its own alone."""
-    there = {each.name for each in (folder / "studies" / name / "runs").glob("[!.]*")}
-    return len(there if study is None else there.intersection(task.name for task in tasks_of(study)))
+    runs = folder / "studies" / "gains" / "runs"
+    return all((runs / task.name).exists() for task in tasks_of(studies.gains_study(plan)))
 
 
 def partition_record() -> Record:
@@ -287,8 +272,7 @@ def run_figures(folder: Path, plan: Plan, options: RunnerOptions) -> dict[str, F
     """Do the runs that the figures show; raise as `run_study`, and InputError when one of them failed."""
     found: dict[str, FigureRun] = {}
     for name, study in studies.figure_studies(plan).items():
-        target = run_study(study, folder, name, options)
-        for row, run in _figure_runs(target):
+        for row, run in _figure_runs(run_study(study, folder, name, options)):
             case = "other" if row["start"] == "other" else name.removeprefix("figures-")
             found[f"{case}/{row['controller']}"] = run
     return found
@@ -312,9 +296,9 @@ def run_paper(folder: Path, plan: Plan, options: RunnerOptions) -> PaperResults:
     known |= references_of((*convex.study.maps, *claims.study.maps), folder, plan, options)
     in_convex = read_outcomes(run_study(convex.study, folder, "convex", options), convex, known)
     outcomes = read_outcomes(run_study(claims.study, folder, "claims", options), claims, known)
-    runs, failed = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
+    counts = _counts(folder, (*studies.figure_studies(plan), "gains", "convex", "claims"))
     worst = worst_runs(claims.study, outcomes, RAPF_SHARED, WORST)
-    return PaperResults(plan, figures, gains, in_convex, outcomes, papers, known, worst, runs, failed)
+    return PaperResults(figures, gains, in_convex, outcomes, papers, known, worst, **counts)
 
 
 def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperResults | None) -> BeyondResults:
@@ -323,20 +307,19 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     Without the paper's own part the paper's controllers are run here, with their best gains if the grids of
     gains have been run before.
     """
+    gains: dict[str, GainOutcomes] = {}
     known: dict[str, Reference] = {}
     if paper is not None:
         known |= paper.references
         papers, claims = paper.contenders, paper.claims
     else:
-        grids: Mapping[str, GainOutcomes] = {}
         if grid_is_done(folder, plan):
             # nothing is left to be done of it: the table is made sure of
-            grids, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
-        papers = paper_contenders(best_gains(grids))
+            gains, known = _run_grid(studies.gains_study(plan), "gains", folder, plan, options)
+        papers, gains = paper_contenders(best_gains(gains)), {}
         contest = studies.claims_contest(plan, papers)
         known |= references_of(contest.study.maps, folder, plan, options)
         claims = read_outcomes(run_study(contest.study, folder, "claims", options), contest, known)
-    gains: dict[str, GainOutcomes] = {}
     if (tuning := studies.baseline_gains_study(plan)) is not None:
         gains, _ = _run_grid(tuning, BASELINE_GAINS, folder, plan, options)
     contests = studies.beyond_contests(plan, best_gains(gains), papers)
@@ -348,39 +331,33 @@ def run_beyond(folder: Path, plan: Plan, options: RunnerOptions, paper: PaperRes
     found = {name: read_outcomes(at / name, each, known) for name, each in contests.items()}
     sides = [name for name in contests if name == "rivals" or name.startswith("ours-")]
     outcomes = reached.joined([among_baselines(claims, plan), *(found[name] for name in sides)])
-    steps = time_steps(folder, plan, options)
-    runs, failed = _counts(folder, (*[BASELINE_GAINS] * bool(gains), *sweeps))
     return BeyondResults(
-        plan=plan,
-        outcomes=outcomes,
-        unseen=found.get("unseen"),
+        plan,
+        outcomes,
+        found.get("unseen"),
         contenders=(*papers, *(law for name in sides for law in contests[name].contenders)),
         gains=gains,
-        steps=steps,
+        steps=time_steps(folder, plan, options),
         worst=worst_runs(contests[f"ours-{OURS[0]}"].study, outcomes, OWN[0], plan.beyond.worst),
         targets=found["targets"],
         density=_density(at, plan, found["density"], found["density-ignored"]),
         teams=found["teams"],
         degradations=read_degradations(at, plan),
-        runs=runs,
-        failed=failed,
+        **_counts(folder, (*[BASELINE_GAINS] * bool(gains), *sweeps)),
     )
 
 
 def among_baselines(outcomes: Outcomes, plan: Plan) -> Outcomes:
-    """Return what was reached on the maps and from the kinds of starts that baselines have as well."""
     names = {each.name for each in studies.baseline_maps(plan)}
     starts = plan.beyond.starts
     return outcomes.where([each.map in names and each.start in starts for each in outcomes.scenarios])
 
 
 def time_steps(folder: Path, plan: Plan, options: RunnerOptions) -> dict[int, StepTimes]:
-    """Return how long the steps of every registered controller take beside RAPF's."""
     everybody = tuple(CONTROLLERS)
     wanted = {ROBOTS: everybody, plan.beyond.large: everybody, plan.beyond.huge: OURS[:1]}
     found = step_times(folder, wanted, plan, stopped=lambda: options.stop.requested)
-    if options.stop.requested:
-        raise Interrupted
+    options.raise_if_stopped()
     return found
 
 
@@ -404,7 +381,6 @@ def worst_runs(
 
 
 def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
-    """Compare runs under each disturbance with those without any, by axis, value and controller."""
     ideal = _finals(at / "conditions-ideal")
     found = []
     for axis, (best, *bad) in studies.axes_of_disturbances(plan).items():
@@ -425,11 +401,12 @@ def read_degradations(at: Path, plan: Plan) -> list[Degradation]:
     return found
 
 
-def _finals(
-    folder: Path, column: str = "", only: float | None = None
-) -> dict[tuple[str, float | None], dict[tuple[str, int], float]]:
+Finals: TypeAlias = dict[tuple[str, float | None], dict[tuple[str, int], float]]
+
+
+def _finals(folder: Path, column: str = "", only: float | None = None) -> Finals:
     """Return final costs by map and seed, by controller and value of a column, `only` if there is none."""
-    found: dict[tuple[str, float | None], dict[tuple[str, int], float]] = {}
+    found: Finals = {}
     for row in read_results(folder).to_table().to_pylist():
         if row["mean_distance_m"] is not None:
             group = found.setdefault((row["controller"], row.get(column, only)), {})
@@ -441,7 +418,7 @@ def _density(at: Path, plan: Plan, *found: Outcomes) -> DensityResults:
     costs = {each.name: CoverageCost(each.environment, plan.lattice) for each in studies.density_maps(plan)}
     values = {}
     for key, outcomes in zip(("known", "ignored"), found, strict=True):
-        (places,) = outcomes.placements.values()
+        (places,) = (each for (_, measure), each in outcomes.values.items() if measure == "placement")
         finals = [
             costs[name](place).mean_distance if np.isfinite(place).all() else np.nan
             for name, place in zip(outcomes.maps, places, strict=True)
@@ -461,6 +438,6 @@ def _run_grid(
     return reached.read_gain_outcomes(run_study(study, folder, name, options), study, known), known
 
 
-def _counts(folder: Path, names: Iterable[str]) -> tuple[int, int]:
+def _counts(folder: Path, names: Iterable[str]) -> dict[str, int]:
     found = [read_results(folder / "studies" / name) for name in names]
-    return sum(map(len, found)), sum(len(each.failures()) for each in found)
+    return {"runs": sum(map(len, found)), "failed": sum(len(each.failures()) for each in found)}

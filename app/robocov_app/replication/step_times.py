@@ -4,6 +4,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -39,12 +40,11 @@ class StepTimes:
     seconds: Mapping[str, tuple[float, ...]]
 
     def ratio_interval(self, controller: str) -> Interval:
-        """Return the median time by RAPF's in the same turn, with its bootstrap interval over the blocks."""
+        """Return the median time by RAPF's in the same turn."""
         own, yardstick = self.seconds.get(controller), self.seconds.get(YARDSTICK)
         return bootstrap(np.array(own) / np.array(yardstick)) if own and yardstick else UNKNOWN
 
     def interval(self, controller: str) -> Interval:
-        """Return the median time of a step, s, with its bootstrap interval over the blocks."""
         own = self.seconds.get(controller)
         return bootstrap(own) if own else UNKNOWN
 
@@ -63,8 +63,7 @@ def step_times(
     what is whole by then is returned. `clock` returns seconds; by default those that this process computes,
     where the system counts them finely: what else is going on then hardly matters.
     """
-    found = {}
-    path = folder / FILE
+    found, path = {}, folder / FILE
     kept = _kept(path)
     if clock is None:
         fine = time.get_clock_info("process_time").resolution <= _FINE
@@ -84,20 +83,16 @@ def step_times(
             document = {**_HEAD, "map": MAP, "dt_s": plan.dt, "steps_per_block": BLOCK, "robots": kept}
             with written(path) as part:
                 part.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
-        taken = {name: tuple(map(float, values)) for name, values in entry["seconds_per_step"].items()}
+        taken = {name: tuple(own) for name, own in entry["seconds_per_step"].items()}
         found[robots] = StepTimes(robots, plan.dt, taken)
     return found
 
 
 def _timed(
-    robots: int,
-    controllers: Sequence[str],
-    plan: Plan,
-    stopped: Callable[[], bool],
-    clock: Callable[[], float],
+    robots: int, names: Sequence[str], plan: Plan, stopped: Callable[[], bool], clock: Callable[[], float]
 ) -> dict[str, list[float]] | None:
     spec = RunSpec(load_map(MAP), team=team_of(robots, TEAM), start="uniform", dt=plan.dt)
-    runs = {name: replace(spec, controller=name).simulation() for name in controllers}
+    runs = {name: replace(spec, controller=name).simulation() for name in names}
     for run in runs.values():
         for _ in range(plan.beyond.warm_up):
             run.step()
@@ -115,15 +110,12 @@ def _timed(
 
 def _kept(path: Path) -> dict[str, Any]:
     """Return what a file holds, nothing where there is none that can be read."""
-    try:
+    with suppress(OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         content = json.loads(path.read_bytes())
-        if content["format"] != _HEAD["format"]:
-            return {}
-        entries = dict(content["robots"])
-        for entry in entries.values():
-            str(entry["digest"])
-            for values in entry["seconds_per_step"].values():
-                [float(value) for value in values]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return {}
-    return entries
+        if content["format"] == _HEAD["format"]:
+            found = {}
+            for robots, entry in dict(content["robots"]).items():
+                times = {name: list(map(float, own)) for name, own in entry["seconds_per_step"].items()}
+                found[robots] = {"digest": str(entry["digest"]), "seconds_per_step": times}
+            return found
+    return {}

@@ -1,19 +1,19 @@
 """The sweeps of the study, each with its folder's name.
 
-1. ``figures-…``: the runs that figures 2 to 8 show;
-2. ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
-3. ``convex``: RAPF and LA in convex regions;
-4. ``claims``: the paper's contenders on non-convex maps, none of which was used in 2.
+- ``figures-…``: the runs that figures 2 to 8 show;
+- ``gains``: grids of gains on maps of their own, for the claims on gains and for the best gains;
+- ``convex``: RAPF and LA in convex regions;
+- ``claims``: the paper's contenders on non-convex maps, none of which was used for ``gains``.
 
 Beyond the paper:
 
-5. ``rival-gains``: grids of the baselines' gains, on maps of their own;
-6. ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
-7. ``unseen``: ours on maps that played no part in its development;
-8. ``targets``: RAPF heading for another optimum of its cell than the centroid;
-9. ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
-10. ``teams``: robots of different speeds, with cells by distance and by time;
-11. ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
+- ``rival-gains``: grids of the baselines' gains, on maps of their own;
+- ``ours-…``, ``rivals``: every registered controller, on the maps of the claims and from the same starts;
+- ``unseen``: ours on maps that played no part in its development;
+- ``targets``: RAPF heading for another optimum of its cell than the centroid;
+- ``density``, ``density-ignored``: RAPF that knows which places count more, and RAPF that does not;
+- ``teams``: robots of different speeds, with cells by distance and by time;
+- ``conditions-…``: disturbances, one sweep for each axis of `AXES`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -81,7 +81,6 @@ class Contest:
 
 
 def bundled(name: str, kinds: Iterable[str] = KINDS) -> StudyMap:
-    """Return a bundled map with the study's starts."""
     return StudyMap(name, with_kinds_of_starts(load_map(name), kinds))
 
 
@@ -104,13 +103,12 @@ def convex_region(seed: int) -> StudyMap:
     those narrower than 5 m, are drawn again. Coordinates are whole centimetres.
     """
     rng = np.random.default_rng([seed, 1])
-    while True:
+    area = width = 0.0
+    while area < _LEAST_AREA or width < _LEAST_WIDTH:
         points = np.round(rng.uniform(0.0, SIDE, size=(_POINTS, 2)), 2)
         hull = shapely.convex_hull(shapely.MultiPoint(points))
         corners = np.asarray(shapely.minimum_rotated_rectangle(hull).exterior.coords)
-        width = np.hypot(*np.diff(corners[:3], axis=0).T).min()
-        if hull.area >= _LEAST_AREA and width >= _LEAST_WIDTH:
-            break
+        area, width = hull.area, np.hypot(*np.diff(corners[:3], axis=0).T).min()
     ring = np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
     boundary = tuple((float(x), float(y)) for x, y in ring)
     region = Environment(f"convex-{seed}", boundary, description="A convex region drawn by chance.")
@@ -120,9 +118,8 @@ def convex_region(seed: int) -> StudyMap:
 def with_hot_spots(each: StudyMap, seed: int) -> StudyMap:
     """Return a map with a density drawn by chance: Gaussians of 1 m in the free space, over a floor of 1."""
     start = replace(each.environment, starts={"uniform": UniformStart()}).start("uniform")
-
-    at = [(round(float(x), 2), round(float(y), 2)) for x, y in start.sample(HOT_SPOTS, seed=seed, radius=0.3)]
-    peaks = tuple(Gaussian(place, weight=20.0, sigma=1.0) for place in at)
+    places = start.sample(HOT_SPOTS, seed=seed, radius=0.3).tolist()
+    peaks = tuple(Gaussian((round(x, 2), round(y, 2)), weight=20.0, sigma=1.0) for x, y in places)
     return StudyMap(each.name, replace(each.environment, density=Gaussians(peaks, floor=1.0)))
 
 
@@ -147,19 +144,16 @@ def _start(environment: Environment, kind: str) -> StartSpec:
 
 @cache
 def generated_maps(seeds: tuple[int, ...]) -> tuple[StudyMap, ...]:
-    """Return non-convex maps drawn by chance, with the study's starts."""
     return tuple(map(generated, seeds))
 
 
 @cache
 def claim_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the non-convex maps on which the claims are tested."""
     return (*map(bundled, plan.bundled), *generated_maps(plan.generated))
 
 
 @cache
 def convex_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the convex regions."""
     known = (bundled(name, CONVEX_KINDS) for name in CONVEX)
     return (*known, *map(convex_region, plan.convex_generated))
 
@@ -171,7 +165,6 @@ def baseline_maps(plan: Plan) -> tuple[StudyMap, ...]:
 
 
 def density_maps(plan: Plan) -> tuple[StudyMap, ...]:
-    """Return the small maps with a density."""
     return tuple(map(with_hot_spots, generated_maps(plan.beyond.maps), plan.beyond.maps))
 
 
@@ -200,15 +193,12 @@ def figure_studies(plan: Plan) -> dict[str, Study]:
 
 def gain_sets(plan: Plan) -> dict[str, list[dict[str, Value]]]:
     """Return the grids of gains: the same potential for both, RAPF with every attraction beside it."""
-    potential = laws.grid(k_rep=plan.k_rep, rho_0=plan.rho_0)
-    attracted: list[dict[str, Value]] = [
-        {**both, "k_att": k_att, "attraction_limit": None} for k_att in plan.k_att for both in potential
-    ]
-    return {"rapf": attracted, "rpf": [dict(both) for both in potential]}
+    potential = [*laws.grid(k_rep=plan.k_rep, rho_0=plan.rho_0)]
+    attractions = laws.grid(k_att=plan.k_att, attraction_limit=(None,))
+    return {"rapf": [both | each for each in attractions for both in potential], "rpf": potential}
 
 
 def gains_study(plan: Plan) -> Study:
-    """Return the grids of gains on the maps of the tuning."""
     on, starts, seeds = generated_maps(plan.tuning), plan.tuning_starts, (plan.tuning_seed,)
     return Study(on, ("rapf", "rpf"), gain_sets(plan), starts=starts, seeds=seeds, **_common(plan))
 

@@ -11,9 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from robocov import __version__
-from robocov.errors import ParameterError
 from robocov_app.figures.styles import MARKS
-from robocov_app.render.theme import theme_named
 from robocov_app.report import facts, plots, replay, tables
 from robocov_app.report import groups as grouped
 from robocov_app.report.pictures import has_path, lives, map_picture, run_picture
@@ -35,10 +33,6 @@ class Report(NamedTuple):
 
 def report(results: Sequence[Result], *, title: str | None = None, theme: str = "auto") -> Report:
     """Return results as a page, a section each; theme "auto" follows the reader. Same results, same page."""
-    if not results:
-        raise ParameterError("report: no results were given, but at least one was wanted")
-    if theme != "auto":
-        theme_named(theme)
     budget = replay.BUDGET // len(results)
     sections = [_section(result, f"r{number}", budget) for number, result in enumerate(results, start=1)]
     default = sections[0]["title"] if len(results) == 1 else f"{len(results)} results"
@@ -115,7 +109,6 @@ def _section(result: Result, key: str, budget: int) -> dict[str, Any]:
 
 @cache
 def template(name: str) -> Template:
-    """Return a template of pages."""
     loader = FunctionLoader(replay.asset)
     tight: Any = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **tight)

@@ -14,7 +14,6 @@ from robocov_app.sweep.study import UNITS, parameter_text
 
 
 def title_of(result: Result) -> str:
-    """Return what a result is called."""
     if result.kind == "sweep":
         return f"Sweep {printable(result.folder.resolve().name)}"
     controllers = list(dict.fromkeys(entry.label for entry in result.entries))
@@ -23,7 +22,6 @@ def title_of(result: Result) -> str:
 
 
 def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
-    """Return what came of it, in a few sentences."""
     fine = [entry for entry in result.fine if np.isfinite(entry.final)]
     if not fine:
         return ["No run has a result."]
@@ -50,7 +48,6 @@ def lede(result: Result, comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def facts(result: Result) -> list[tuple[str, str]]:
-    """Return what was run, as terms and descriptions."""
     starts = dict.fromkeys(entry.start for entry in result.entries)
     sizes = sorted({entry.robots for entry in result.entries})
     versions = result.facts.get("versions")
@@ -77,7 +74,6 @@ def facts(result: Result) -> list[tuple[str, str]]:
 
 
 def meanings(result: Result) -> list[tuple[str, str]]:
-    """Return the gains of the controllers that were run, and what they are."""
     used = {name for entry in result.entries for name, _ in entry.gains}
     return [(name, text) for name, text in result.meanings.items() if name in used and text]
 
@@ -85,22 +81,18 @@ def meanings(result: Result) -> list[tuple[str, str]]:
 def weighed_text(result: Result) -> str:
     """Return by which densities the places of which maps count, empty where all places count the same."""
     words = {name: density_label(environment) for name, environment in result.maps.items()}
-    if len(words) == 1:
-        return "".join(words.values())
-    return "; ".join(f"{name}: {each}" for name, each in words.items() if each)
+    several = [each if len(words) == 1 else f"{name}: {each}" for name, each in words.items() if each]
+    return "; ".join(several)
 
 
 def gaps(result: Result) -> list[str]:
-    """Return sentences on runs that failed, cannot be read, or are missing."""
     words = []
     if result.failed:
         total = Counter(entry.label for entry in result.entries)
         failed = Counter(entry.label for entry in result.failed)
         whose = ", ".join(f"{label} {count} of {total[label]}" for label, count in failed.most_common())
-        words.append(
-            f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): "
-            f"{_firsts([entry.error or '' for entry in result.failed])}"
-        )
+        why = _firsts([entry.error or "" for entry in result.failed])
+        words.append(f"{len(result.failed)} of {counted(len(result.entries), 'run')} failed ({whose}): {why}")
     if result.damaged:
         reasons = [f"{each.folder} ({each.reason})" for each in result.damaged]
         be = "is" if len(reasons) == 1 else "are"
@@ -111,15 +103,14 @@ def gaps(result: Result) -> list[str]:
     return words
 
 
-def _firsts(texts: Sequence[str], most: int = 3) -> str:
-    """Return the first different texts as a sentence, and how many more there are."""
+def _firsts(texts: Sequence[str]) -> str:
+    """Return the first three different texts as a sentence, and how many more there are."""
     different = list(dict.fromkeys(texts))
-    more = f"; and {len(different) - most} more" if len(different) > most else ""
-    return f"{'; '.join(different[:most])}{more}."
+    more = f"; and {len(different) - 3} more" if len(different) > 3 else ""
+    return f"{'; '.join(different[:3])}{more}."
 
 
 def troubles(result: Result) -> list[str]:
-    """Return sentences on what did not go well in runs: contacts, robots that got stuck, no rest."""
     fine = result.fine
     moving = [e.has("mean_distance_m") and not e.has("settled_at_s") for e in fine]
     found = {
@@ -146,7 +137,6 @@ def run_title(result: Result, entry: Entry, label: str) -> str:
 
 
 def run_facts(result: Result, entry: Entry) -> str:
-    """Return the figures of a run as a sentence."""
     figures = entry.figures
     words = [f"Gains: {gain_text(entry.gains, result.units)}"] if entry.gains else []
     if entry.has("mean_time_s"):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, TypeAlias
+from operator import attrgetter, itemgetter
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov_app.figures.statistics import Interval, bootstrap, mean_with_t_interval
 from robocov_app.figures.styles import CurveStyle, curve_styles, styles_of
-from robocov_app.report.results import Entry, Result
+from robocov_app.report.results import Entry, Gains, Result, Setting
 from robocov_app.sweep.study import parameter_text
 
 MOST_GROUPS = 8  # controllers with their gains up to which each is shown apart; of more, by controller
@@ -22,9 +23,9 @@ TUNED = " (tuned)"  # stands behind a controller's label where its gains were ch
 
 _DIRECT = 12  # letters that a gain and its value may take in a label
 
-Gains: TypeAlias = tuple[tuple[str, Value], ...]
-Setting: TypeAlias = tuple[object, ...]
-Scales: TypeAlias = Mapping[Setting, float]  # what costs are divided by
+T = TypeVar("T")
+K = TypeVar("K")
+Scales: TypeAlias = Mapping[Entry, float]  # what the costs of runs are divided by
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,24 +38,26 @@ class Group:
     entries: tuple[Entry, ...]
 
     def at(self, setting: Setting) -> Group:
-        """Return the part of the group in one setting."""
         return replace(self, entries=tuple(entry for entry in self.entries if entry.setting == setting))
 
 
 def variants(result: Result) -> list[Group]:
-    """Return runs that did not fail by controller and gains, named by the differing gain or a letter."""
-    found: dict[tuple[str, Gains], list[Entry]] = {}
-    for entry in result.fine:
-        found.setdefault((entry.controller, entry.gains), []).append(entry)
+    found = parted(result.fine, lambda entry: (entry.controller, entry.gains))
     suffixes: dict[tuple[str, Gains], str] = {}
-    for controller in {controller for controller, _ in found}:
-        sets = [gains for name, gains in found if name == controller]
-        suffixes |= {(controller, gains): text for gains, text in zip(sets, _suffixes(sets), strict=True)}
+    for sets in parted(found, itemgetter(0)).values():
+        suffixes |= dict(zip(sets, _suffixes([gains for _, gains in sets]), strict=True))
     return [Group(f"{runs[0].label}{suffixes[key]}", *key, tuple(runs)) for key, runs in found.items()]
 
 
+def parted(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """Return items by a key, keys and items in their order."""
+    found: dict[K, list[T]] = {}
+    for item in items:
+        found.setdefault(key(item), []).append(item)
+    return found
+
+
 def labels(result: Result) -> dict[Entry, str]:
-    """Return what the variant of each run that did not fail is called."""
     return {entry: group.label for group in variants(result) for entry in group.entries}
 
 
@@ -84,12 +87,8 @@ def styles(result: Result) -> dict[str, CurveStyle]:
 
 
 def by_controller(result: Result) -> list[Group]:
-    """Return the runs that did not fail by controller, whatever the gains."""
-    found: dict[str, list[Entry]] = {}
-    for entry in result.fine:
-        found.setdefault(entry.controller, []).append(entry)
     groups = []
-    for controller, entries in found.items():
+    for controller, entries in parted(result.fine, lambda entry: entry.controller).items():
         gains = {entry.gains for entry in entries}
         one = gains.pop() if len(gains) == 1 else None
         groups.append(Group(entries[0].label, controller, one, tuple(entries)))
@@ -103,61 +102,49 @@ def shown_groups(result: Result) -> list[Group]:
 
 
 def settings(result: Result) -> list[Setting]:
-    """Return the settings of all runs that did not fail, in the result's order."""
     return list(dict.fromkeys(entry.setting for entry in result.fine))
 
 
 def setting_label(result: Result, setting: Setting) -> str:
     """Return what tells a setting from the others of the result: at least its map."""
     name, robots, team = setting
-    parts = [str(name)]
+    parts = [name]
     if len({size for _, size, _ in settings(result)}) > 1:
         parts.append(f"{robots} robots")
-    assert isinstance(team, tuple)
     parts += [f"{each.replace('_', ' ')} {parameter_text(each, value)}" for each, value in team]
     return ", ".join(parts)
 
 
-def medians(result: Result) -> dict[Setting, float]:
-    """Return the median of the final mean distances of all runs in each setting, m."""
-    found: dict[Setting, list[float]] = {}
-    for entry in result.fine:
-        if np.isfinite(entry.final):
-            found.setdefault(entry.setting, []).append(entry.final)
-    return {setting: float(np.median(values)) for setting, values in found.items()}
+def medians(result: Result, part_of: Callable[[Entry], object] = attrgetter("setting")) -> Scales:
+    """Return for each run the median of the final mean distances of all runs in its part of a result, m."""
+    found: dict[Entry, float] = {}
+    for part in parted((entry for entry in result.fine if np.isfinite(entry.final)), part_of).values():
+        found |= dict.fromkeys(part, float(np.median([entry.final for entry in part])))
+    return found
 
 
 def relative(entries: Iterable[Entry], scales: Scales) -> Array:
-    """Return final mean distances as multiples of their settings' medians, (m,); only the finite ones."""
-    parts = np.array([_part(entry, scales) for entry in entries])
-    return np.asarray(parts[np.isfinite(parts)])
+    """Return scaled final mean distances, (m,); only the finite ones."""
+    costs = np.array([scaled(entry, scales) for entry in entries])
+    return np.asarray(costs[np.isfinite(costs)])
 
 
-def _part(entry: Entry, scales: Scales) -> float:
-    """Return a final mean distance as a multiple of its setting's median; inf where that is not known."""
-    scale = scales.get(entry.setting, 0.0)
+def scaled(entry: Entry, scales: Scales) -> float:
+    """Return a final mean distance as a multiple of its scale; inf where that is not known."""
+    scale = scales.get(entry, 0.0)
     return entry.final / scale if np.isfinite(entry.final) and scale > 0.0 else np.inf
 
 
 def dependences(result: Result) -> dict[str, list[str]]:
     """Return the gains that take several values, by name, with the controllers that they vary in."""
-    levels: dict[tuple[str, str], set[Value]] = {}
-    for entry in result.fine:
-        for name, value in entry.gains:
-            levels.setdefault((name, entry.controller), set()).add(value)
-    found: dict[str, list[str]] = {}
-    for (name, controller), values in levels.items():
-        if len(values) > 1:
-            found.setdefault(name, []).append(controller)
-    return found
+    every = ((name, entry.controller, value) for entry in result.fine for name, value in entry.gains)
+    levels = parted(every, itemgetter(0, 1)).items()
+    varying = parted((key for key, values in levels if len(set(values)) > 1), itemgetter(0))
+    return {name: [controller for _, controller in keys] for name, keys in varying.items()}
 
 
 def gain_text(gains: Sequence[tuple[str, Value]], units: Mapping[str, str]) -> str:
-    """Return gains as a line of text.
-
-    >>> gain_text([("k_rep", 0.3), ("attraction_limit", None)], {"k_rep": "N m³"})
-    'k_rep 0.3 N m³, attraction_limit none'
-    """
+    """Return gains as a line of text: "k_rep 0.3 N m³, attraction_limit none"."""
     known = [(name, value, "" if value is None else units.get(name, "")) for name, value in gains]
     return ", ".join(f"{name} {value_text(value)} {unit}".rstrip() for name, value, unit in known)
 
@@ -198,12 +185,10 @@ class Comparison:
 
     @property
     def label(self) -> str:
-        """Name of the ratio: first / second."""
         return f"{self.first.label} / {self.second.label}"
 
     @property
     def pairs(self) -> int:
-        """Number of pairs, on all maps."""
         return sum(len(each.a) for each in self.maps)
 
     def tally(self) -> str:
@@ -230,7 +215,6 @@ class Comparison:
 
 
 def ratio_text(ratio: Interval) -> str:
-    """Return a ratio with its interval, if it has one."""
     known = f" ({ratio.low:.3f} to {ratio.high:.3f})" if np.isfinite(ratio.low) else ""
     return f"{ratio.estimate:.3f}{known}"
 
@@ -243,12 +227,11 @@ def comparisons(groups: Sequence[Group]) -> list[Comparison]:
 
 
 def compared(first: Group, second: Group) -> Comparison | None:
-    """Return how two groups compare on the cases that both have, None where they have none."""
-    a, b = _by_case(first), _by_case(second)
-    cases: dict[str, list[Entry]] = {}
-    for case in a:
-        if case in b:
-            cases.setdefault(a[case].map, []).append(a[case])
+    a, b = (
+        {entry.case: entry for entry in group.entries if np.isfinite(entry.final) and entry.final > 0.0}
+        for group in (first, second)
+    )
+    cases = parted((entry for case, entry in a.items() if case in b), lambda entry: entry.map)
     if not cases:
         return None
     maps = []
@@ -256,10 +239,9 @@ def compared(first: Group, second: Group) -> Comparison | None:
         left = np.array([entry.final for entry in entries])
         right = np.array([b[entry.case].final for entry in entries])
         # runs of other teams from the same start and seed are no further evidence
-        seeds: dict[object, list[float]] = {}
-        for entry, effect in zip(entries, np.log(left / right).tolist(), strict=True):
-            seeds.setdefault((entry.start, entry.seed), []).append(effect)
-        effect = mean_with_t_interval([float(np.mean(each)) for each in seeds.values()])
+        effects = zip(entries, np.log(left / right).tolist(), strict=True)
+        seeds = parted(effects, lambda pair: (pair[0].start, pair[0].seed)).values()
+        effect = mean_with_t_interval([float(np.mean([each for _, each in pairs])) for pairs in seeds])
         maps.append(MapPairs(name, left, right, _exp(effect)))
     ratio = maps[0].ratio
     if len(maps) > 1:
@@ -274,9 +256,7 @@ def compared_groups(result: Result) -> tuple[list[Group], str]:
     those for a start and seed on the others): no run is compared that its own gains were chosen on.
     """
     apart = variants(result)
-    by: dict[str, list[Group]] = {}
-    for group in apart:
-        by.setdefault(group.controller, []).append(group)
+    by = parted(apart, lambda group: group.controller)
     if len(by) < 2 or len(by) == len(apart):
         every = "Every set of gains is compared by itself; none was chosen."
         return apart, every if len(by) < len(apart) else ""
@@ -290,17 +270,17 @@ def compared_groups(result: Result) -> tuple[list[Group], str]:
         words = "There is one case only, too few to choose gains fairly: the first of each take part."
         return [groups[0] for groups in by.values()], words
     scales, groups, chosen_gains = medians(result), [], []
-    costs: dict[object, list[tuple[object, float]]] = {}
-    for entry in result.entries:
-        cost = part_of(entry), _part(entry, scales)
-        costs.setdefault((entry.controller, entry.gains), []).append(cost)
+    tried: dict[object, list[Entry]] = parted(result.entries, lambda entry: (entry.controller, entry.gains))
     for controller, own in by.items():
         if len(own) == 1:
             groups += own
             continue
         entries, choices = [], []
         for part in parts:
-            outside = [[c for at, c in costs[controller, group.gains] if at != part] for group in own]
+            outside = [
+                [scaled(each, scales) for each in tried[controller, group.gains] if part_of(each) != part]
+                for group in own
+            ]
             standing = [(np.median(values), np.mean(values)) if values else (np.inf,) for values in outside]
             best = own[min(range(len(own)), key=standing.__getitem__)]
             entries += [entry for entry in best.entries if part_of(entry) == part]
@@ -314,10 +294,6 @@ def compared_groups(result: Result) -> tuple[list[Group], str]:
         f"median {other}, so that no run is compared on which its gains were chosen; a failed run counts as "
         f"the worst. Chosen: {'; '.join(chosen_gains)}."
     )
-
-
-def _by_case(group: Group) -> dict[tuple[object, ...], Entry]:
-    return {entry.case: entry for entry in group.entries if np.isfinite(entry.final) and entry.final > 0.0}
 
 
 def _exp(effect: Interval) -> Interval:
@@ -352,8 +328,8 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
         )
         every = f"{len(entries)} runs"
         found: set[Entry] = set()
-        for name in dict.fromkeys(entry.map for entry in entries):
-            found |= _telling(result, [entry for entry in entries if entry.map == name])
+        for own in parted(entries, lambda entry: entry.map).values():
+            found |= _telling(result, own)
         words = f"on each map {what}."
         if len(found) > most:
             found = _telling(result, entries)
@@ -370,14 +346,11 @@ def chosen(result: Result, most: int = MOST_RUNS, panes: int = 4) -> Choice:
 def _telling(result: Result, entries: Sequence[Entry]) -> set[Entry]:
     """Return best and worst runs, and those of a middle case."""
     scales = medians(result)
-    by: dict[str, list[tuple[float, Entry]]] = {}
-    for entry in entries:
-        if np.isfinite(part := _part(entry, scales)):
-            by.setdefault(entry.controller, []).append((part, entry))
+    known = (entry for entry in entries if np.isfinite(scaled(entry, scales)))
     found = set(_middle_case(_best_variants(result, entries), scales))
-    for ranked in by.values():
-        values = [value for value, _ in ranked]
-        found |= {ranked[int(np.argmin(values))][1], ranked[int(np.argmax(values))][1]}
+    for own in parted(known, lambda entry: entry.controller).values():
+        costs = [scaled(entry, scales) for entry in own]
+        found |= {own[int(np.argmin(costs))], own[int(np.argmax(costs))]}
     return found
 
 
@@ -391,14 +364,11 @@ def _best_variants(result: Result, entries: Iterable[Entry], few: int = 0) -> li
 
 def _middle_case(groups: Sequence[Group], scales: Scales) -> tuple[Entry, ...]:
     """Return the runs of the case whose ranks are nearest to the middle, of those that most groups have."""
-    ranks: dict[tuple[object, ...], list[float]] = {}
-    runs: dict[tuple[object, ...], list[Entry]] = {}
+    ranked: list[tuple[float, Entry]] = []  # distance from the middle of its group
     for group in groups:
-        known = [entry for entry in group.entries if np.isfinite(_part(entry, scales))]
-        order = sorted(known, key=lambda entry: _part(entry, scales))
-        for rank, entry in enumerate(order):
-            ranks.setdefault(entry.case, []).append(abs(rank - (len(order) - 1) / 2) / len(order))
-            runs.setdefault(entry.case, []).append(entry)
-    if not ranks:
-        return ()
-    return tuple(runs[min(ranks, key=lambda case: (-len(ranks[case]), sum(ranks[case])))])
+        known = [entry for entry in group.entries if np.isfinite(scaled(entry, scales))]
+        order = sorted(known, key=lambda entry: scaled(entry, scales))
+        ranked += [(abs(k - (len(order) - 1) / 2) / len(order), entry) for k, entry in enumerate(order)]
+    cases = parted(ranked, lambda pair: pair[1].case).values()
+    nearest = min(cases, key=lambda case: (-len(case), sum(rank for rank, _ in case)), default=[])
+    return tuple(entry for _, entry in nearest)

@@ -16,7 +16,7 @@ from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.render.density import density_label, dots, shading
 from robocov_app.render.layout import fitted_radii, mark_size
-from robocov_app.render.scene import MovingObstacle, moving_obstacles
+from robocov_app.render.scene import moving_obstacles
 from robocov_app.render.theme import DARK, LIGHT, ONE_HUE_EACH, mix, robot_hues
 from robocov_app.runs.saved import roster_of
 
@@ -82,7 +82,6 @@ def lives(record: Record) -> list[tuple[float, float | None]]:
 
 
 def map_picture(environment: Environment, width: float = 300.0, height: float = 220.0) -> str:
-    """Return a picture of a map as an SVG element, with its facts as its text."""
     frame = Frame(environment, width, height)
     return _svg(frame, _map_shapes(environment, frame, 0.0), map_sentence(environment))
 
@@ -138,21 +137,7 @@ def run_picture(
     return _svg(frame, "".join(parts), None if hidden else run_sentence(record, history))
 
 
-def changes_sentence(record: Record) -> str:
-    """Return when robots joined and failed, in words; empty where all were there and worked."""
-    numbers, end = roster_of(record).numbers, float(record.time[-1] - record.time[0])
-    words = []
-    for number, (begin, failed) in zip(numbers, lives(record), strict=True):
-        if 0.0 < begin <= end:
-            words.append((begin, f"robot {number} joins at {begin:.1f} s"))
-        if failed is not None:
-            words.append((failed, f"robot {number} fails at {failed:.1f} s"))
-    text = ", ".join(change for _, change in sorted(words))
-    return f"{text[:1].upper()}{text[1:]}." if text else ""
-
-
 def map_sentence(environment: Environment) -> str:
-    """Return what a picture of a map shows, in words."""
     low_x, low_y, high_x, high_y = environment.region.bounds
     blocked = 100.0 * (1.0 - environment.free_area / environment.region.area)
     count, weighed = len(environment.obstacles), density_label(environment)
@@ -167,13 +152,19 @@ def map_sentence(environment: Environment) -> str:
 
 
 def run_sentence(record: Record, history: CostHistory | None) -> str:
-    """Return what a picture of a run shows, in words."""
     robots, span = counted(len(record.team), "robot"), record.time[-1] - record.time[0]
     start = f" from start {record.start}" if record.start else ""
-    begin = f"{record.label} on map {record.environment.name}: trajectories of"
-    words = [f"{begin} {robots}{start} over {span:.4g} s."]
-    if record.conditions is not None and (changes := changes_sentence(record)):
-        words.append(changes)
+    head = f"{record.label} on map {record.environment.name}: trajectories of"
+    words = [f"{head} {robots}{start} over {span:.4g} s."]
+    changes = []  # who joined and who failed
+    for number, (begin, failed) in zip(roster_of(record).numbers, lives(record), strict=True):
+        if record.conditions is not None and 0.0 < begin <= span:
+            changes.append((begin, f"robot {number} joins at {begin:.1f} s"))
+        if record.conditions is not None and failed is not None:
+            changes.append((failed, f"robot {number} fails at {failed:.1f} s"))
+    if changes:
+        text = ", ".join(change for _, change in sorted(changes))
+        words.append(f"{text[0].upper()}{text[1:]}.")
     if history is not None and np.isfinite(history.mean_distance[[0, -1]]).all():
         first, final = history.mean_distance[[0, -1]]
         goes = "falls" if final < first else "goes"
@@ -198,38 +189,30 @@ def _map_shapes(environment: Environment, frame: Frame, time: float) -> str:
     shapes = ""
     if address := density_picture(environment):
         wide, high = frame.width - 2 * _MARGIN, frame.height - 2 * _MARGIN
-        shapes = (
-            f'<image x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}" '
-            f'preserveAspectRatio="none" href="{address}"/>'
-        )
+        box = f'x="{_MARGIN:g}" y="{_MARGIN:g}" width="{wide:g}" height="{high:g}"'
+        shapes = f'<image {box} preserveAspectRatio="none" href="{address}"/>'
     rings = rings_of(shapely.simplify(environment.at(time).blocked, _FINE / frame.zoom))
     if rings:
         shapes += f'<path class="blocked" d="{_path(map(frame.at, rings), closed=True)}"/>'
     for obstacle in moving_obstacles(environment, time):
-        shapes += _motion(obstacle, environment, frame)
+        seen = shapely.intersection(obstacle.polygon, environment.region.polygon)
+        along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
+        across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)
+        arrow = np.array([middle - along, middle + along])
+        head = np.array([middle + 0.2 * along + across, middle + along, middle + 0.2 * along - across])
+        shapes += (
+            f'<path class="blocked moving" d="{_path(map(frame.at, rings_of(seen)), closed=True)}"/>'
+            f'<path class="motion" d="{_path([frame.at(obstacle.path)])}"/>'
+            f'<path class="heading" d="{_path([arrow, head])}"/>'
+        )
     region = _path([frame.at(environment.region.vertices)], closed=True)
     return f'{shapes}<path class="region" d="{region}"/>'
-
-
-def _motion(obstacle: MovingObstacle, environment: Environment, frame: Frame) -> str:
-    seen = shapely.intersection(obstacle.polygon, environment.region.polygon)
-    along = 7.0 * obstacle.heading * np.array([1.0, -1.0])
-    across, middle = 0.45 * along[::-1] * np.array([-1.0, 1.0]), frame.at(obstacle.middle)
-    arrow = [middle - along, middle + along]
-    head = [middle + 0.2 * along + across, middle + along, middle + 0.2 * along - across]
-    return (
-        f'<path class="blocked moving" d="{_path(map(frame.at, rings_of(seen)), closed=True)}"/>'
-        f'<path class="motion" d="{_path([frame.at(obstacle.path)])}"/>'
-        f'<path class="heading" d="{_path([np.array(arrow), np.array(head)])}"/>'
-    )
 
 
 def _path(lines: Iterable[Array], *, closed: bool = False) -> str:
     """Return the path of lines of (k, 2) px: relative, in tenths of a pixel, that no error adds up."""
     words = []
     for line in lines:
-        if len(line) == 0:
-            continue
         tenths = np.rint(line * 10).astype(int)
         steps = np.diff(tenths, axis=0)
         steps = steps[(steps != 0).any(axis=1)]

@@ -1,6 +1,7 @@
 """The plots of a report: costs, comparisons, metrics, and what they depend on."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple, TypeAlias
 
@@ -11,13 +12,13 @@ from robocov.arrays import Array
 from robocov.controllers.gains import Value, value_text
 from robocov.errors import counted
 from robocov.metrics.run_metrics import RunMetrics, run_metrics
-from robocov_app.figures.gains import MOST_LEVELS, Dependence, plot_gain_grid, plot_gains
+from robocov_app.figures import results as drawing
+from robocov_app.figures.curves import TIME
 from robocov_app.figures.metrics import share
-from robocov_app.figures.results import Band, Pairs, Sample, plot_cost_bands, plot_final_costs, plot_paired
-from robocov_app.figures.results import quartiles as quartiles_of
+from robocov_app.figures.results import MOST_LEVELS, Band, Dependence, Pairs, Sample
 from robocov_app.figures.styles import CurveStyle, curve_styles
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import Comparison, Group, ratio_text, setting_label, settings, shown_groups
+from robocov_app.report.groups import Comparison, Group, Scales, ratio_text, setting_label
 from robocov_app.report.pictures import has_path
 from robocov_app.report.replay import ReplayRun
 from robocov_app.report.results import Entry, Result
@@ -29,7 +30,6 @@ Looks: TypeAlias = Mapping[str, CurveStyle]  # the styles of a result's groups b
 MOST_PANELS = 24  # settings up to which each has panels of its own
 PANEL = 420, 290  # of a panel in pixels; on a telephone it is shown a little smaller
 WIDE = 860, 360  # of a plot that stands alone, on a screen that is wide enough
-SCALE = 1.0
 _MOMENTS = 121  # moments of a cost curve: one every three pixels
 TOGETHER = "All maps and teams together"
 METRES = "final mean distance (m)"
@@ -46,7 +46,7 @@ class Plot(NamedTuple):
 
 def _parts(result: Result, key: str) -> Iterator[tuple[str, str, list[Group], bool]]:
     """Yield title, key and groups of several settings together, then of each where they are not many."""
-    groups, every = shown_groups(result), settings(result)
+    groups, every = grouped.shown_groups(result), grouped.settings(result)
     if len(every) > 1:
         yield TOGETHER, f"{key}-all", groups, True
     for k, setting in enumerate(every if len(every) <= MOST_PANELS else ()):
@@ -65,27 +65,56 @@ def cost_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
         for entry, each in known.items()
     }
     for title, own, groups, several in _parts(result, key):
-        bands = []
+        bands, words = [], []
+        what, unit = "mean distance to the nearest robot (m)", "m"
+        if several:
+            what, unit = "mean distance / that of the start", ""
         for group in groups:
             rows = [values[entry] for entry in group.entries if entry in values]
             if several:
                 rows = [row / row[0] for row in rows if np.isfinite(row[0]) and row[0] > 0.0]
-            if rows:
-                bands.append(Band(group.label, group.controller, time, np.array(rows)))
+            if not rows:
+                continue
+            bands.append(Band(group.label, looks[group.label], time, np.array(rows)))
+            low, middle, high = (row[np.isfinite(row)][-1] for row in drawing.quartiles(bands[-1].values))
+            text = f"{group.label}: {middle:.3f} {unit}".rstrip()
+            if len(rows) > 1:
+                text += f" at the end (median of {len(rows)} runs, quartiles {low:.3f} to {high:.3f})"
+            words.append(text)
         if bands:
-            relative, metres = "mean distance / that of the start", "mean distance to the nearest robot (m)"
-            what, unit = (relative, "") if several else (metres, "m")
-            yield _band_plot(title, bands, looks, own, what, unit)
+            about = f"{what} against time, up to {time[-1]:.4g} s. {'; '.join(words)}."
+            # the axis tells the unit: names have little room
+            yield _fitting(title, own, about, partial(drawing.plot_cost_bands, bands, label=what, unit=""))
 
 
 def final_plots(result: Result, looks: Looks, key: str) -> Iterator[Plot]:
     """Yield the distributions of final costs: over all settings, by their medians, then of each setting."""
-    scales = grouped.medians(result)
+    scales, metres = grouped.medians(result), dict.fromkeys(result.fine, 1.0)
     for title, own, groups, several in _parts(result, key):
-        metres = dict.fromkeys(scales, 1.0)
-        values = [grouped.relative(group.entries, scales if several else metres) for group in groups]
         what, unit = (RELATIVE, "") if several else (METRES, " m")
-        yield from _sample_plot(title, groups, values, looks, own, what, unit)
+        samples = [
+            Sample(group.label, looks[group.label], values)
+            for group in groups
+            if len(values := grouped.relative(group.entries, scales if several else metres))
+        ]
+        if not samples or max(len(sample.values) for sample in samples) < 2:
+            continue
+
+        def drawn(size: tuple[int, int], samples: list[Sample] = samples, what: str = what) -> Figure:
+            return drawing.plot_final_costs([("", samples)], what, size[0], 1.0)
+
+        words = []
+        for label, _, found in samples:
+            low, middle, high = np.percentile(found, [25, 50, 75])
+            text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
+            words.append(f"{text}, {counted(len(found), 'run')}")
+        yield _fitting(title, own, f"{what}. {'; '.join(words)}.", drawn)
+
+
+def _fitting(title: str, key: str, about: str, drawn: Callable[[tuple[int, int]], Figure]) -> Plot:
+    sizes, sentence = ((PANEL,), f"{title}: {about}") if title else ((WIDE, PANEL), about)
+    svgs = (inline_svg(drawn(size), f"{key}{k or ''}", sentence) for k, size in enumerate(sizes))
+    return Plot(title, *svgs)
 
 
 def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> Iterator[Plot]:
@@ -93,64 +122,17 @@ def paired_plots(comparisons: Sequence[Comparison], looks: Looks, key: str) -> I
     for k, each in enumerate(comparisons):
         if each.pairs < 2:
             continue
-        name, rows, maps = each.first.controller, [], each.maps
+        style, rows, maps = looks[each.first.label], [], each.maps
         if 1 < len(maps) <= MOST_PANELS:
-            rows = [Pairs(own.name, name, own.a / own.b, own.ratio) for own in maps]
+            rows = [Pairs(own.name, style, own.a / own.b, own.ratio) for own in maps]
         if len(maps) > 1:
             ratios = np.array([own.ratio.estimate for own in maps])
-            rows.append(Pairs(f"all {len(maps)} maps", name, ratios, each.ratio))
+            rows.append(Pairs(f"all {len(maps)} maps", style, ratios, each.ratio))
         else:
-            rows.append(Pairs(f"{each.pairs} pairs", name, maps[0].a / maps[0].b, each.ratio))
+            rows.append(Pairs(f"{each.pairs} pairs", style, maps[0].a / maps[0].b, each.ratio))
         words = "; ".join(f"{row.label}: ratio {ratio_text(row.interval)}" for row in rows)
-        styles, label = [looks[each.first.label]] * len(rows), "ratio of final mean distances (log)"
-        figure = plot_paired(rows, size=(PANEL[0], None), scale=SCALE, label=label, styles=styles)
+        figure = drawing.plot_paired(rows, "ratio of final mean distances (log)", PANEL[0], 1.0)
         yield Plot(each.label, inline_svg(figure, f"{key}-{k}", f"{each.label}, pair by pair. {words}."))
-
-
-def _band_plot(title: str, bands: list[Band], looks: Looks, key: str, what: str, unit: str) -> Plot:
-    styles = [looks[band.label] for band in bands]
-
-    def drawn(size: tuple[int, int]) -> Figure:
-        # the axis tells the unit: names have little room
-        return plot_cost_bands(bands, size=size, scale=SCALE, title="", styles=styles, label=what, unit="")
-
-    words = []
-    for band in bands:
-        low, middle, high = (row[np.isfinite(row)][-1] for row in quartiles_of(band.values))
-        text = f"{band.label}: {middle:.3f} {unit}".rstrip()
-        if len(band.values) > 1:
-            text += f" at the end (median of {len(band.values)} runs, quartiles {low:.3f} to {high:.3f})"
-        words.append(text)
-    about = f"{what} against time, up to {bands[0].time[-1]:.4g} s. {'; '.join(words)}."
-    return _fitting(title, key, about, drawn)
-
-
-def _fitting(title: str, key: str, about: str, drawn: Callable[[tuple[int, int]], Figure]) -> Plot:
-    """Return a plot as a panel, or where it stands alone for wide screens and for narrow ones."""
-    sizes, sentence = ((PANEL,), f"{title}: {about}") if title else ((WIDE, PANEL), about)
-    svgs = (inline_svg(drawn(size), f"{key}{k or ''}", sentence) for k, size in enumerate(sizes))
-    return Plot(title, *svgs)
-
-
-def _sample_plot(
-    title: str, groups: list[Group], values: list[Array], looks: Looks, key: str, what: str, unit: str
-) -> Iterator[Plot]:
-    each = zip(groups, values, strict=True)
-    samples = [Sample(group.label, group.controller, own) for group, own in each if len(own)]
-    if not samples or max(len(sample.values) for sample in samples) < 2:
-        return
-    styles = [looks[sample.label] for sample in samples]
-
-    def drawn(size: tuple[int, int]) -> Figure:
-        wide = size[0], None
-        return plot_final_costs([("", samples)], size=wide, scale=SCALE, styles=styles, label=what)
-
-    words = []
-    for label, _, found in samples:
-        low, middle, high = np.percentile(found, [25, 50, 75])
-        text = f"{label}: median {middle:.3f}{unit}, quartiles {low:.3f} to {high:.3f}"
-        words.append(f"{text}, {counted(len(found), 'run')}")
-    yield _fitting(title, key, f"{what}. {'; '.join(words)}.", drawn)
 
 
 class _Parameter(NamedTuple):
@@ -160,14 +142,8 @@ class _Parameter(NamedTuple):
     value_of: Callable[[Entry], Value]
     choices: tuple[str, ...] = ()
 
-    def place(self, entry: Entry) -> float:
-        """Return where a run stands: nan for no limit, of a word its number."""
-        value = self.value_of(entry)
-        if isinstance(value, str):
-            return float(self.choices.index(value))
-        return np.nan if value is None else value
-
     def level(self, place: float) -> Value:
+        """Return the value at a place of the axis: nan stands for no limit, and a word's number for it."""
         if np.isnan(place):
             return None
         return self.choices[int(place)] if self.choices else place
@@ -175,105 +151,98 @@ class _Parameter(NamedTuple):
     def text(self, place: float) -> str:
         return value_text(self.level(place), digits=4)
 
-
-class _Scale(NamedTuple):
-    """Scale of final costs: the medians of the parts of a result; and the label of the axis."""
-
-    label: str
-    part_of: Callable[[Entry], object]
-    medians: Mapping[object, float]
-
-    def depends(self, group: Group, parameter: _Parameter) -> Dependence:
-        """Return the scaled costs of a group's runs over a parameter, of those that have one."""
-        scales = [self.medians.get(self.part_of(entry), 0.0) for entry in group.entries]
-        known = [
-            (parameter.place(entry), entry.final / scale)
-            for entry, scale in zip(group.entries, scales, strict=True)
-            if np.isfinite(entry.final) and scale > 0.0
-        ]
+    def dependence(self, group: Group, scales: Scales, style: CurveStyle) -> Dependence:
+        """Return the scaled costs of a group's runs over the parameter, of those that have one."""
+        known = []
+        for entry in group.entries:
+            value, cost = self.value_of(entry), grouped.scaled(entry, scales)
+            if np.isfinite(cost):
+                place = float(self.choices.index(value)) if isinstance(value, str) else value
+                known.append((np.nan if place is None else place, cost))
         places, values = np.array(known, dtype=float).reshape(-1, 2).T
-        return Dependence(group.label, group.controller, places, values)
-
-
-def _scale_by(result: Result, label: str, part_of: Callable[[Entry], object]) -> _Scale:
-    """Return a scale by the medians of parts of a result, or of one part metres."""
-    finals: dict[object, list[float]] = {}
-    for entry in result.fine:
-        finals.setdefault(part_of(entry), []).append(entry.final)
-    if len(finals) == 1:
-        return _Scale(METRES, part_of, dict.fromkeys(finals, 1.0))
-    known = {part: np.extract(np.isfinite(own), own) for part, own in finals.items()}
-    return _Scale(label, part_of, {part: float(np.median(own)) for part, own in known.items() if len(own)})
+        return Dependence(group.label, style, places, values)
 
 
 def dependence_plots(result: Result, key: str) -> Iterator[Plot]:
     """Yield the final cost against every gain and limit that varies, then grids of gains."""
     groups, varying = grouped.by_controller(result), grouped.dependences(result)
-    scale = _scale_by(result, RELATIVE, lambda entry: entry.setting)
-    gains = {name: _gain(result, name) for name in varying}
+    styles = curve_styles(group.controller for group in groups)
+
+    def scale(label: str, part_of: Callable[[Entry], object]) -> tuple[str, Scales]:
+        """Return the axis' label and scales by the medians of parts; of one part metres."""
+        if len({part_of(entry) for entry in result.fine}) == 1:
+            return METRES, dict.fromkeys(result.fine, 1.0)
+        return label, grouped.medians(result, part_of)
+
+    def plotted(
+        parameter: _Parameter, some: Sequence[Group], label: str, scales: Scales, key: str
+    ) -> Iterator[Plot]:
+        rows = [parameter.dependence(group, scales, styles[group.controller]) for group in some]
+        if rows := [row for row in rows if len(row.values)]:
+            figure = drawing.plot_gains(rows, parameter.title, PANEL, label, parameter.choices)
+            words = "; ".join(_levels_text(row, parameter) for row in rows)
+            sentence = f"{label} against {parameter.title}. {words}."
+            yield Plot(parameter.title, inline_svg(figure, key, sentence))
+
+    by_setting = scale(RELATIVE, lambda entry: entry.setting)
+    gains: dict[str, _Parameter] = {}
     for k, (name, controllers) in enumerate(varying.items()):
+        values = dict.fromkeys(dict(entry.gains).get(name) for entry in result.fine)
+        unit, choices = result.units.get(name, ""), tuple(each for each in values if isinstance(each, str))
+        title = f"{name} ({unit})" if unit else name
+        gains[name] = _Parameter(title, partial(_named, "gains", name), choices)
         some = [group for group in groups if group.controller in controllers]
-        yield from _dependence_plot(gains[name], some, groups, scale, f"{key}-{k}")
+        yield from plotted(gains[name], some, *by_setting, f"{key}-{k}")
+    team = [_Parameter("robots", lambda entry: entry.robots)]
+    for name, _ in result.fine[0].team if result.fine else ():
+        if name not in WORDS:
+            title = f"{name.replace('_', ' ')} ({UNITS[name]})"
+            team.append(_Parameter(title, partial(_named, "team", name)))
     # teams differ in their settings: by the medians of the maps alone
-    by_map = _scale_by(result, "final distance / median of map", lambda entry: entry.map)
-    for k, parameter in enumerate(_team_parameters(result)):
+    by_map = scale("final distance / median of map", lambda entry: entry.map)
+    for k, parameter in enumerate(team):
         if len({parameter.value_of(entry) for entry in result.fine}) > 1:
-            yield from _dependence_plot(parameter, groups, groups, by_map, f"{key}-team-{k}")
+            yield from plotted(parameter, groups, *by_map, f"{key}-team-{k}")
     count = 0
     for group in groups:
         own = [name for name, controllers in varying.items() if group.controller in controllers]
         for names in combinations(own, 2):
-            plot = _grid_plot(group, names, [gains[name] for name in names], scale, f"{key}-grid-{count + 1}")
+            both, style = [gains[name] for name in names], styles[group.controller]
+            plot = _grid_plot(group, names, both, *by_setting, style, f"{key}-grid-{count + 1}")
             if plot is not None:
                 count += 1
                 yield plot
 
 
-def _gain(result: Result, name: str) -> _Parameter:
-    values = dict.fromkeys(dict(entry.gains).get(name) for entry in result.fine)
-    unit = result.units.get(name, "")
-    choices = tuple(value for value in values if isinstance(value, str))
-    return _Parameter(f"{name} ({unit})" if unit else name, lambda entry: dict(entry.gains)[name], choices)
+def _named(part: str, name: str, entry: Entry) -> Value:
+    value: Value = dict(getattr(entry, part))[name]
+    return value
 
 
-def _team_parameters(result: Result) -> Iterator[_Parameter]:
-    yield _Parameter("robots", lambda entry: entry.robots)
-    for name, _ in result.fine[0].team if result.fine else ():
-        if name not in WORDS:
-            title = f"{name.replace('_', ' ')} ({UNITS[name]})"
-            yield _Parameter(title, lambda entry, name=name: dict(entry.team)[name])  # type: ignore[misc]
-
-
-def _dependence_plot(
-    parameter: _Parameter, some: Sequence[Group], groups: Sequence[Group], scale: _Scale, key: str
-) -> Iterator[Plot]:
-    rows = [row for row in (scale.depends(group, parameter) for group in some) if len(row.values)]
-    if not rows:
-        return
-    known = curve_styles(group.controller for group in groups)
-    looks, (title, _, choices), label = [known[row.controller] for row in rows], parameter, scale.label
-    figure = plot_gains(rows, title, size=PANEL, scale=SCALE, styles=looks, label=label, words=choices)
-    words = []
-    for row in rows:
-        levels = np.unique(row.gains)
-        if len(levels) <= MOST_LEVELS:
-            places = np.nan_to_num(row.gains, nan=np.inf)
-            medians = [np.median(row.values[places == level]) for level in np.nan_to_num(levels, nan=np.inf)]
-            each = zip(levels.tolist(), medians, strict=True)
-            parts = [f"{parameter.text(level)}: {median:.3f}" for level, median in each]
-            words.append(f"{row.label}, medians at {', '.join(parts)}")
-        else:
-            span = f"from {np.nanmin(row.gains):.3g} to {np.nanmax(row.gains):.3g}"
-            best = parameter.text(row.gains[int(np.argmin(row.values))])
-            words.append(f"{row.label}, {len(row.values)} runs {span}, the lowest value at {best}")
-    yield Plot(title, inline_svg(figure, key, f"{label} against {title}. {'; '.join(words)}."))
+def _levels_text(row: Dependence, parameter: _Parameter) -> str:
+    levels = np.unique(row.gains)
+    if len(levels) > MOST_LEVELS:
+        span = f"from {np.nanmin(row.gains):.3g} to {np.nanmax(row.gains):.3g}"
+        best = parameter.text(row.gains[int(np.argmin(row.values))])
+        return f"{row.label}, {len(row.values)} runs {span}, the lowest value at {best}"
+    places = np.nan_to_num(row.gains, nan=np.inf)
+    medians = [np.median(row.values[places == level]) for level in np.nan_to_num(levels, nan=np.inf)]
+    each = zip(levels.tolist(), medians, strict=True)
+    parts = [f"{parameter.text(level)}: {median:.3f}" for level, median in each]
+    return f"{row.label}, medians at {', '.join(parts)}"
 
 
 def _grid_plot(
-    group: Group, names: Sequence[str], gains: Sequence[_Parameter], scale: _Scale, key: str
+    group: Group,
+    names: Sequence[str],
+    gains: Sequence[_Parameter],
+    label: str,
+    scales: Scales,
+    style: CurveStyle,
+    key: str,
 ) -> Plot | None:
     """Return medians over two gains of a controller; None where they were not tried on a grid."""
-    first, second = (scale.depends(group, gain) for gain in gains)
+    first, second = (gain.dependence(group, scales, style) for gain in gains)
     columns, i = np.unique(first.gains, return_inverse=True)
     rows, j = np.unique(second.gains, return_inverse=True)
     if not (1 < len(columns) <= MOST_LEVELS and 1 < len(rows) <= MOST_LEVELS):
@@ -285,10 +254,10 @@ def _grid_plot(
         return None  # a sample of a range
     levels = [[gain.level(place) for place in own] for gain, own in zip(gains, (columns, rows), strict=True)]
     titles = gains[0].title, gains[1].title
-    figure = plot_gain_grid(levels[0], levels[1], values, titles, size=PANEL, scale=SCALE)
+    figure = drawing.plot_gain_grid(PANEL, levels[0], levels[1], values, titles)
     row, column = np.unravel_index(int(np.nanargmin(values)), values.shape)
     title = f"{group.label} over {names[0]} and {names[1]}"
-    what = "final distance in m" if scale.label == METRES else RELATIVE
+    what = "final distance in m" if label == METRES else RELATIVE
     best = f"{titles[0]} {gains[0].text(columns[column])} and {titles[1]} {gains[1].text(rows[row])}"
     span = f"from {np.nanmin(values):.3g} at {best} to {np.nanmax(values):.3g}"
     return Plot(title, inline_svg(figure, key, f"{title}: medians of the {what}, {span}."))
@@ -299,27 +268,20 @@ MOST_ROBOTS = 60  # robots up to which they are
 _MEASURED = 30  # moments of a run, besides its first
 
 
-class _Panel(NamedTuple):
-    title: str
-    label: str
-    unit: str
-    of: Callable[[RunMetrics], Array]
-
-
 def _in_contact(gaps: Array) -> Array:
     """Return gaps in whole millimetres: what is below is the solver's slop, which has no sign."""
     return np.asarray(np.round(gaps, 3) + 0.0)
 
 
-_PARTS = "parts of the team that hear each other"
-_PANELS = (
-    _Panel("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
-    _Panel("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
-    _Panel("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
-    _Panel("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
-    _Panel("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
-    _Panel("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
-    _Panel("Connectivity", _PARTS, "", lambda m: np.asarray(m.components, float)),
+# title, label, unit and values of each plot of a metric
+_PANELS: tuple[tuple[str, str, str, Callable[[RunMetrics], Array]], ...] = (
+    ("Sensed", "in range and in sight (% of the free area)", "%", share(lambda m: m.sensed_area)),
+    ("Seen", "in line of sight (% of the free area)", "%", share(lambda m: m.visible_area)),
+    ("Energy", "work |F v| so far (J)", "J", lambda m: m.work),
+    ("Path", "path of a robot so far, mean (m)", "m", lambda m: m.path_length),
+    ("Clearance", "smallest gap to a wall (m)", "m", lambda m: _in_contact(m.wall_clearance)),
+    ("Distance kept", "smallest gap between robots (m)", "m", lambda m: _in_contact(m.robot_clearance)),
+    ("Connectivity", "parts of the team that hear each other", "", lambda m: np.asarray(m.components, float)),
 )
 
 
@@ -335,29 +297,32 @@ def measure_plots(
         return []
     if any(len(run.record.team) > MOST_ROBOTS or not has_path(run.record) for run in runs):
         return []
-    labels = {entry: group.label for group in shown_groups(result) for entry in group.entries}
-    measured = [_measured(run) for run in runs]
+    labels = {entry: group.label for group in grouped.shown_groups(result) for entry in group.entries}
+    spans = [float(run.record.time[-1] - run.record.time[0]) for run in runs]
+    measured = [
+        run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)
+        for run, seconds in zip(runs, spans, strict=True)
+    ]
+    parting = any((metrics.components != metrics.components[0]).any() for metrics in measured)
     curves = [
-        (panel, [(metrics.time, panel.of(metrics)) for metrics in measured])
-        for panel in _PANELS
-        if panel.label != _PARTS or any((m.components != m.components[0]).any() for m in measured)
+        (title, label, unit, [(metrics.time, of(metrics)) for metrics in measured])
+        for title, label, unit, of in _PANELS
+        if parting or title != "Connectivity"
     ]
     histories = [run.history for run in runs]
     times = [(each.time, each.mean_time) for each in histories if each and each.mean_time is not None]
     if len(times) == len(runs):
-        what = "mean time until the first robot is there (s)"
-        curves.insert(0, (_Panel("Time to come", what, "s", lambda m: m.time), times))
+        curves.insert(0, ("Time to come", TIME, "s", times))
     plots = []
-    for (title, label, unit, _), found in curves:
+    for title, label, unit, found in curves:
         bands = [
-            Band(labels[entry], entry.controller, time - time[0], np.where(known, values, np.nan)[None])
+            Band(labels[entry], looks[labels[entry]], time - time[0], np.where(known, values, np.nan)[None])
             for entry, (time, values) in zip(entries, found, strict=True)
             if entry in labels and (known := np.isfinite(values)).any()
         ]
         if not bands:
             continue
-        own = [looks[band.label] for band in bands]
-        figure = plot_cost_bands(bands, size=PANEL, scale=SCALE, title="", styles=own, label=label, unit=unit)
+        figure = drawing.plot_cost_bands(bands, PANEL, label, unit)
         words = []
         for band in bands:
             first, last = band.values[0][np.isfinite(band.values[0])][[0, -1]]
@@ -365,8 +330,3 @@ def measure_plots(
         sentence = f"{title}: {label} against time. {'; '.join(words)}."
         plots.append(Plot(title, inline_svg(figure, f"{key}-{title.lower().replace(' ', '-')}", sentence)))
     return plots
-
-
-def _measured(run: ReplayRun) -> RunMetrics:
-    seconds = float(run.record.time[-1] - run.record.time[0])
-    return run_metrics(run.record, _MEASURED / seconds if seconds > 0.0 else 0.0)

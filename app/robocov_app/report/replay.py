@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 
 from robocov.arrays import Array
 from robocov.environment import Environment
-from robocov.errors import ParameterError
 from robocov.metrics import CostHistory
 from robocov.record import Record
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
@@ -50,16 +49,9 @@ class ReplayRun:
 
 
 def even_times(end: float, rate: float) -> Array:
-    """Return multiples of 1/rate seconds up to `end`, s, and `end` itself.
-
-    >>> even_times(1.0, 2.5).tolist()
-    [0.0, 0.4, 0.8, 1.0]
-    """
-    count = math.floor(end * rate + 1e-9)
-    times = np.arange(count + 1) / rate
-    if end - times[-1] > 1e-9:
-        times = np.append(times, end)
-    return np.asarray(times)
+    """Return multiples of 1/rate seconds up to `end`, s, and `end` itself."""
+    times = np.arange(math.floor(end * rate + 1e-9) + 1) / rate
+    return np.append(times, end) if end - times[-1] > 1e-9 else times
 
 
 def quantised(values: Array, low: float, high: float) -> str:
@@ -155,11 +147,7 @@ def embedded(
 
 
 def script_json(content: Any) -> str:
-    """Return JSON that may stand in a script element, whatever names are in it.
-
-    >>> script_json("</script>")
-    '"\\\\u003c/script\\\\u003e"'
-    """
+    """Return JSON that may stand in a script element, whatever names are in it."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)  # ASCII: no U+2028 is left
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
@@ -187,7 +175,6 @@ def _places(record: Record, values: Array, times: Array) -> str:
 
 
 def _headings(record: Record, times: Array) -> str:
-    """Return where robots face at other times as unit vectors, quantised; nan for points."""
     assert record.steering is not None
     angles = np.where(record.team.turns, record.steering[:, :, 0], np.nan)
     vectors = np.stack([np.cos(angles), np.sin(angles)], axis=2).reshape(len(record), -1)
@@ -219,33 +206,18 @@ def _cost(history: CostHistory | None, begin: float, times: Array, step: float) 
     return {"step": step, "count": len(times), **known, "last": last if np.isfinite(last) else None}
 
 
-def replay_html(
-    runs: Sequence[ReplayRun], *, standalone: bool, panes: Sequence[int] | None = None, budget: int = BUDGET
-) -> str:
-    """Return runs as HTML in which they can be watched side by side, those of `panes` at first.
+def replay_html(runs: Sequence[ReplayRun]) -> str:
+    """Return runs that can be watched side by side as a fragment of HTML with its own style and script.
 
     It asks for no network, defines no global name and has no ids: several may stand on one page. Where
-    scripts do not run (and on paper) it shows pictures of the last moments. `standalone`: a whole page; else
-    a fragment with its own style and script, for a notebook.
+    scripts do not run (and on paper) it shows pictures of the last moments.
     """
-    content = replay_part(runs, panes, budget)
-    style = theme_rules(".robocov-replay") + replay_css()
-    fragment = f"<style>{style}</style>{content}<script>{script(replay_js() + 'startReplays();')}</script>"
-    if not standalone:
-        return fragment
-    title = escape(runs[0].title)
-    return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
-        f'<meta name="viewport" content="width=device-width">'
-        f"<style>{theme_rules(':root')}body{{margin:16px;background:var(--rc-background)}}</style></head>"
-        f"<body><main>{fragment}</main></body></html>\n"
-    )
+    style, code = theme_rules(".robocov-replay") + replay_css(), script(replay_js() + "startReplays();")
+    return f"<style>{style}</style>{replay_part(runs)}<script>{code}</script>"
 
 
 def replay_part(runs: Sequence[ReplayRun], panes: Sequence[int] | None = None, budget: int = BUDGET) -> str:
     """Return a replay without style and script, for a page that has `replay_css` and `replay_js` once."""
-    if not runs:
-        raise ParameterError("replay: no runs were given, but at least one was wanted")
     shown = list(range(len(runs)))[:MOST_PANES] if panes is None else list(panes)
     # runs of one controller with the same gains look the same
     keys = [(run.record.controller, tuple(run.record.gains.items())) for run in runs]
@@ -275,11 +247,9 @@ def replay_js() -> str:
 
 
 def script(content: str) -> str:
-    """Return a script whose names nobody else sees."""
     return f'(() => {{\n"use strict";\n{content}\n}})();'
 
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a file that pages are made of."""
     return files("robocov_app.report").joinpath("assets", name).read_text(encoding="utf-8")

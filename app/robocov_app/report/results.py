@@ -31,9 +31,10 @@ from robocov_app.sweep.table import gain_column
 
 RESTARTS = 24  # searches of which the best counts
 
-
 Kind: TypeAlias = Literal["run", "comparison", "sweep"]
 Gains: TypeAlias = tuple[tuple[str, Value], ...]
+Parameters: TypeAlias = tuple[tuple[str, float | None], ...]
+Setting: TypeAlias = tuple[str, int, Parameters]  # map, number of robots, team: what makes costs comparable
 
 # what is known of a run in numbers, by the names of the columns of a sweep's table
 FIGURES = (
@@ -50,7 +51,7 @@ class Entry:
     controller: str
     label: str  # the controller's name as shown to people
     robots: int
-    team: tuple[tuple[str, float | None], ...]  # parameters of which there are several values; None: no limit
+    team: Parameters  # those of which there are several values; None: no limit
     start: str | None
     seed: int | None
     gains: Gains
@@ -60,18 +61,15 @@ class Entry:
 
     @property
     def final(self) -> float:
-        """Mean distance to the nearest robot at the end, m; nan where there is none."""
         value = self.figures.get("mean_distance_m")
         return float("nan") if value is None else float(value)
 
     def has(self, name: str) -> bool:
-        """Whether a figure is known, and finite."""
         value = self.figures.get(name)
         return value is not None and bool(np.isfinite(value))
 
     @property
-    def setting(self) -> tuple[object, ...]:
-        """Key of comparable costs: map, number of robots, team."""
+    def setting(self) -> Setting:
         return self.map, self.robots, self.team
 
     @property
@@ -109,22 +107,19 @@ class Result:
     facts: Mapping[str, Any]
     loaded: Mapping[Path, Saved]  # runs that were read already
     damaged: tuple[Damaged, ...] = ()  # runs that cannot be read and are no entries
-    references: Mapping[tuple[object, ...], Reference] = field(default_factory=dict)  # of settings
+    references: Mapping[Setting, Reference] = field(default_factory=dict)  # of settings
     part: str = ""  # which part of a story it is
 
     @cached_property
     def fine(self) -> tuple[Entry, ...]:
-        """The runs that did not fail."""
         return tuple(entry for entry in self.entries if entry.error is None)
 
     @property
     def failed(self) -> tuple[Entry, ...]:
-        """The runs that failed."""
         return tuple(entry for entry in self.entries if entry.error is not None)
 
     @property
     def missing(self) -> int:
-        """Number of runs that are not done."""
         return max(self.wanted - len(self.entries) - len(self.damaged), 0)
 
     def readable(self, tell: Callable[[int], None] = lambda done: None) -> Result:
@@ -169,28 +164,24 @@ class Result:
         return read_history(path) if path.exists() else None
 
 
-def with_references(result: Result, *, search: bool, tell: Callable[[int], None] | None = None) -> Result:
+def with_references(result: Result, *, search: bool, tell: Callable[[int], None]) -> Result:
     """Return the result with centralised references, cached or by `search`; none where things change."""
     lattice = result.facts.get("lattice")
     first = {entry.setting: entry for entry in reversed(result.fine)}
     found = {}
     for done, (setting, entry) in enumerate(first.items(), start=1):
         record = result.record(entry)
-        environment = record.environment
-        everybody = bool(record.present.all() and record.working.all())
-        if isinstance(lattice, int) and everybody and not environment.moves:
-            radius = float(record.team.radius.max())
-            reference = _reference(environment, len(record.team), radius, lattice, search=search)
+        everybody = record.present.all() and record.working.all()
+        if isinstance(lattice, int) and everybody and not record.environment.moves:
+            reference = _reference(record, lattice, search=search)
             if reference is not None:
                 found[setting] = reference
-        if tell is not None:
-            tell(done)
+        tell(done)
     return replace(result, references=found)
 
 
-def _reference(
-    environment: Environment, robots: int, radius: float, lattice: int, *, search: bool
-) -> Reference | None:
+def _reference(record: Record, lattice: int, *, search: bool) -> Reference | None:
+    environment, robots, radius = record.environment, len(record.team), float(record.team.radius.max())
     cache = ArrayCache.of_user()
     content = json.dumps(to_json(environment), sort_keys=True)
     key = ArrayCache.key("optimum", __version__, content, robots, radius, lattice, RESTARTS)
@@ -225,16 +216,11 @@ def gathered(folder: Path) -> Result:
 
 
 def printable(text: str) -> str:
-    """Return a text as a page can hold it: what is no character becomes a question mark of its own.
-
-    >>> printable("a\\x00b")
-    'a\\ufffdb'
-    """
-    return "".join(c if c.isprintable() or c == " " else "\ufffd" for c in text)
+    """Return a text as a page can hold it: what is no character becomes a question mark of its own."""
+    return "".join(c if c.isprintable() else "\ufffd" for c in text)
 
 
 def _damaged(folder: Path, error: InputError) -> Damaged:
-    """Return a damaged run with the reason, without the path of its folder."""
     reason = str(error).removeprefix(f"{folder}: ").replace(f"{folder}/", "")
     return Damaged(printable(folder.name), printable(reason))
 
@@ -329,7 +315,12 @@ def _of_sweep(folder: Path) -> Result:
         )
     if teams:
         facts["team"] = {name: value for name, value in teams[0].items() if name not in swept}
-    facts["versions"] = _versions(entries)
+    facts["versions"] = None
+    for entry in entries:
+        with suppress(InputError):
+            if entry.error is None:
+                facts["versions"] = _json(entry.folder / "run.json").get("versions")
+                break
     columns = {column.name: column.metadata or {} for column in results.dataset.schema}
     about = {name: columns.get(gain_column(name), {}) for own in gains.values() for name in own}
     texts = {
@@ -358,12 +349,10 @@ def _known_gains(
     entries: list[Entry], documented: Mapping[str, Sequence[str]]
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return units and meanings of gains: of the built-in controllers, and what a table says of others."""
-    units: dict[str, str] = {}
-    meanings: dict[str, str] = {}
-    for controller in dict.fromkeys(entry.controller for entry in entries):
-        if controller in CONTROLLERS:
-            for name, gain in gains_of(CONTROLLERS[controller]).items():
-                units[name], meanings[name] = gain.unit, gain.meaning
+    kinds = dict.fromkeys(CONTROLLERS[each.controller] for each in entries if each.controller in CONTROLLERS)
+    gains = {name: gain for kind in kinds for name, gain in gains_of(kind).items()}
+    units = {name: gain.unit for name, gain in gains.items()}
+    meanings = {name: gain.meaning for name, gain in gains.items()}
     for name, (unit, meaning) in documented.items():
         if unit or meaning:
             units.setdefault(name, "" if unit == "1" else printable(unit))
@@ -386,14 +375,6 @@ def _figures(summary: Any, history: CostHistory | None) -> dict[str, float | Non
         if figures["mean_distance_over_run_m"] is None and np.isfinite(history.mean_distance).all():
             figures["mean_distance_over_run_m"] = mean_over_run(history.time, history.mean_distance)
     return figures
-
-
-def _versions(entries: list[Entry]) -> Any:
-    for entry in entries:
-        with suppress(InputError):
-            if entry.error is None:
-                return _json(entry.folder / "run.json").get("versions")
-    return None
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import TypeAlias
 
 import numpy as np
 
-from robocov.controllers.gains import Value, value_text
+from robocov.controllers.gains import value_text
 from robocov.errors import counted
 from robocov_app.report import groups as grouped
-from robocov_app.report.groups import Comparison, Group, gain_text, ratio_text, setting_label, settings
+from robocov_app.report.groups import Comparison, Group, gain_text, parted, ratio_text, setting_label
 from robocov_app.report.results import RESTARTS, Entry, Result
 
 NOTHING = "–"  # stands where there is no number
@@ -33,12 +34,11 @@ Column: TypeAlias = tuple[str, Callable[[Sequence[Entry]], str]]  # head, and te
 
 
 def controllers_table(result: Result) -> Table:
-    """Return the controllers with their gains, or between which values these are."""
     groups = grouped.shown_groups(result)
     known = {group.controller for group in groups}
-    lost = {e.controller: Group(e.label, e.controller, None, (e,)) for e in reversed(result.failed)}
-    order = dict.fromkeys(entry.controller for entry in result.failed if entry.controller not in known)
-    return _gains_table("Controllers and their gains", [*groups, *(lost[name] for name in order)], result)
+    failed = parted(result.failed, lambda entry: entry.controller).items()
+    lost = [Group(own[0].label, name, None, tuple(own[:1])) for name, own in failed if name not in known]
+    return _gains_table("Controllers and their gains", [*groups, *lost], result)
 
 
 def gains_table(result: Result) -> Table | None:
@@ -58,8 +58,7 @@ def _gains_table(caption: str, groups: Sequence[Group], result: Result) -> Table
 
 
 def summary_tables(result: Result) -> list[Table]:
-    """Return what came of each group, over everything and in each setting."""
-    groups, every = grouped.shown_groups(result), settings(result)
+    groups, every = grouped.shown_groups(result), grouped.settings(result)
     distance, over_run, *others = _figure_columns(result)
 
     def above(entries: Sequence[Entry]) -> str:
@@ -67,7 +66,12 @@ def summary_tables(result: Result) -> list[Table]:
         return _quartiles(gaps, 1)
 
     gap: list[Column] = [("Above J_ref, %", above)] * bool(result.references)
-    settled: Column = "Settled", _settled
+
+    def rest(entries: Sequence[Entry]) -> str:
+        count = len(_values(entries, "settled_at_s"))
+        return f"{count} of {len(entries)}" if len(entries) > 1 else "yes" if count else "no"
+
+    settled: Column = "Settled", rest
 
     def table(caption: str, columns: Sequence[Column], parts: Sequence[Group], *notes: str) -> Table:
         rows = [
@@ -102,7 +106,6 @@ def summary_tables(result: Result) -> list[Table]:
 
 
 def runs_table(result: Result) -> Table | None:
-    """Return every run in a row of its own, None where they are too many."""
     labels = grouped.labels(result)
     if len(result.fine) > MOST_ROWS or len(result.fine) == len(set(labels.values())):
         return None  # too many, or the summary tells all of them
@@ -129,13 +132,18 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
 
         return text
 
+    def clearance(entries: Sequence[Entry]) -> str:
+        # a minus as wide as a digit; none before nothing but zeros
+        number = f"{min(values):.3f}" if (values := _values(entries, "min_clearance_m")) else NOTHING
+        return number.replace("-", "\u2212" if number.strip("-0.") else "")
+
     timed = any(entry.has("mean_time_s") for entry in result.fine)
     return [
         ("Mean distance, m", spread("mean_distance_m", 3)),
         ("Over the run, m", spread("mean_distance_over_run_m", 3)),
         ("Settled at, s", spread("settled_at_s", 1, unsettled)),
         ("Contacts", count("contacts", lambda own: f"{sum(each > 0 for each in own)} of {len(own)}")),
-        ("Clearance, m", _clearance),
+        ("Clearance, m", clearance),
         ("Path, m", spread("path_length_m", 2)),
         ("Stuck robots", count("stuck_robots", lambda own: f"{np.mean(own):.2g} per run")),
         *([("Mean time, s", spread("mean_time_s", 3))] if timed else []),
@@ -143,7 +151,6 @@ def _figure_columns(result: Result, unsettled: str = NOTHING) -> list[Column]:
 
 
 def pairs_table(comparisons: Sequence[Comparison]) -> Table:
-    """Return how the groups compare over maps, one row a comparison."""
     rows = []
     for each in comparisons:
         lower = sum(int((own.a < own.b).sum()) for own in each.maps)
@@ -155,7 +162,6 @@ def pairs_table(comparisons: Sequence[Comparison]) -> Table:
 
 
 def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
-    """Return a table for each comparison on several maps, one row a map."""
     head = ("Map", "Pairs", "First, m", "Second, m", "Ratio", "First is", "First is lower in")
     tables = []
     for each in comparisons:
@@ -171,7 +177,6 @@ def map_pairs_tables(comparisons: Sequence[Comparison]) -> list[Table]:
 
 
 def failures_table(result: Result) -> Table | None:
-    """Return the runs that failed, each with its error, and those that cannot be read; None without any."""
     rows: list[tuple[str, ...]] = []
     for entry in result.failed:
         where, gains = setting_label(result, entry.setting), gain_text(entry.gains, result.units)
@@ -199,25 +204,11 @@ def _quartiles(values: Sequence[float], decimals: int, nothing: str = NOTHING) -
     return text if len(values) == 1 else f"{text} ({low:.{decimals}f}–{high:.{decimals}f})"
 
 
-def _settled(entries: Sequence[Entry]) -> str:
-    count = len(_values(entries, "settled_at_s"))
-    return f"{count} of {len(entries)}" if len(entries) > 1 else "yes" if count else "no"
-
-
-def _clearance(entries: Sequence[Entry]) -> str:
-    """Return the least gap, its minus as wide as a digit; none before nothing but zeros."""
-    values = _values(entries, "min_clearance_m")
-    number = f"{min(values):.3f}" if values else NOTHING
-    return number.replace("-", "\u2212" if number.strip("-0.") else "")
-
-
 def _ranges_text(group: Group, result: Result) -> str:
-    values: dict[str, list[Value]] = {}
-    for entry in group.entries:
-        for name, value in entry.gains:
-            values.setdefault(name, []).append(value)
     parts = []
-    for name, every in values.items():
+    gains = parted((gain for entry in group.entries for gain in entry.gains), itemgetter(0))
+    for name, own in gains.items():
+        every = [value for _, value in own]
         numbers = [value for value in every if isinstance(value, int | float)]
         if any(isinstance(value, str) for value in every):
             span = " or ".join(dict.fromkeys(map(value_text, every)))

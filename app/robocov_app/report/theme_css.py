@@ -7,18 +7,10 @@ from robocov_app.render.theme import DARK, LIGHT, Colour, Theme, mix, readable_o
 
 
 def hex_code(colour: Colour) -> str:
-    """Return a colour as CSS writes it.
-
-    >>> hex_code((136, 204, 238))
-    '#88ccee'
-    """
-    red, green, blue = colour
-    return f"#{red:02x}{green:02x}{blue:02x}"
+    return f"#{bytes(colour).hex()}"
 
 
 def named_colours(theme: Theme) -> dict[str, Colour]:
-    """Return the colours that pages use, by the names that they have there."""
-
     def own(*names: str) -> dict[str, Colour]:
         return {name: getattr(theme, name.replace("-", "_")) for name in names}
 
@@ -40,7 +32,6 @@ def named_colours(theme: Theme) -> dict[str, Colour]:
 
 
 def variables(theme: Theme) -> str:
-    """Return the declarations of a theme's colours, to stand between braces."""
     colours = "".join(f"--rc-{name}:{hex_code(colour)};" for name, colour in named_colours(theme).items())
     return f"color-scheme:{theme.name};{colours}"
 

@@ -3,7 +3,6 @@ from dataclasses import replace
 import pytest
 
 from robocov.environment import Environment
-from robocov.errors import ParameterError
 from robocov_app.figures.map_sheet import MOST, plot_maps
 
 
@@ -13,7 +12,7 @@ def words(figure) -> list[str]:  # type: ignore[no-untyped-def]
 
 def test_maps_stand_side_by_side_at_one_scale(empty: Environment, cluttered: Environment) -> None:
     wide = replace(empty, name="wide", boundary=((5.0, 5.0), (25.0, 5.0), (25.0, 12.0), (5.0, 12.0)))
-    figure = plot_maps([empty, cluttered, wide], title="three")
+    figure = plot_maps([empty, cluttered, wide])
     panels = figure.axes
     assert len(panels) == 3
     boxes = [axes.get_window_extent() for axes in panels]
@@ -23,17 +22,16 @@ def test_maps_stand_side_by_side_at_one_scale(empty: Environment, cluttered: Env
         assert box.height / (axes.get_ylim()[1] - axes.get_ylim()[0]) == pytest.approx(zoom)
     assert panels[2].get_xlim() == (5.0, 25.0)
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
-    assert words(figure)[:4] == ["empty", "cluttered", "wide", "three"]
+    assert words(figure)[:3] == ["empty", "cluttered", "wide"]
     assert round(figure.bbox.width) == 1600
 
 
-def test_a_size_is_kept_and_the_dark_is_dark(empty: Environment) -> None:
-    figure = plot_maps([empty] * 7, "dark", (900, 700))
-    assert (round(figure.bbox.width), round(figure.bbox.height)) == (900, 700)
+def test_all_is_on_the_page_and_the_dark_is_dark(empty: Environment) -> None:
+    figure = plot_maps([empty] * 7, "dark")
     assert sum(figure.get_facecolor()[:3]) < 0.6
     for axes in figure.axes:
         box = axes.get_window_extent()
-        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= 900 and box.y1 <= 700
+        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= 1600 and box.y1 <= figure.bbox.height
 
 
 @pytest.mark.slow
@@ -41,9 +39,3 @@ def test_of_very_many_the_first_are_drawn_and_the_title_says_so(empty: Environme
     figure = plot_maps([empty] * (MOST + 5))
     assert len(figure.axes) == MOST
     assert f"{MOST} of {MOST + 5}" in words(figure)
-    assert f"all  ·  {MOST} of {MOST + 1}" in words(plot_maps([empty] * (MOST + 1), title="all"))
-
-
-def test_nothing_is_refused() -> None:
-    with pytest.raises(ParameterError, match="maps: none were given"):
-        plot_maps([])

@@ -2,19 +2,25 @@
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
-from robocov.errors import ParameterError
-from robocov_app.figures.gains import (
+from robocov_app.figures.results import (
     MOST_LEVELS,
-    MOST_POINTS,
+    MOST_RUNS,
     Dependence,
     plot_gain_grid,
     plot_gains,
 )
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import DARK, HEAT_LEVELS, LIGHT, contrast
 
 GAINS = np.repeat([0.1, 0.3, 1.0, 3.0, np.nan], 4)
 VALUES = np.arange(20.0)
+
+
+def drawn(gains: np.ndarray, values: np.ndarray, gain: str) -> Axes:
+    style = curve_styles(["rapf"])["rapf"]
+    return plot_gains([Dependence("RAPF", style, gains, values)], gain, (420, 290), "cost").axes[0]
 
 
 def texts(ticks) -> list[str]:
@@ -22,7 +28,7 @@ def texts(ticks) -> list[str]:
 
 
 def test_null_has_a_place_of_its_own() -> None:
-    axes = plot_gains([Dependence("RAPF", "rapf", GAINS, VALUES)], "attraction_limit (N)").axes[0]
+    axes = drawn(GAINS, VALUES, "attraction_limit (N)")
     assert axes.get_xscale() == "log"
     assert texts(axes.get_xticklabels()) == ["0.1", "0.3", "1", "3", "none"]
     points, medians = axes.lines
@@ -35,7 +41,7 @@ def test_null_has_a_place_of_its_own() -> None:
     ("gains", "scale"), [([1.0, 2.0, 3.0], "linear"), ([0.0, 1.0, 100.0], "linear"), ([1.0, 30.0], "log")]
 )
 def test_the_axis_is_logarithmic_where_that_fits(gains, scale) -> None:
-    axes = plot_gains([Dependence("RAPF", "rapf", np.array(gains), np.ones(len(gains)))], "k").axes[0]
+    axes = drawn(np.array(gains), np.ones(len(gains)), "k")
     assert axes.get_xscale() == scale
     low, high = axes.get_xlim()
     assert low < min(gains) and high > max(gains)
@@ -43,20 +49,20 @@ def test_the_axis_is_logarithmic_where_that_fits(gains, scale) -> None:
 
 def test_a_sampled_range_has_points_alone() -> None:
     gains = np.geomspace(0.01, 10.0, 3 * MOST_LEVELS)
-    axes = plot_gains([Dependence("RAPF", "rapf", gains, np.ones(len(gains)))], "k").axes[0]
+    axes = drawn(gains, np.ones(len(gains)), "k")
     assert not [line for line in axes.lines if line.get_linestyle() not in ("None", "none")]
     assert len(axes.get_xticks()) <= 8
 
 
 def test_of_very_many_runs_some_points_are_drawn() -> None:
-    count = 5 * MOST_POINTS
-    axes = plot_gains([Dependence("RAPF", "rapf", np.resize([1.0, 2.0], count), np.ones(count))], "k").axes[0]
-    assert len(axes.lines[0].get_xdata()) <= MOST_POINTS
+    count = 5 * MOST_RUNS
+    axes = drawn(np.resize([1.0, 2.0], count), np.ones(count), "k")
+    assert len(axes.lines[0].get_xdata()) <= MOST_RUNS
 
 
 def test_a_grid_has_its_numbers_and_the_lowest_is_bold() -> None:
     values = np.array([[1.25, 2.5], [np.nan, 0.5]])
-    axes = plot_gain_grid([0.1, 1.0], [2.0, None], values, ("k_rep", "limit")).axes[0]
+    axes = plot_gain_grid((420, 290), [0.1, 1.0], [2.0, None], values, ("k_rep", "limit")).axes[0]
     assert sorted(texts(axes.texts)) == ["0.50", "1.25", "2.50"]
     assert [text.get_text() for text in axes.texts if text.get_fontweight() == "bold"] == ["0.50"]
     assert len(axes.patches) == 3
@@ -65,7 +71,7 @@ def test_a_grid_has_its_numbers_and_the_lowest_is_bold() -> None:
 
 def test_numbers_of_a_grid_tell_small_differences() -> None:
     values = np.array([[1.0, 1.001, 1.002]])
-    axes = plot_gain_grid([1.0, 2.0, 3.0], [1.0], values, ("a", "b")).axes[0]
+    axes = plot_gain_grid((420, 290), [1.0, 2.0, 3.0], [1.0], values, ("a", "b")).axes[0]
     assert len(set(texts(axes.texts))) == 3
 
 
@@ -74,21 +80,3 @@ def test_ink_can_be_read_on_all_colours_of_a_grid(theme) -> None:
     colours = theme.quiet_heat
     assert len(colours) == len(set(colours)) == HEAT_LEVELS
     assert min(contrast(theme.ink, colour) for colour in colours) >= 4.5
-
-
-@pytest.mark.parametrize(
-    ("plot", "message"),
-    [
-        (lambda: plot_gains([], "k"), "none were given"),
-        (
-            lambda: plot_gains([Dependence("x", "rapf", np.ones(2), np.full(2, np.nan))], "k"),
-            "no finite value",
-        ),
-        (lambda: plot_gain_grid([1.0], [1.0], np.ones((2, 2)), ("a", "b")), "shape (2, 2)"),
-        (lambda: plot_gain_grid([1.0], [1.0], np.full((1, 1), np.nan), ("a", "b")), "0 of them finite"),
-    ],
-)
-def test_bad_input_is_named(plot, message) -> None:
-    with pytest.raises(ParameterError) as caught:
-        plot()
-    assert message in str(caught.value)

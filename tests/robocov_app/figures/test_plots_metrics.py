@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from robocov.errors import ParameterError
 from robocov.metrics.run_metrics import RunMetrics
 from robocov_app.figures.metrics import PANELS, Measured, plot_metrics
 
@@ -18,7 +17,7 @@ def measured(controller: str, seed: int) -> Measured:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_every_panel_has_a_curve_of_each_run(theme: str) -> None:
     runs = [measured("rapf", 1), measured("rpf", 2)]
-    figure = plot_metrics(runs, theme, (900, 600), "Two runs")
+    figure = plot_metrics(runs, theme, "Two runs")
     assert len(figure.axes) == len(PANELS)
     for axes, (label, _, of) in zip(figure.axes, PANELS, strict=True):
         assert axes.get_ylabel() == label
@@ -27,8 +26,3 @@ def test_every_panel_has_a_curve_of_each_run(theme: str) -> None:
             assert any(np.array_equal(line, of(run.metrics)) for line in drawn)
     # shares are of the free area
     assert PANELS[0][2](runs[0].metrics)[-1] == pytest.approx(5.0 * runs[0].metrics.sensed_area[-1])
-
-
-def test_without_a_run_there_is_nothing_to_plot() -> None:
-    with pytest.raises(ParameterError, match="at least one was wanted"):
-        plot_metrics([])

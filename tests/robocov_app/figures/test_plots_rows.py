@@ -18,7 +18,7 @@ STYLE = curve_styles(["rapf"])["rapf"]
 
 def axes_of(rows=1.0):
     with plain_style():
-        return rows_page(rows, ["name"], LIGHT, (420, None), "", 1.0)[0]
+        return rows_page(rows, ["name"], LIGHT, 420, 1.0)[0]
 
 
 @given(st.lists(st.tuples(st.sampled_from(["", "a map"]), st.integers(1, 5)), min_size=1, max_size=6))

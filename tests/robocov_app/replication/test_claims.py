@@ -211,13 +211,13 @@ class TestStarts:
         shift = np.array([STARTS.index(start) for start in found.starts], dtype=float)
         base = np.stack([4.0 * np.arange(6.0), np.zeros(6)], axis=1)
         places = {
-            law: base[None]
+            (law, "placement"): base[None]
             + (reach * shift)[:, None, None] * [0.0, 1.0]
             + 0.01 * rng.random((len(shift), 6, 2))
             for law, reach in (("rapf-shared", ours), ("rpf-shared", theirs))
         }
         shares = dict.fromkeys(found.maps, 4.0)
-        claim = claims.starts_placement(Outcomes(found.scenarios, found.values, places, shares))
+        claim = claims.starts_placement(Outcomes(found.scenarios, {**found.values, **places}, shares))
         assert claim.verdict == verdict
         assert claim.criteria[0].interval.estimate == pytest.approx(ours / 4.0, rel=0.1)
 
@@ -352,8 +352,7 @@ class TestMatchedDistance:
         starts = (("m", "a"), ("m", "a"), ("m", "b"), ("m", "b"), ("n", "a"), ("o", "b"))
         found = Outcomes(
             tuple(Scenario(name, start, k) for k, (name, start) in enumerate(starts)),
-            {},
-            {"lloyd": np.concatenate([ends, ends[:2]])},
+            {("lloyd", "placement"): np.concatenate([ends, ends[:2]])},
             dict.fromkeys("mno", 3.0),
         )
         assert found.placement_spreads("lloyd") == {"m": pytest.approx(1.5)}

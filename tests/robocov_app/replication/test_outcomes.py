@@ -71,13 +71,13 @@ def test_every_value_is_that_of_its_run(study, folder):
         stuck = outcomes.of(law, "stuck")[k]
         assert np.isnan(stuck) if row["stuck_robots"] == "" else stuck == float(row["stuck_robots"])
         with np.load(folder / "runs" / row["run"] / "record.npz") as record:
-            assert outcomes.placements[law][k] == pytest.approx(record["positions"][-1])
+            assert outcomes.values[law, "placement"][k] == pytest.approx(record["positions"][-1])
         # a run of a second is averaged over all of it
         whole = float(row["mean_distance_over_run_m"])
         assert outcomes.of(law, "first_minute")[k] == pytest.approx(whole, rel=1e-9)
     assert (outcomes.of("rapf-best", "final") == outcomes.of("rapf-shared", "final")).all()
     assert np.isnan(outcomes.of("rapf-default", "final")).all()
-    assert outcomes.shares["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
+    assert outcomes.sides["blocks-a"] == pytest.approx(np.sqrt(load_map("blocks-a").free_area / 6))
 
 
 def test_a_run_that_failed_is_nan(study, folder, tmp_path):
@@ -91,7 +91,7 @@ def test_a_run_that_failed_is_nan(study, folder, tmp_path):
     sweep(study.study, broken, workers=1, quiet=True)
     outcomes = read_outcomes(broken, study, REFERENCES)
     assert np.isnan(outcomes.of("lloyd", "final")).tolist() == [True, False, False, False]
-    assert np.isnan(outcomes.placements["lloyd"][0]).all()
+    assert np.isnan(outcomes.values["lloyd", "placement"][0]).all()
     assert np.isfinite(outcomes.of("rapf-shared", "final")).all()
 
 

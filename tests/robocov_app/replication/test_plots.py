@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robocov_app.figures.statistics import Interval
-from robocov_app.replication.plots import plot_degradations
+from robocov_app.replication.figures import plot_degradations
 from robocov_app.replication.results import Degradation
 
 

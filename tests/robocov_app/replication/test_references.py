@@ -9,6 +9,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment, UniformStart
 from robocov.errors import OutputError
 from robocov.mapfile import to_json
+from robocov_app.replication import references
 from robocov_app.replication.plan import QUICK
 from robocov_app.replication.references import Question, Reference, find_references
 from robocov_app.sweep.study import StudyMap
@@ -20,8 +21,10 @@ MAPS = (StudyMap("square", SQUARE), StudyMap("hall", HALL))
 
 def found(folder, maps=MAPS, restarts=2, stop=None, **other):
     plan = replace(QUICK, lattice=other.pop("lattice", 16), restarts=restarts)
-    options = {"robots": 3, "radius": 0.1, "workers": 2, "quiet": True, **other}
-    return find_references(maps, folder, plan, stop=stop or Interruption(), **options)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(references, "ROBOTS", other.get("robots", 3))
+        patch.setattr(references, "TEAM", {"radius": other.get("radius", 0.1)})
+        return find_references(maps, folder, plan, 2, stop or Interruption(), quiet=True)
 
 
 @pytest.mark.slow

@@ -23,14 +23,13 @@ from robocov.cost import CoverageCost
 from robocov.errors import InputError
 from robocov.metrics.results import read_results
 from robocov_app.cli import main
-from robocov_app.replication import beyond_claims, claims, contenders, pages, results, step_times, studies
+from robocov_app.replication import claims, contenders, pages, results, step_times, studies
 from robocov_app.replication import plan as planned
 from robocov_app.replication.claims import amount
 from robocov_app.replication.contenders import GRIDS, LABELS, TEAMS
 from robocov_app.replication.evidence import gains_text, law_rows, ranked_rows
-from robocov_app.replication.figures import arrival, describe_figure
+from robocov_app.replication.figures import CAPTIONS, arrival, beyond_plots, describe_figure, gap_samples
 from robocov_app.replication.pages import Image
-from robocov_app.replication.plots import WORDS, beyond_plots, gap_samples
 from robocov_app.replication.results import Interrupted, forecast, open_folder
 from robocov_app.sweep.study import Study, tasks_of
 
@@ -66,7 +65,7 @@ def study(tmp_path_factory):
     return folder, paper, beyond, pickle.loads(kept.read_bytes())
 
 
-DRAWN = {name: Image(name, 2148, 900, words) for name, words in WORDS.items() if name.startswith("beyond")}
+DRAWN = {name: Image(name, 2148, 900, words) for name, words in CAPTIONS.items() if name.startswith("beyond")}
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +128,7 @@ class TestRuns:
         assert again.contenders == paper.contenders and again.references == paper.references
         first, second = (claims.paper_claims(of.convex, of.claims, of.gains) for of in (paper, again))
         assert text_of(first) == text_of(second)
-        first, second = (beyond_claims.beyond_claims(of) for of in (beyond, alone))
+        first, second = (claims.beyond_claims(of) for of in (beyond, alone))
         assert text_of(first) == text_of(second)
 
     def test_what_is_lost_is_done_again_and_gives_the_same(self, folder, paper, beyond, tmp_path):
@@ -141,7 +140,7 @@ class TestRuns:
             shutil.rmtree(path)
         (lost[0].parent / f".{lost[0].name}.part").mkdir()  # as one that was killed leaves it
         again = results.run_beyond(out, TINY, options(), paper)
-        assert text_of(beyond_claims.beyond_claims(again)) == text_of(beyond_claims.beyond_claims(beyond))
+        assert text_of(claims.beyond_claims(again)) == text_of(claims.beyond_claims(beyond))
         for name in ("rivals", "conditions-loss"):
             table = f"studies/{name}/results.csv"
             assert (out / table).read_bytes() == (folder / table).read_bytes()
@@ -174,7 +173,7 @@ class TestRuns:
         first, record = paper.worst[0]
         k = paper.claims.scenarios.index(first)
         assert gap[k] == gap.max()
-        assert record.positions[-1] == pytest.approx(paper.claims.placements["rapf-shared"][k])
+        assert record.positions[-1] == pytest.approx(paper.claims.values["rapf-shared", "placement"][k])
         assert record.gains["k_att"] == 3.0
 
     def test_figures_show_their_runs(self, paper):
@@ -433,7 +432,7 @@ class TestPages:
             assert {"claim", "verdict", "estimate", "interval", "runs"} <= set(claim)
             assert claim["verdict"] == "undecided"  # on two maps nothing is decided
             assert claim["claim"] in plain(content)
-        assert {claim["question"] for claim in found} == set(claims.QUESTIONS)
+        assert {claim["question"] for claim in found} == set(range(1, claims.GOALS))
         ratio = paper.claims.compared("rapf-shared", "rpf-shared").ratio
         shared = next(claim for claim in found if claim["key"] == "nonconvex-final-shared")
         assert (shared["estimate"], shared["interval"]) == (ratio.estimate, [ratio.low, ratio.high])
@@ -476,12 +475,13 @@ class TestPages:
         ids = {attributes.get("id") for _, attributes in _Tags(more).found}
         assert {f"controller-{name}" for name in CONTROLLERS} <= ids
         assert more.count('<svg class="strips"') == len(CONTROLLERS) and "<script" not in more
-        found = beyond_claims.beyond_claims(beyond)
-        assert {claim.part for claim in found} == set(beyond_claims.QUESTIONS)
+        found = claims.beyond_claims(beyond)
+        assert {claim.part for claim in found} == {claims.GOALS, claims.RIVALS, claims.EXTENSIONS}
         for claim in found:
             assert claim.key in ids and claim.claim in said
-        goals = beyond_claims.beyond_goals(beyond)
-        assert all(goal.words in said for goal in goals) and beyond_claims.goal_counts(goals) in said
+        goals = [claim for claim in found if claim.key.startswith("goal-") and claim.key != "goal-unseen"]
+        assert all(claims.goal_outcome(goal) in said for goal in goals)
+        assert claims.goal_counts(goals) in said
         assert all(gains_text(name, grid) in said for name, grid in beyond.gains.items())
         assert "on 1 generated maps (seeds 101)" in said
         quick = replace(beyond, plan=replace(TINY, beyond=replace(TINY.beyond, tuning=())))
@@ -495,7 +495,7 @@ class TestPages:
         assert heading in more and "generated maps with seeds 201, on which nothing" in more
         without = replace(beyond, unseen=None)
         assert heading not in pages.beyond_page({}, without)
-        assert "goal-unseen" not in text_of(beyond_claims.beyond_claims(without))
+        assert "goal-unseen" not in text_of(claims.beyond_claims(without))
 
     def test_the_same_runs_give_the_same_pages(self, study, content, more):
         _, paper, beyond, images = study
@@ -576,9 +576,7 @@ class TestCommand:
         answer = json.loads(capsys.readouterr().out)
         found = json.loads((out / "claims.json").read_text())
         assert answer["claims"] == found and answer["runs"] == study[2].runs + 8
-        assert [claim["key"] for claim in found] == [
-            claim.key for claim in beyond_claims.beyond_claims(study[2])
-        ]
+        assert [claim["key"] for claim in found] == [claim.key for claim in claims.beyond_claims(study[2])]
         page, front = ((out / name).read_text(encoding="utf-8") for name in ("beyond.html", "index.html"))
         assert 'href="index.html"' in page and 'href="beyond.html"' in front
         assert "without --beyond-only the claims are tested too" in front

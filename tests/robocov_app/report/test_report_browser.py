@@ -366,7 +366,7 @@ def test_hostile_names_do_nothing(browser, tmp_path) -> None:
 
 def test_replays_of_a_notebook_live_side_by_side(browser, tmp_path) -> None:
     runs = [ReplayRun(walk(seed=k, seconds=2.0), None, f"run {k}") for k in range(2)]
-    cells = "".join(f"<section>{replay_html([run], standalone=False)}</section>" for run in runs)
+    cells = "".join(f"<section>{replay_html([run])}</section>" for run in runs)
     path = tmp_path / "notebook.html"
     path.write_text(
         f'<!doctype html><meta charset="utf-8"><body data-jp-theme-light="false">{cells}', "utf-8"
@@ -416,7 +416,7 @@ def test_who_fails_is_crossed_out_from_then_on_and_who_joins_is_there_from_then_
     record = replace(walk(), conditions=Conditions(failures=((2, 2.0),), joins=((3, 4.0),)))
     page = tmp_path / "replay.html"
     run = ReplayRun(record, falling(record, 2.0), "a run")
-    page.write_text(replay_html([run], standalone=True), encoding="utf-8")
+    page.write_text(f"<!doctype html><main>{replay_html([run])}</main>", encoding="utf-8")
     browser.open(page)
     browser.until(lambda: browser.all(".chart"))
     notes = []

@@ -186,7 +186,6 @@ def test_themes(theme) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: report([]), "no results were given"),
         (lambda: report([watched([entry()])], theme="sepia"), "unknown theme 'sepia'"),
     ],
 )

@@ -4,11 +4,9 @@ import json
 import re
 from dataclasses import replace
 
-import pytest
 from drawn_run import ROOMS
 from reported_results import HOSTILE, Page, falling, walk
 
-from robocov.errors import ParameterError
 from robocov_app.report.replay import MOST_PANES, ReplayRun, replay_css, replay_html, replay_js, replay_part
 
 
@@ -25,7 +23,7 @@ def data_of(html: str) -> dict:
 
 
 def test_a_fragment_brings_all_that_it_needs() -> None:
-    html = replay_html(runs_of(), standalone=False)
+    html = replay_html(runs_of())
     page = Page(html)
     assert [attributes for name, attributes in page.elements if "id" in attributes] == []
     assert not re.findall(r"\b(?:src|href)=|https?:|@import|url\(", html)
@@ -38,19 +36,8 @@ def test_a_fragment_brings_all_that_it_needs() -> None:
 
 def test_runs_of_one_controller_with_other_gains_look_different() -> None:
     runs = [ReplayRun(walk(gains={"k": k}), None, f"run {n}") for n, k in enumerate((1.0, 2.0, 1.0))]
-    looks = [
-        (run["style"], run["mark"], tuple(run["dashes"]))
-        for run in data_of(replay_html(runs, standalone=True))["runs"]
-    ]
+    looks = [(run["style"], run["mark"], tuple(run["dashes"])) for run in data_of(replay_html(runs))["runs"]]
     assert looks[0] == looks[2] and all(a != b for a, b in zip(*looks[:2], strict=True))
-
-
-def test_a_page_is_a_page() -> None:
-    html = replay_html(runs_of(), standalone=True)
-    page = Page(html)
-    assert html.startswith("<!doctype html>")
-    assert page.all("html") == [{"lang": "en"}]
-    assert [len(page.all(tag)) for tag in ("title", "main", "body")] == [1, 1, 1]
 
 
 def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
@@ -63,7 +50,7 @@ def test_without_a_script_there_are_pictures_that_say_what_they_show() -> None:
 
 def test_no_name_gets_out_of_its_place() -> None:
     record = replace(walk(replace(ROOMS, name=HOSTILE)), label=HOSTILE, controller=HOSTILE)
-    html = replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)], standalone=True)
+    html = replay_html([ReplayRun(record, None, HOSTILE, HOSTILE)])
     page = Page(html)
     assert len(page.all("script")) == 2 and not page.all("img")
     data = data_of(html)
@@ -71,14 +58,12 @@ def test_no_name_gets_out_of_its_place() -> None:
 
 
 def test_the_first_runs_or_those_that_are_wanted_are_shown() -> None:
-    assert data_of(replay_html(runs_of(6), standalone=False))["panes"] == [0, 1, 2, 3]
-    assert data_of(replay_html(runs_of(6), standalone=False, panes=[5, 2]))["panes"] == [5, 2]
-    with pytest.raises(ParameterError, match="no runs were given"):
-        replay_html([], standalone=False)
+    assert data_of(replay_html(runs_of(6)))["panes"] == [0, 1, 2, 3]
+    assert data_of(replay_part(runs_of(6), [5, 2]))["panes"] == [5, 2]
 
 
 def test_the_same_runs_give_the_same_bytes() -> None:
-    assert replay_html(runs_of(), standalone=False) == replay_html(runs_of(), standalone=False)
+    assert replay_html(runs_of()) == replay_html(runs_of())
 
 
 def test_style_and_script_meet_nothing_else() -> None:
@@ -86,7 +71,7 @@ def test_style_and_script_meet_nothing_else() -> None:
     for selector in re.findall(r"([^{}]+)\{", re.sub(r"@[^{]+\{", "", css)):
         for part in re.sub(r":is\([^)]*\)", "", selector).split(","):
             assert part.strip().startswith((".robocov-replay", ".robocov-picture")), part
-    html = replay_html(runs_of(1), standalone=False)
+    html = replay_html(runs_of(1))
     script = html[html.rindex("<script>") : html.rindex("</script>")]
     assert script.startswith('<script>(() => {\n"use strict";') and script.rstrip().endswith("})();")
     assert "window." not in replay_js().replace("window.devicePixelRatio", "").replace(

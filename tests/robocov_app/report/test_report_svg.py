@@ -7,26 +7,55 @@ import numpy as np
 import pytest
 from reported_results import HOSTILE
 
-from robocov_app.figures.gains import Dependence, plot_gain_grid, plot_gains
-from robocov_app.figures.results import Band, Sample, plot_cost_bands, plot_final_costs
+from robocov_app.figures.results import (
+    Band,
+    Dependence,
+    Sample,
+    plot_cost_bands,
+    plot_final_costs,
+    plot_gain_grid,
+    plot_gains,
+)
+from robocov_app.figures.styles import curve_styles
 from robocov_app.render.theme import LIGHT
 from robocov_app.report.svg import inline_svg
 from robocov_app.report.theme_css import named_colours
 
 RNG = np.random.default_rng(5)
 TIME = np.linspace(0.0, 10.0, 40)
+STYLES = curve_styles(["rapf", "rpf", "lloyd", "mine"])
+PANEL = 420, 290
 FIGURES = {
     "bands": lambda name="RAPF": plot_cost_bands(
-        [Band(name, "rapf", TIME, RNG.uniform(1, 2, (5, 40))), Band("RPF", "rpf", TIME, np.ones((1, 40)))],
-        size=(420, 290),
+        [
+            Band(name, STYLES["rapf"], TIME, RNG.uniform(1, 2, (5, 40))),
+            Band("RPF", STYLES["rpf"], TIME, np.ones((1, 40))),
+        ],
+        PANEL,
+        "distance (m)",
+        "m",
     ),
     "boxes": lambda name="RAPF": plot_final_costs(
-        [("", [Sample(name, "rapf", RNG.normal(2, 0.1, 300)), Sample("x", "mine", np.ones(2))])]
+        [
+            (
+                "",
+                [
+                    Sample(name, STYLES["rapf"], RNG.normal(2, 0.1, 300)),
+                    Sample("x", STYLES["mine"], np.ones(2)),
+                ],
+            )
+        ],
+        "distance (m)",
+        800,
+        1.25,
     ),
     "gains": lambda name="RAPF": plot_gains(
-        [Dependence(name, "lloyd", np.array([1.0, 2.0, np.nan] * 9), np.ones(27))], name
+        [Dependence(name, STYLES["lloyd"], np.array([1.0, 2.0, np.nan] * 9), np.ones(27))],
+        name,
+        PANEL,
+        "distance (m)",
     ),
-    "grid": lambda name="RAPF": plot_gain_grid([1.0, 2.0], [1.0], np.array([[1.0, 2.0]]), (name, "b")),
+    "grid": lambda name="RAPF": plot_gain_grid(PANEL, [1.0, 2.0], [1.0], np.array([[1.0, 2.0]]), (name, "b")),
 }
 
 
@@ -75,8 +104,8 @@ def test_many_dots_are_one_path_at_the_same_places() -> None:
 
 
 def test_the_same_figure_gives_the_same_bytes() -> None:
+    band = Band("RAPF", STYLES["rapf"], TIME, np.outer([1, 2, 3], TIME))
     once, again = (
-        inline_svg(plot_cost_bands([Band("RAPF", "rapf", TIME, np.outer([1, 2, 3], TIME))]), "k", "x")
-        for _ in range(2)
+        inline_svg(plot_cost_bands([band], PANEL, "distance (m)", "m"), "k", "x") for _ in range(2)
     )
     assert once == again

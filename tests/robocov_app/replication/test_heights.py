@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from robocov.observation.region import Region
-from robocov_app.figures.heights import PENTAGON, best_at_heights, plot_heights
 from robocov_app.render.theme import DARK, LIGHT, contrast
+from robocov_app.replication.figures import PENTAGON, best_at_heights, plot_heights
 
 HEIGHTS = (0.01, 0.1, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 100.0)
 
 
 def test_rows_go_from_one_limit_to_the_other() -> None:
-    rows = best_at_heights(PENTAGON, HEIGHTS)
+    rows = best_at_heights(HEIGHTS)
     assert [row.height for row in rows] == [0.0, *HEIGHTS, np.inf]
     away = [row.from_centroid for row in rows]
     assert away == sorted(away, reverse=True)
@@ -23,18 +23,14 @@ def test_rows_go_from_one_limit_to_the_other() -> None:
 
 
 def test_the_best_place_at_a_height() -> None:
-    row = best_at_heights(PENTAGON, (1.0,))[1]
+    row = best_at_heights((1.0,))[1]
     assert (row.x, row.y, row.from_centroid) == pytest.approx((2.0849, 1.6650, 0.05609), abs=6e-5)
     assert row.missed == pytest.approx(0.000284, abs=1e-6)
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=["light", "dark"])
-@pytest.mark.parametrize(
-    "scale", [pytest.param(0.01, marks=pytest.mark.slow), 1.0, pytest.param(30.0, marks=pytest.mark.slow)]
-)
-def test_the_plot_shows_the_path_in_its_frame(theme, scale) -> None:
-    ring = [(scale * x, scale * y) for x, y in PENTAGON]
-    figure = plot_heights(ring, theme, size=(900, 380))
+def test_the_plot_shows_the_path_in_its_frame(theme) -> None:
+    figure = plot_heights((900, 380), theme, 0.8)
     cell, frame, distance = figure.axes
     path = frame.lines[0]
     low, high = frame.get_xlim()
