@@ -17,10 +17,11 @@ import json
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from numbers import Integral, Real
-from typing import Any, NamedTuple, TypeAlias, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeGuard
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 JsonPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices, from the whole document inwards."""
@@ -156,6 +157,8 @@ def numeric(
     Traceback (most recent call last):
     robocov.errors.ParameterError: starts: 'abc', but [x, y] of each robot was wanted
     """
+    import numpy as np  # not before there are numbers: `robocov bench` first asks for one thread
+
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
