@@ -4,7 +4,8 @@ Fast marching travels over the same lattice with the same free sites, from the c
 It is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from time import perf_counter
@@ -16,7 +17,7 @@ from scipy.spatial import cKDTree
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
@@ -35,13 +36,11 @@ YARDSTICK = "scikit-fmm, order 2"
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each lattice and number of vertices."""
     sizes = ((128, 200), (256, 200)) if quick else [(n, k) for k in VERTICES for n in LATTICES]
     return [partial(_rows, lattice, vertices, quick) for lattice, vertices in sizes]
 
 
 def has_yardstick() -> bool:
-    """Return whether scikit-fmm is installed."""
     return find_spec("skfmm") is not None
 
 
@@ -64,21 +63,16 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     begin = perf_counter()
     cost = CoverageCost(environment, lattice)
     built = perf_counter() - begin
-    size: Parameters = {"lattice": lattice, "vertices": vertices}
+    size = {"lattice": lattice, "vertices": vertices}
     yield Row("cost", "built, once a map", size, built, goal_seconds=BUILD_GOALS.get((lattice, vertices)))
     for robots in (6, 50) if quick else ROBOTS:
         if robots > len(cost.points):
             continue
         places = Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {"exact": partial(evaluated, cost, places)}
-        if has_yardstick():
-            calls["marching"] = partial(_marched, cost, places)
-        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
+        exact, *marched = _compared(cost, places, _marched if has_yardstick() else None, quick)
+        row = Row("cost", "evaluated", size | {"robots": robots}, exact)
         goal = GOALS.get((lattice, vertices, robots))
-        yield Row(
-            *("cost", "evaluated", {**size, "robots": robots}, taken["exact"]),
-            *((YARDSTICK, taken["marching"], goal) if "marching" in taken else ()),
-        )
+        yield replace(row, yardstick=YARDSTICK, yardstick_seconds=marched[0], goal=goal) if marched else row
 
 
 class Places:
@@ -87,9 +81,7 @@ class Places:
     def __init__(self, cost: CoverageCost, robots: int) -> None:
         self._rng = np.random.default_rng(1)
         self._start = cost.points[self._rng.choice(len(cost.points), robots, replace=False)]
-        self._step = cost.spacing / 4.0
-        self._geodesics = cost.geodesics
-        self.now = self._start
+        self._step, self._geodesics, self.now = cost.spacing / 4.0, cost.geodesics, self._start
         blocked = np.ones(cost.lattice**2, dtype=bool)
         blocked[cost.cells] = False
         self.blocked = blocked.reshape(cost.lattice, cost.lattice)
@@ -101,9 +93,14 @@ class Places:
         self.now = np.where(free[:, None], places, self._start)
 
 
-def evaluated(cost: CoverageCost, places: Places) -> float:
-    """Return the mean distance, exactly."""
-    return cost(places.now).mean_distance
+def _compared(
+    cost: CoverageCost, places: Places, other: Callable[[CoverageCost, Places], object] | None, quick: bool
+) -> list[float]:
+    """Return the times of the exact cost and of another measure, s, while the robots move."""
+    calls: dict[str, Call] = {"exact": lambda: cost(places.now).mean_distance}
+    if other is not None:
+        calls["other"] = partial(other, cost, places)
+    return list(in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move).values())
 
 
 def _marched(cost: CoverageCost, places: Places) -> float:
@@ -137,7 +134,6 @@ FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
 
 
 def map_cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each map and lattice."""
     maps = sorted({(name, lattice) for name, lattice, _ in BEFORE if not quick or lattice == 64})
     return [partial(_on_map, name, lattice, quick) for name, lattice in maps]
 
@@ -145,14 +141,12 @@ def map_cases(*, quick: bool = False) -> list[Case]:
 def _on_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
     cost = CoverageCost(load_map(name), lattice)
     for robots in [n for known, size, n in BEFORE if (known, size) == (name, lattice)]:
-        places = Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {
-            "exact": partial(evaluated, cost, places),
-            "tree": lambda: cKDTree(places.now).query(cost.points),  # noqa: B023 - called at once
-        }
-        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
-        before = BEFORE[name, lattice, robots]
+        places, before = Places(cost, robots), BEFORE[name, lattice, robots]
+        exact, tree = _compared(cost, places, _looked_up, quick)
         faster = 10.0 if robots == 1000 else FASTER[lattice] * (2.0 if name == "campus" else 1.0)
-        size: Parameters = {"map": name, "lattice": lattice, "robots": robots}
-        tree = TREE, taken["tree"], before / faster
-        yield Row("maps", "evaluated", size, taken["exact"], *tree, before=before)
+        size: Mapping[str, int | str] = {"map": name, "lattice": lattice, "robots": robots}
+        yield Row("maps", "evaluated", size, exact, TREE, tree, before / faster, before=before)
+
+
+def _looked_up(cost: CoverageCost, places: Places) -> object:
+    return cKDTree(places.now).query(cost.points)

@@ -5,8 +5,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import cast
 
-import numpy as np
-
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
@@ -52,9 +50,8 @@ def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> Non
     axes = page.axes((LEFT, top + GAP - 26, WIDTH - LEFT - RIGHT, ROW * len(rows)))
     quiet_axes(axes, theme, grid="x")
     axes.set_xscale("log")
-    ratios = np.array([cast("float", row.ratio) for row in rows])
-    wanted = np.array([row.goal for row in rows if row.goal is not None] + [1.0])
-    low, high = 0.75 * min(ratios.min(), wanted.min()), 1.35 * max(ratios.max(), wanted.max())
+    values = [1.0, *(value for row in rows for value in (row.ratio, row.goal) if value is not None)]
+    low, high = 0.75 * min(values), 1.35 * max(values)
     axes.axvline(1.0, color=tone(theme.faint), linewidth=1)
     for place, row in enumerate(rows):
         ratio, y = cast("float", row.ratio), len(rows) - 1 - place

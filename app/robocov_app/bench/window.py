@@ -10,7 +10,7 @@ import pygame
 
 from robocov.cost import LATTICE
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import Costs
@@ -30,7 +30,6 @@ _CROWD = 100  # from so many robots on they are smaller, so that there is room f
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each size of a team."""
     return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200, 1000)]
 
 
@@ -47,7 +46,7 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
                 frames, drawing, answers = _played(window, seconds)
         finally:
             viewer.costs.close()
-        bare = _bare(len(frames))
+        bare = in_turn({"bare": _clear_and_flip()}, len(frames))["bare"]
     for name, took, goal, note in (
         ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
         ("drawing", median(drawing), DRAWING_GOAL.get(n), ""),
@@ -79,16 +78,13 @@ def _played(window: Window, seconds: float) -> tuple[list[float], list[float], i
     return frames, drawing, len(curve) - known
 
 
-def _bare(rounds: int) -> float:
-    """Return what filling, copying and flipping an empty window takes."""
-    screen = pygame.display.get_surface()
+def _clear_and_flip() -> Call:
+    screen, empty = pygame.display.get_surface(), pygame.Surface(SIZE)
     assert screen is not None
-    empty = pygame.Surface(SIZE)
-    taken = []
-    for _ in range(rounds):
-        began = perf_counter()
+
+    def call() -> None:
         empty.fill((255, 255, 255))
         screen.blit(empty, (0, 0))
         pygame.display.flip()
-        taken.append(perf_counter() - began)
-    return median(taken)
+
+    return call
