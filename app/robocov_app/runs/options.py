@@ -135,15 +135,14 @@ class ConditionOptions:
             return None
         from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 
-        option = "--fail"
-        try:
-            failures = tuple(parsed_entry(Failure, text) for text in self.fail)
-            option = "--join"
-            joins = tuple(parsed_entry(Join, text) for text in self.join)
-        except ParameterError as error:
-            raise ParameterError(f"{option}: {error}") from None
+        events: dict[str, Any] = {}
+        for option, kind, texts in (("fail", Failure, self.fail), ("join", Join, self.join)):
+            try:
+                events[option] = tuple(parsed_entry(kind, text) for text in texts)
+            except ParameterError as error:
+                raise ParameterError(f"--{option}: {error}") from None
         limits = {name: getattr(self, name) for name in LIMITS}
-        conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
+        conditions = Conditions(**limits, failures=events["fail"], joins=events["join"], seed=seed)
         conditions.check_team(robots)
         return None if conditions.ideal else conditions
 
@@ -181,12 +180,10 @@ class FilmOptions(LayerOptions):
         return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
 
     def film_size(self) -> tuple[int, int]:
-        """Return the size of film frames (width, height)."""
         return self.picture_size() or (1280, 720)
 
     @property
     def colour_theme(self) -> Theme:
-        """The theme of pictures and films."""
         from robocov_app.render.theme import theme_named
 
         return theme_named(self.theme or "light")

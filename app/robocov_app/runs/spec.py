@@ -51,11 +51,9 @@ class RunSpec:
 
     @property
     def steps(self) -> int:
-        """Control periods of the whole run."""
         return round(self.duration / self.dt)
 
     def made_controller(self) -> Controller:
-        """Return the controller; raises ParameterError as `make_controller`."""
         return make_controller(self.controller, self.gains, source=self.source)
 
     def check(self) -> None:

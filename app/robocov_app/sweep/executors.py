@@ -74,33 +74,29 @@ class Executor(ABC):
 
     def _returned(self, timeout: float) -> Returned | None:
         """Return a task that was handed out, and what came of it; None where none is for so many seconds."""
-        try:
+        with suppress(queue.Empty):
             task, future = self._back.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        return task, self._result(future)
+            return task, self._result(future)
+        return None
 
     def _result(self, future: Any) -> Outcome | Lost:
-        came: Outcome | Lost = future.result()
-        return came
+        return future.result()  # type: ignore[no-any-return]
 
     @property
     def waiting(self) -> str:
-        """Reason why no worker is at work, in words; empty where one is."""
+        """Why no worker is at work, in words; empty where one is."""
         return ""
 
     @property
     def busy(self) -> int:
-        """Number of submitted tasks that have not come back."""
+        """Number of tasks that have not come back."""
         return self._out + len(self._backlog) + len(self._alone)
 
     @property
     def full(self) -> bool:
-        """Whether more tasks would only wait."""
         return self.busy >= self.most
 
     def submit(self, task: Task) -> None:
-        """Take a task on."""
         self._backlog.append(task)
         self._feed()
 
@@ -113,26 +109,24 @@ class Executor(ABC):
         task, came = back
         together, self._lonely = self._out > 1, False
         self._out -= 1
-        self._in_a_row = self._in_a_row + 1 if isinstance(came, Lost) else 0
         outcome = self._considered(task, came, together) if isinstance(came, Lost) else came
+        if outcome is came:
+            self._in_a_row = 0
         self._feed()
         return None if outcome is None else (task, outcome)
 
     def _feed(self) -> None:
-        if self._lonely:
-            return
-        if self._alone:
-            if self._out == 0:
-                self._lonely, self._out = True, 1
-                self._hand_out(self._alone.popleft())
-            return
-        while self._backlog and self._out < self.most:
+        while self._backlog and not (self._lonely or self._alone) and self._out < self.most:
             self._hand_out(self._backlog.popleft())
             self._out += 1
+        if self._alone and not self._out:
+            self._lonely, self._out = True, 1
+            self._hand_out(self._alone.popleft())
 
     def _considered(self, task: Task, lost: Lost, together: bool) -> Outcome | None:
         """Return that a task has failed, None where it is to be done again."""
         self.lost += 1
+        self._in_a_row += 1
         if self._in_a_row > max(_IN_A_ROW, 4 * self.most):
             raise OutputError(
                 f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}; "
@@ -162,9 +156,7 @@ class LocalPool(Executor):
     def __init__(self, workers: int) -> None:
         super().__init__()
         self._hands = [_Hand() for _ in range(workers)]
-        self._idle: queue.LifoQueue[_Hand] = queue.LifoQueue()
-        for hand in self._hands:
-            self._idle.put(hand)
+        self._idle = list(self._hands)  # the last one that came back is the next to go
         self._threads = ThreadPoolExecutor(max(1, workers))
 
     def __exit__(self, *exception: object) -> None:
@@ -172,22 +164,22 @@ class LocalPool(Executor):
             hand.stop()
         self._threads.shutdown(cancel_futures=True)
         for hand in self._hands:
-            hand.close()
+            hand.end()
+            hand.complaints.close()
 
     @property
     def most(self) -> int:
-        """As many as there are processes, and one that is ready for the first that comes back."""
-        return len(self._hands) + 1
+        return len(self._hands) + 1  # one is ready for the first that comes back
 
     def _hand_out(self, task: Task) -> None:
         self._awaited(task, self._threads.submit(self._done, task))
 
     def _done(self, task: Task) -> Outcome | Lost:
-        hand = self._idle.get()
+        hand = self._idle.pop()
         try:
             return hand.done(task)
         finally:
-            self._idle.put(hand)
+            self._idle.append(hand)
 
 
 class _Hand:
@@ -196,60 +188,53 @@ class _Hand:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         # appended to, so that it can be emptied
-        self._complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - see `close`
+        self.complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - the pool closes it
         self._stopped = False
         self._starting = threading.Lock()
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
         with self._starting:
             self._stopped = True
             if self._process is not None:
                 self._process.kill()
-
-    def close(self) -> None:
-        """Let the process end."""
-        self._end()
-        self._complaints.close()
 
     def done(self, task: Task) -> Outcome | Lost:
         """Do a task; raises OutputError where no process can be started."""
         process = self._process
         if process is None or process.poll() is not None:
             process = self._begun()
-        self._complaints.truncate(0)  # what it says of this task, and does not grow for ever
+        self.complaints.truncate(0)  # what it says of this task, and does not grow for ever
         reply = asked(process, task)
         if reply is not None and isinstance(reply.answer, Outcome):
             return reply.answer
-        status, said = self._end()
+        status, said = self.end()
         cause = f"signal {-status}" if status < 0 else f"exit status {status}"
         return Lost(f"its process ended ({cause})", said, blamed=status != _OUTSIDE)
 
     def _begun(self) -> subprocess.Popen[bytes]:
         for _ in range(_STARTS):
-            self._end()
-            self._complaints.truncate(0)
+            self.end()
+            self.complaints.truncate(0)
             with self._starting:
                 if self._stopped:
                     break
-                process = started("robocov_app.sweep.worker:Performing", stderr=self._complaints)
+                process = started("robocov_app.sweep.worker:Performing", stderr=self.complaints)
                 self._process = process
             assert process.stdout
             if receive(process.stdout) == READY:
                 return process
-        said = self._end()[1].strip().splitlines() or ["it says nothing"]
+        said = self.end()[1].strip().splitlines() or ["it says nothing"]
         raise OutputError(f"no process for the runs can be started: {said[-1]}")
 
-    def _end(self) -> tuple[int, str]:
+    def end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its status and its last words."""
         status = 0 if self._process is None else ended(self._process)
         self._process = None
-        self._complaints.seek(0)
-        return status, self._complaints.read()[-_LAST_WORDS:].decode(errors="replace")
+        self.complaints.seek(0)
+        return status, self.complaints.read()[-_LAST_WORDS:].decode(errors="replace")
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -302,7 +287,6 @@ class Cluster(Executor):
 
     @property
     def threads(self) -> int:
-        """Number of tasks that the cluster does at once."""
         if time.monotonic() - self._asked > _LOOK:
             self._threads = 0
             with suppress(Exception):  # the scheduler may be gone
@@ -312,7 +296,6 @@ class Cluster(Executor):
 
     @property
     def waiting(self) -> str:
-        """That there is nobody, where there is nobody."""
         return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _hand_out(self, task: Task) -> None:

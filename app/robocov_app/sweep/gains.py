@@ -22,9 +22,7 @@ Scale: TypeAlias = Literal["linear", "log"]
 Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
 
 NO_LIMIT = "null"  # what stands for None where a file has no word for it
-
 MOST_SAMPLES = 100_000
-
 _DIGITS = 6
 """Digits of a sampled gain: more say nothing, and the last ones differ from one processor to the next."""
 
@@ -41,11 +39,10 @@ class Range:
 
     def values(self, parts: Array) -> list[float]:
         """Return the values at (m,) parts of the range, from 0 to 1, rounded to six digits."""
-        if self.scale == "log":
-            low, high = math.log(self.low), math.log(self.high)
-            exact = np.exp(low + (high - low) * parts)
-        else:
-            exact = self.low + (self.high - self.low) * parts
+        log = self.scale == "log"
+        low, high = (math.log(self.low), math.log(self.high)) if log else (self.low, self.high)
+        exact = low + (high - low) * parts
+        exact = np.exp(exact) if log else exact
         return [min(max(float(f"{x:.{_DIGITS}g}"), self.low), self.high) for x in exact.tolist()]
 
 
@@ -122,20 +119,18 @@ def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None
             ranges[name] = _checked_range(known, name, given, at)
         else:
             lists[name] = axis(given, at, partial(_value, known, name))
-    samples: list[dict[str, float]] = [{}]
+    samples: list[tuple[float, ...]] = [()]
     if ranges:
         if sampling is None:
             at = (*path, next(iter(ranges)))
             raise ParameterError(f"{place(at)}: a range, but sampling says neither a method nor how many")
         points = sampling.points(len(ranges))
         columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
-        samples = [dict(zip(ranges, row, strict=True)) for row in zip(*columns, strict=True)]
-    combined = [
-        {**dict(zip(lists, row, strict=True)), **sample}
-        for row in product(*lists.values())
-        for sample in samples
+        samples = list(zip(*columns, strict=True))
+    choices: list[Choice] = [
+        gain_values(with_gains(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True))))
+        for row, sample in product(product(*lists.values()), samples)
     ]
-    choices: list[Choice] = [gain_values(with_gains(kind, values)) for values in combined]
     once(choices, (*path, "samples"))  # as of a range that is narrower than the digits of a sample
     return Gains(tuple(choices), ranges)
 
@@ -162,16 +157,15 @@ def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, 
     if isinstance(gain, Option):
         wanted = f"one of {', '.join(gain.words)}, or a list of them,"
         raise ParameterError(f"{place(path)}: a range, but {wanted} was wanted")
-    for end in ("low", "high"):
-        if getattr(given, end) is None:
+    ends = []
+    for end, value in (("low", given.low), ("high", given.high)):
+        if value is None:
             raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
-    low = placed((*path, "low"), lambda: gain.validated(given.low, ""))
-    high = placed((*path, "high"), lambda: gain.validated(given.high, ""))
-    assert low is not None and high is not None
+        ends.append(placed((*path, end), partial(gain.validated, value, "")) or 0.0)
+    low, high = ends
     if given.scale not in get_args(Scale):
-        raise ParameterError(
-            f"{place((*path, 'scale'))}: {unknown_name('scale', given.scale, get_args(Scale))}"
-        )
+        unknown = unknown_name("scale", given.scale, get_args(Scale))
+        raise ParameterError(f"{place((*path, 'scale'))}: {unknown}")
     if not low < high:
         raise ParameterError(f"{place((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted")
     if given.scale == "log" and low <= 0.0:

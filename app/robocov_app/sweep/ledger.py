@@ -19,14 +19,9 @@ from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders
-
 STUDY = "study.json"
-
 _ROW = "row.json"  # what the table holds of a run, in its folder
-
 _HEAD = {"format": "robocov-row", "version": 2}
-
-_STUDY_FORMAT = "robocov-study"
 
 _LEFT_OVER = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
@@ -45,7 +40,7 @@ class Entry(NamedTuple):
     checked: bool = True
 
 
-class Damaged(Exception):  # noqa: N818 - it is handled
+class Damaged(ValueError):  # noqa: N818 - it is handled
     """A run is there, but is not as it was written."""
 
 
@@ -98,15 +93,14 @@ class Ledger:
         """Check all files of all runs; return which are to be done, and why again."""
         found = Survey()
         for task in tasks:
+            entry = None
             try:
                 entry = self._entry(task, files=True)
             except Damaged:
                 found.damaged.append(task.name)
-                entry = None
             todo = entry is None or (retry_failed and entry.error is not None)
             if entry is not None and not todo:
-                difference = difference_of(entry.versions)
-                if difference:
+                if difference := difference_of(entry.versions):
                     found.outdated[difference] += 1
                     todo = not keep_versions
                 found.unchecked += not todo and not entry.checked
@@ -121,23 +115,17 @@ class Ledger:
             return None
         try:
             row = json.loads(_content(folder / _ROW))
-            if row["format"] != _HEAD["format"] or row["digest"] != task.digest:
-                raise Damaged
             figures, error = row["figures"], row["error"]
-            if not all(value is None or type(value) in (int, float) for value in figures.values()):
-                raise Damaged
-            if not isinstance(error, str | None):
-                raise Damaged
+            _require(row["format"] == _HEAD["format"] and row["digest"] == task.digest)
+            _require(all(value is None or type(value) in (int, float) for value in figures.values()))
+            _require(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
                 run = _content(folder / ("run.json" if error is None else "error.json"))
                 return Entry(figures, error, _versions_1(json.loads(run), figures, error), checked=False)
-            if row.pop("check_sum") != _check_sum(row):
-                raise Damaged
-            if files:
-                for name, (size, digest) in row["files"].items():
-                    content = _content(folder / name)
-                    if len(content) != size or _digest(content) != digest:
-                        raise Damaged
+            _require(row.pop("check_sum") == _check_sum(row))
+            for name, (size, digest) in row["files"].items() if files else ():
+                content = _content(folder / name)
+                _require(len(content) == size and _digest(content) == digest)
             return Entry(figures, error, row["versions"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
             raise Damaged from fault
@@ -213,20 +201,23 @@ def is_sweep(folder: Path) -> bool:
         return False
     except (ValueError, RecursionError):
         return (folder / RUNS).is_dir() and (folder / ".lock").is_file()
-    return isinstance(content, dict) and content.get("format") == _STUDY_FORMAT
+    return isinstance(content, dict) and content.get("format") == "robocov-study"
 
 
 def _versions_1(run: Mapping[str, Any], figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
     """Return what a run of version 1 was made with, if its row agrees with its other file."""
     if error is not None:
-        if run["error"] != error:
-            raise Damaged
+        _require(run["error"] == error)
         return {}
     for name in FIGURES:
         value = run["summary"][name]
-        if figures[name] != (sum(value) / len(value) if isinstance(value, list) else value):
-            raise Damaged
+        _require(figures[name] == (sum(value) / len(value) if isinstance(value, list) else value))
     return dict(run["versions"])
+
+
+def _require(sound: bool) -> None:
+    if not sound:
+        raise Damaged
 
 
 def _content(path: Path) -> bytes:

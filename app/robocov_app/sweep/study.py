@@ -23,13 +23,14 @@ from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.spec import MOST_ROWS
-from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, placed
+from robocov_app.sweep.gains import NO_LIMIT, Gains, Place, Sampling, Wanted, axis, once, placed
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
 
-WORDS = ("fail", "join", "kinematics")  # those that are texts: ``3@20 5@40`` are two failures, in one run
-CONDITIONS = (*LIMITS, *WORDS[:2])  # the conditions that a study may sweep
+EVENTS = {"fail": Failure, "join": Join}  # conditions that are texts: ``3@20 5@40`` are two in one run
+CONDITIONS = (*LIMITS, *EVENTS)  # the conditions that a study may sweep
+WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
@@ -59,18 +60,17 @@ def parameter_text(name: str, value: TeamValue) -> str:
     """
     if name in WORDS:
         return str(value) or "none"
-    if name == GROUPS:
-        return "; ".join(map(_group_text, json.loads(str(value))))
-    return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
-
-
-def _group_text(group: Mapping[str, Any]) -> str:
-    own = [
-        f"{name.replace('_', ' ')} {value if isinstance(value, str) else f'{value:g}'} {UNITS[name]}"
-        for name, value in group.items()
-        if name != "count"
-    ]
-    return f"{group['count']} {'with ' + ', '.join(own) if own else 'as the rest'}"
+    if name != GROUPS:
+        return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
+    groups = []
+    for group in json.loads(str(value)):
+        count = group.pop("count")
+        own = (
+            f"{key.replace('_', ' ')} {each if isinstance(each, str) else f'{each:g}'} {UNITS[key]}"
+            for key, each in group.items()
+        )
+        groups.append(f"{count} {'with ' + ', '.join(own) if group else 'as the rest'}")
+    return "; ".join(groups)
 
 
 def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
@@ -79,41 +79,36 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     for name, values in given.items():
         if name not in CONDITIONS:
             raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
-        axes[name] = axis(values, ("conditions", name), partial(_value, name))
+        axes[name] = axis(values, ("conditions", name), partial(_condition, name))
     return axes
 
 
 def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
     """Return the conditions among what a study varies; None where they are ideal."""
     values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
-    conditions = Conditions(
-        **values,
-        failures=tuple(parsed_entry(Failure, word) for word in str(parameters.get("fail", "")).split()),
-        joins=tuple(parsed_entry(Join, word) for word in str(parameters.get("join", "")).split()),
-        seed=seed,
-    )
+    fail, join = (str(parameters.get(name, "")).split() for name in EVENTS)
+    values["failures"] = tuple(parsed_entry(Failure, word) for word in fail)
+    values["joins"] = tuple(parsed_entry(Join, word) for word in join)
+    conditions = Conditions(**values, seed=seed)
     conditions.check_team(robots)
     return None if conditions.ideal else conditions
 
 
-def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
-    if name in WORDS:
+def _condition(name: str, value: object, path: Place) -> TeamValue:
+    if name in EVENTS:
         if not isinstance(value, str):
             raise ParameterError(f'{place(path)}: {shown(value)}, but a text, as in "3@20", was wanted')
-        kind: type[Failure | Join] = Failure if name == "fail" else Join
         try:
-            return " ".join(str(parsed_entry(kind, word)) for word in value.split())
+            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in value.split())
         except ParameterError as error:
             raise ParameterError(f"{place(path)}: {error}") from None
     if name == "message_rate" and value in (None, NO_LIMIT):
         return None
     given: dict[str, Any] = {"forget_after": 1e6, name: value}
-    number: float = getattr(placed(path, lambda: Conditions(**given)), name)
-    return number
+    return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
 
 
 MOST_RUNS = 1_000_000
-
 ALL = "*"  # stands for all starts of a map
 
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
@@ -122,9 +117,7 @@ UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_
 """More of them, with defaults: what is as by default a study does not tell."""
 
 _RANGES = ("sensing_range", "communication_range")  # those that may be without limit
-
 _LONGEST_NAME = 100
-
 _HUGE = 1e300  # what a float can hold, with some to spare
 
 Swept: TypeAlias = float | Sequence[float | None] | None
@@ -133,9 +126,9 @@ Swept: TypeAlias = float | Sequence[float | None] | None
 
 @dataclass(frozen=True)
 class StudyMap:
-    """A map of a study. `name`: what the table calls it."""
+    """A map of a study."""
 
-    name: str
+    name: str  # what the table calls it
     environment: Environment
 
 
@@ -183,7 +176,14 @@ class Study:
             if self.robots not in (Study.robots, (size,)):
                 raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
             object.__setattr__(self, "robots", (size,))
-        self._check_names()
+        for k, controller in enumerate(self.controllers):
+            if not isinstance(controller, str):
+                raise ParameterError(f"controllers[{k}]: {shown(controller)}, but a text was wanted")
+        for k, each in enumerate(self.maps):
+            name = each.name
+            if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
+                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
+                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
                 checked(place((name, k)), value, low, high, whole=True)
@@ -227,13 +227,11 @@ class Study:
         return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
-        """Return what is tried of a controller of the study."""
         gains = self.gains[controller]
         assert isinstance(gains, Gains)
         return gains
 
     def starts_on(self, each: StudyMap) -> tuple[str, ...]:
-        """Return the names of the starts that are taken on a map."""
         environment = each.environment
         if not self.starts:
             return (environment.start().name,)
@@ -242,7 +240,6 @@ class Study:
         return tuple(self.starts)
 
     def kind(self, controller: str) -> type[Any]:
-        """Return the class of a controller of the study."""
         return controller_kind(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
@@ -253,16 +250,9 @@ class Study:
             "runs": len(self),
             "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
             "controllers": [
-                {"name": name, **(source_json(self.sources[name]) if name in self.sources else {})}
-                for name in self.controllers
+                {"name": name, **source_json(self.sources.get(name))} for name in self.controllers
             ],
-            "gains": {
-                name: {
-                    "choices": [dict(choice) for choice in self.gains_of(name).choices],
-                    "ranges": {gain: asdict(each) for gain, each in self.gains_of(name).ranges.items()},
-                }
-                for name in self.controllers
-            },
+            "gains": {name: asdict(self.gains_of(name)) for name in self.controllers},
             "sampling": None if self.sampling is None else asdict(self.sampling),
             "robots": list(self.robots),
             "teams": [dict(team) for team in self.teams],
@@ -276,25 +266,12 @@ class Study:
             "metrics": self.metrics,
         }
 
-    def _check_names(self) -> None:
-        for k, name in enumerate(self.controllers):
-            if not isinstance(name, str):
-                raise ParameterError(f"controllers[{k}]: {shown(name)}, but a text was wanted")
-        for k, each in enumerate(self.maps):
-            name = each.name
-            if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
-                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
-                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
-
     def _check_starts(self) -> None:
         once(self.starts, ("starts",))
-        if self.starts == (ALL,):
-            return
-        for k, name in enumerate(self.starts):
+        for k, name in enumerate(self.starts if self.starts != (ALL,) else ()):
             if name == ALL:
-                raise ParameterError(
-                    f"starts[{k}]: {shown(ALL)} is all of them, so nothing beside it was wanted"
-                )
+                beside = "is all of them, so nothing beside it was wanted"
+                raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
             for each in self.maps:
                 try:
                     each.environment.start(name)
@@ -306,26 +283,23 @@ class Study:
         axes: list[Sequence[TeamValue]] = [
             axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names
         ]
-        conditions = condition_axes(self.conditions)
-        if self.group:
-            conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
-        names = (*names, *conditions)
-        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *conditions.values()))
-        for team in teams:
-            for robots in self.robots:
-                conditions_of(team, 0, robots)
+        groups = {GROUPS: [json.dumps([dict(each) for each in self.group])]} if self.group else {}
+        more = groups | condition_axes(self.conditions)
+        names = (*names, *more)
+        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *more.values()))
+        for team, robots in product(teams, self.robots):
+            conditions_of(team, 0, robots)
         return teams
 
     def _read_sources(self) -> dict[str, Source]:
         sources = {}
         for k, name in enumerate(self.controllers):
             file, _, class_name = name.rpartition(":")
-            if ".py:" not in name and not name.endswith(".py"):
+            if not (class_name and file.endswith(".py")):
                 continue
             path = (self.folder / file).resolve()
             try:
-                if class_name and file.endswith(".py"):
-                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
+                sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
             except (OSError, ValueError) as error:
                 reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
                 raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
@@ -353,13 +327,13 @@ class Study:
         return found
 
 
-def source_json(source: Source) -> dict[str, Any]:
+def source_json(source: Source | None) -> dict[str, Any]:
     """Return what files say of a controller's source: its text, and those of the modules that it imports."""
-    modules = {name: module.text for name, module in source.modules.items()}
-    return {"source": source.text, **({"modules": modules} if modules else {})}
+    modules = {name: module.text for name, module in source.modules.items()} if source else {}
+    return ({"source": source.text} if source else {}) | ({"modules": modules} if modules else {})
 
 
-def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
+def _team_value(name: str, value: object, path: Place) -> TeamValue:
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
@@ -423,10 +397,8 @@ class Task:
 
 def tasks_of(study: Study) -> Iterator[Task]:
     """Yield the runs in the order of the table: maps outermost, controllers and their gains innermost."""
-    once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
-    once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
-    if study.metrics:
-        once["metrics"] = True
+    names = ("duration", "dt", "lattice", "cost_hz", "record_hz", *(["metrics"] if study.metrics else []))
+    once = {name: getattr(study, name) for name in names}
     laws: list[tuple[dict[str, Any], dict[str, Any]]] = []  # what tasks hold of them, what their digests say
     for name in study.controllers:
         source = study.sources.get(name)
@@ -441,15 +413,12 @@ def tasks_of(study: Study) -> Iterator[Task]:
     for each in study.maps:
         document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
         short = {"document": _digest(document)}
-        for robots in study.robots:
-            for team in study.teams:
-                for start in study.starts_on(each):
-                    for seed in study.seeds:
-                        place = {"map": each.name, "robots": robots, "start": start, "seed": seed}
-                        for law, words in laws:
-                            inputs: dict[str, Any] = {**once, **place, "team": dict(team)}
-                            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
-                            yield Task(**inputs, **law, document=document, digest=digest)
+        axes = (study.robots, study.teams, study.starts_on(each), study.seeds, laws)
+        for robots, team, start, seed, (law, words) in product(*axes):
+            own = {"map": each.name, "robots": robots, "team": dict(team), "start": start, "seed": seed}
+            inputs: dict[str, Any] = once | own
+            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
+            yield Task(**inputs, **law, document=document, digest=digest)
 
 
 def _digest(text: str) -> str:

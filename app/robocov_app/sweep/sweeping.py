@@ -10,12 +10,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from itertools import compress, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
-from robocov_app.sweep.executors import Executor, LocalPool, processors
-from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened
+from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
+from robocov_app.sweep.ledger import Entry, Ledger, difference_of, opened
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.worker import Outcome, perform, prepared
@@ -31,7 +31,7 @@ PERIOD = 10.0  # seconds between two lines where there is no terminal
 
 @dataclass
 class Count:
-    """Number of runs, done and left."""
+    """Number of runs, done and left, and of workers `lost`; `waiting`: why nobody does any, in words."""
 
     total: int
     done: int = 0
@@ -42,6 +42,10 @@ class Count:
     began: float = field(default_factory=time.perf_counter)
 
     @property
+    def over(self) -> int:
+        return self.done + self.failed + self.reused
+
+    @property
     def rate(self) -> float:
         """Runs a second; 0 before the first one."""
         seconds = time.perf_counter() - self.began
@@ -50,8 +54,7 @@ class Count:
     @property
     def left(self) -> float | None:
         """Seconds to the end, None before the first run."""
-        rest = self.total - self.done - self.failed - self.reused
-        return rest / self.rate if self.rate else None
+        return (self.total - self.over) / self.rate if self.rate else None
 
     @property
     def ahead(self) -> str:
@@ -59,7 +62,7 @@ class Count:
         return self.waiting or (f"{duration(self.left)} left" if self.left else "")
 
     def __str__(self) -> str:
-        words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
+        words = [f"{self.over} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
         words += [f"{self.reused} were there"] * (self.reused > 0)
         words += [f"{counted(self.lost, 'worker')} lost"] * (self.lost > 0)
@@ -79,8 +82,7 @@ class Teller:
     def __call__(self, count: Count, *, at_once: bool = False) -> None:
         """Take the count, whenever it has changed or some time has passed."""
         if self._bar is not None and self._task is not None:
-            done = count.done + count.failed + count.reused
-            self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
+            self._bar.update(self._task, completed=count.over, said=str(count), left=count.ahead)
             return
         now = time.perf_counter()
         due = now - self._said >= PERIOD and not count.waiting  # that is told once
@@ -89,12 +91,10 @@ class Teller:
             self.say(", ".join(filter(None, (str(count), count.ahead))))
 
     def say(self, line: str) -> None:
-        """Say something else."""
         if self._bar is not None:
             self._bar.console.print(line, markup=False, highlight=False)
         elif not self._quiet:
             sys.stderr.write(f"{self._title}: {line}\n")
-            sys.stderr.flush()
 
 
 @contextmanager
@@ -121,13 +121,10 @@ def duration(seconds: float) -> str:
     ('8 s', '1 min 35 s', '1 h 6 min', '2 d 7 h')
     """
     whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    if whole < 86400:
-        return f"{whole // 3600} h {whole % 3600 // 60} min"
-    return f"{whole // 86400} d {whole % 86400 // 3600} h"
+    for unit, name, part, part_name in ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s")):
+        if whole >= unit:
+            return f"{whole // unit} {name} {whole % unit // part} {part_name}"
+    return f"{whole} s"
 
 
 MOST_WORKERS = 1024
@@ -192,12 +189,10 @@ def sweep(
         rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
         def open_executor() -> Executor:
-            if scheduler is None:
-                compile_kernels()
-                return LocalPool(min(workers or processors(), sum(survey.todo)))
-            from robocov_app.sweep.executors import Cluster
-
-            return Cluster(scheduler)
+            if scheduler is not None:
+                return Cluster(scheduler)
+            compile_kernels()
+            return LocalPool(min(workers or processors(), sum(survey.todo)))
 
         def keep(task: Task, outcome: Outcome) -> None:
             difference = difference_of(outcome.versions)
@@ -224,7 +219,7 @@ def sweep(
         done=count.done,
         failed=count.failed + survey.failed,
         reused=count.reused - survey.failed,
-        interrupted=count.done + count.failed + count.reused < count.total,
+        interrupted=count.over < count.total,
         errors={run: error for error, run in rows.errors.items()},
         damaged=survey.damaged,
         versions=dict(rows.versions),
@@ -256,10 +251,8 @@ def worked_off(
                 count.began = time.perf_counter()
             if back is not None:
                 keep(*back)
-                if back[1].error is None:
-                    count.done += 1
-                else:
-                    count.failed += 1
+                count.done += back[1].error is None
+                count.failed += back[1].error is not None
             yield
 
 
@@ -274,7 +267,6 @@ class _Rows:
         self.versions: Counter[str] = Counter()
 
     def finished(self, task: Task) -> None:
-        """Write the row of a task, and of those behind it that were finished before, when it is its turn."""
         self._finished.add(task.name)
         self.write()
 
@@ -318,17 +310,15 @@ class Rehearsal:
 
 def rehearsed(
     study: Study,
-    folder: Path | None,
+    folder: Path,
     *,
     workers: int,
     retry_failed: bool = False,
     keep_versions: bool = False,
 ) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing."""
-    survey = Survey(bytearray(b"\x01") * len(study))
-    if folder is not None:
-        ledger = Ledger(folder)
-        survey = ledger.survey(tasks_of(study), retry_failed=retry_failed, keep_versions=keep_versions)
+    again = {"retry_failed": retry_failed, "keep_versions": keep_versions}
+    survey = Ledger(folder).survey(tasks_of(study), **again)
     left = sum(survey.todo)
     chosen = next(compress(tasks_of(study), survey.todo), None) or next(tasks_of(study))
     prepared(chosen)  # once for all runs on a map
@@ -352,8 +342,7 @@ def rehearsed(
 
 def axes_of(study: Study) -> dict[str, int]:
     """Return how many values there are of each thing that a study varies."""
-    axes: dict[str, Any] = {"maps": study.maps, "robots": study.robots, "teams": study.teams}
-    axes |= {"starts": [name for each in study.maps for name in study.starts_on(each)]}
-    axes |= {"seeds": study.seeds, "controllers": study.controllers}
-    sizes = {name: len(values) for name, values in axes.items()}
+    sizes = {name: len(getattr(study, name)) for name in ("maps", "robots", "teams")}
+    sizes["starts"] = sum(len(study.starts_on(each)) for each in study.maps)
+    sizes |= {name: len(getattr(study, name)) for name in ("seeds", "controllers")}
     return sizes | {f"gains of {name}": len(study.gains_of(name).choices) for name in study.controllers}
