@@ -53,27 +53,13 @@ if TYPE_CHECKING:
     from robocov_app.learning.policy import ControllerPolicy, PolicyController
     from robocov_app.learning.task import CoverageTask, GeneratedMaps
 
-__all__ = [
-    "ControllerPolicy",
-    "CoverageEnv",
-    "CoverageParallelEnv",
-    "CoverageTask",
-    "CoverageVectorEnv",
-    "GeneratedMaps",
-    "ObservationLayout",
-    "PolicyController",
-]
+__all__ = ["ControllerPolicy", "CoverageEnv", "CoverageParallelEnv", "CoverageTask", "CoverageVectorEnv"]
+__all__ += ["GeneratedMaps", "ObservationLayout", "PolicyController"]
 
-_HOME = {
-    "ControllerPolicy": "policy",
-    "CoverageEnv": "gym",
-    "CoverageParallelEnv": "parallel",
-    "CoverageTask": "task",
-    "CoverageVectorEnv": "gym",
-    "GeneratedMaps": "task",
-    "ObservationLayout": "layout",
-    "PolicyController": "policy",
-}
+_HOME = dict.fromkeys(("ControllerPolicy", "PolicyController"), "policy")
+_HOME |= dict.fromkeys(("CoverageEnv", "CoverageVectorEnv"), "gym")
+_HOME |= dict.fromkeys(("CoverageTask", "GeneratedMaps"), "task")
+_HOME |= {"CoverageParallelEnv": "parallel", "ObservationLayout": "layout"}
 _NEEDED = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}  # packages of the extra
 
 

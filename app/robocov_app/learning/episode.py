@@ -19,7 +19,7 @@ from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.learning.layout import Rows
+from robocov_app.learning.layout import Rows, from_middle
 from robocov_app.learning.task import (
     SEEDS,
     CoverageTask,
@@ -44,7 +44,6 @@ class Learner:
 
     @classmethod
     def of(cls, task: CoverageTask) -> Learner:
-        """Return the learner of a task, with the scans that it is told of."""
         rays = task.observation.rays
         return cls(Scanning(rays, task.period) if rays else None)
 
@@ -84,27 +83,20 @@ def drawn_episode(
     name = options.get("start", task.start)
     starts = list(environment.starts) or ["uniform"]
     any_start, seed = starts[int(rng.integers(len(starts)))], int(rng.integers(SEEDS))
-    start = environment.start(any_start if name == "*" else name)
-    seed = options.get("start_seed", seed)
+    start: dict[str, Any] = {"start": environment.start(any_start if name == "*" else name).name}
+    start["seed"] = options.get("start_seed", seed)
     conditions, chance = task.conditions, int(rng.integers(SEEDS))
     if conditions is not None:
         conditions = replace(conditions, seed=options.get("conditions_seed", chance))
     cost = scenarios.cost(environment)
-    spec = RunSpec(
-        environment,
-        team=task.whole_team,
-        start=start.name,
-        seed=seed,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=conditions,
-    )
     if "positions" in options:
         try:
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
             raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
-        spec = replace(spec, positions=positions, start=None, seed=None)
+        start = {"positions": positions, "start": None, "seed": None}
+    more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
+    spec = RunSpec(environment, team=task.whole_team, **start, **more)
     return Episode(task, spec, cost, place)
 
 
@@ -119,12 +111,10 @@ class SharedSimulation:
     def begin(self, run: int, positions: Array) -> Simulation:
         """Put the team of an episode to its start."""
         task, count = self._task, self._count
-        if self._simulation is None:
-            # the others follow
+        if self._simulation is None:  # the others follow
             starts, team = np.tile(positions, (count, 1)), Team.joined([task.whole_team] * count)
-            self._simulation = Simulation(
-                self.environment, Learner.of(task), starts, team, task.dt, runs=count
-            )
+            learner = Learner.of(task)
+            self._simulation = Simulation(self.environment, learner, starts, team, task.dt, runs=count)
         self._simulation.restart(run, positions)
         return self._simulation
 
@@ -138,8 +128,7 @@ class SharedSimulation:
             positions = self._simulation.positions.reshape(actions.shape)[due]
             results = dict(zip(due, episodes[due[0]].cost.of_teams(positions), strict=True))
         return {
-            run: episode.moved(contact[run], run in results, results.get(run))
-            for run, episode in episodes.items()
+            run: each.moved(contact[run], run in results, results.get(run)) for run, each in episodes.items()
         }
 
     def rows(self) -> Rows:
@@ -165,21 +154,17 @@ class Episode:
     def __init__(
         self, task: CoverageTask, spec: RunSpec, cost: CoverageCost, place: Place | None = None
     ) -> None:
-        environment, positions = spec.environment, spec.starts
+        environment, positions, n = spec.environment, spec.starts, len(spec.team)
         self.task, self.team, self.environment, self._spec = task, spec.team, environment, spec
-        if len(positions) != len(self.team):
-            raise StartError(
-                f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
-            )
-        self.shared: SharedSimulation | None = None
-        run = 0
-        if place is not None and place[0].environment is environment:
-            self.shared, run = place
-        self._rows = slice(run * len(positions), (run + 1) * len(positions))
-        if self.shared is None:
-            self.simulation = spec.simulation(Learner.of(task))
+        if len(positions) != n:
+            raise StartError(f"starts: {len(positions)}, but one for each of {n} robots was wanted")
+        shared, run = place or (None, 0)
+        if shared is not None and shared.environment is environment:
+            self.shared: SharedSimulation | None = shared
+            self._rows, self.simulation = slice(run * n, (run + 1) * n), shared.begin(run, positions)
         else:
-            self.simulation = self.shared.begin(run, positions)
+            self.shared, self._rows = None, slice(n)
+            self.simulation = spec.simulation(Learner.of(task))
         self.working = self.simulation.working[self._rows]
         self.cost, self._cost = cost, MomentaryCost(cost)
         self._all_count = spec.conditions is None and not environment.moves
@@ -203,7 +188,6 @@ class Episode:
 
     @property
     def time(self) -> float:
-        """Simulated time in seconds."""
         return self.cycle * self.task.repeat * self.task.dt
 
     @property
@@ -219,15 +203,12 @@ class Episode:
 
     def state(self) -> Rows:
         """Return where all are, from the middle in diagonals, and how fast, (4 n,) from -1 to 1."""
-        low_x, low_y, high_x, high_y = self.environment.region.bounds
-        middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
-        where = (self.positions - middle) / self.environment.region.diameter
+        where = from_middle(self.positions, self.environment.region)
         speed = self.simulation.velocities[self._rows] / self.team.max_speed[:, None]
         rows: Rows = np.clip(np.column_stack([where, speed]), -1.0, 1.0).astype(np.float32)
         return rows.ravel()
 
     def facts(self) -> dict[str, float]:
-        """Return what is told beside observations: time and cost of the team, units in the names."""
         return {
             "time_s": self.time,
             "mean_distance_m": self.result.mean_distance,

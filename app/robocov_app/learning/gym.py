@@ -31,28 +31,19 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
     of what `CoverageParallelEnv` gives each robot.
 
     An episode is truncated after `CoverageTask.duration`, and ends when no robot is left. The same seed and
-    actions give the same episode, bit for bit. The `changes` are of the task, as in
-    ``gymnasium.make(..., maps="museum", robots=4)``; several environments may share the `scenarios` of their
-    task. For `render_mode`, `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
+    actions give the same episode, bit for bit. The `options` are those of
+    `robocov_app.learning.pictures.EpisodeEnv`, with changes of the task, as in
+    ``gymnasium.make(..., maps="museum", robots=4)``.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
     metadata: ClassVar[dict[str, Any]] = dict(METADATA)  # type: ignore[misc]
+    place: "Place | None" = None
+    outcome: Outcome | None = None
 
-    def __init__(
-        self,
-        task: CoverageTask | None = None,
-        *,
-        render_mode: str | None = None,
-        size: tuple[int, int] = (640, 480),
-        theme: str = "light",
-        scenarios: Scenarios | None = None,
-        **changes: Any,
-    ) -> None:
-        super().__init__(task, changes, render_mode, size, theme, scenarios)
-        self.place: Place | None = None
-        self.outcome: Outcome | None = None
+    def __init__(self, task: CoverageTask | None = None, **options: Any) -> None:
+        super().__init__(task, **options)
         n = self.task.robots
         low, high = (np.tile(row, (n, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)

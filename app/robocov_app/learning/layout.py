@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import TypeAlias
 
 import numpy as np
@@ -59,48 +60,41 @@ class ObservationLayout:
         for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
             checked(f"observation.{name}", getattr(self, name), 0, most, whole=True)
         if not isinstance(self.centroid, bool):
-            raise ParameterError(
-                f"observation.centroid: {shown(self.centroid)}, but true or false was wanted"
-            )
+            told = f"{shown(self.centroid)}, but true or false was wanted"
+            raise ParameterError(f"observation.centroid: {told}")
 
     @cached_property
     def blocks(self) -> dict[str, slice]:
         """Slices of the blocks of a row, in their order; only those that it has."""
         counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
         counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
-        places: dict[str, slice] = {}
-        begin = 0
-        for name, count in counts.items():
-            if count:
-                places[name] = slice(begin, begin + count)
-            begin += count
-        return places
+        ends = accumulate(counts.values())
+        return {
+            name: slice(end - count, end)
+            for (name, count), end in zip(counts.items(), ends, strict=True)
+            if count
+        }
 
     @property
     def size(self) -> int:
-        """Length of a row."""
         return 7 + 3 * self.neighbours + self.rays + 2 * self.centroid
 
     @property
     def bounds(self) -> tuple[Rows, Rows]:
         """Least and largest values of a row, (size,) each."""
         low = np.full(self.size, -1.0, dtype=np.float32)
-        places = self.blocks
-        low[places["obstacle"]][2] = 0.0
-        if "neighbour" in places:
-            low[places["neighbour"]][2::3] = 0.0
-        if "rays" in places:
-            low[places["rays"]] = 0.0
+        rays = 7 + 3 * self.neighbours
+        low[6:rays:3] = low[rays : rays + self.rays] = (
+            0.0  # whether there is a point, who is heard, distances
+        )
         return low, np.ones(self.size, dtype=np.float32)
 
     def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
         """Return what each robot is told, (n, size), with the latest scans, by default those of `seen`."""
         n, unit = len(seen.positions), seen.region.diameter
-        reach = sensing_unit(team, seen.region)[:, None]
+        reach = np.clip(team.sensing_range, 1e-9, unit)[:, None]
         places, rows = self.blocks, np.zeros((n, self.size))
-        low_x, low_y, high_x, high_y = seen.region.bounds
-        middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
-        rows[:, places["position"]] = (seen.positions - middle) / unit
+        rows[:, places["position"]] = from_middle(seen.positions, seen.region)
         rows[:, places["velocity"]] = seen.velocities / team.max_speed[:, None]
         sensed = ~np.isnan(seen.obstacle_points[:, 0])
         obstacle = rows[:, places["obstacle"]]
@@ -115,21 +109,21 @@ class ObservationLayout:
         if self.rays:
             scans = seen.scans if scans is None else scans
             if scans is None or scans.rays != self.rays:
-                found = "none" if scans is None else str(scans.rays)
-                raise ParameterError(
-                    f"observation.rays: {self.rays} in a scan were wanted, but {found} are there"
-                )
+                found, wanted = "none" if scans is None else scans.rays, f"{self.rays} in a scan were wanted"
+                raise ParameterError(f"observation.rays: {wanted}, but {found} are there")
             rows[:, places["rays"]] = np.where(scans.hit, scans.distances / reach, 1.0)
         if self.centroid:
-            cells = cells_seen(seen, "distance", None)
-            rows[:, places["centroid"]] = (cells.centroid - seen.positions) / unit
+            centroid = cells_seen(seen, "distance", None).centroid
+            rows[:, places["centroid"]] = (centroid - seen.positions) / unit
         # what is believed of places may be off by more than there is
         return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
 
 
-def sensing_unit(team: Team, region: Region) -> Array:
-    """Return the length in metres that sensed distances are told in, (n,)."""
-    return np.asarray(np.clip(team.sensing_range, 1e-9, region.diameter))
+def from_middle(positions: Array, region: Region) -> Array:
+    """Return positions from the middle of a region's bounding box, in its diagonals, (n, 2)."""
+    low_x, low_y, high_x, high_y = region.bounds
+    middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
+    return np.asarray((positions - middle) / region.diameter)
 
 
 @kernel

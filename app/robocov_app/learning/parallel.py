@@ -27,8 +27,8 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
     `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
 
-    The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``. For `render_mode`,
-    `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
+    The `options` are those of `robocov_app.learning.pictures.EpisodeEnv`, with changes of the task, as in
+    ``CoverageParallelEnv(maps="museum", robots=4)``.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
@@ -36,16 +36,9 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     metadata: ClassVar[dict[str, Any]] = METADATA | {"name": "robocov_coverage_v0", "is_parallelizable": True}
 
     def __init__(
-        self,
-        task: CoverageTask | None = None,
-        *,
-        render_mode: str | None = None,
-        size: tuple[int, int] = (640, 480),
-        theme: str = "light",
-        max_cycles: int | None = None,
-        **changes: Any,
+        self, task: CoverageTask | None = None, *, max_cycles: int | None = None, **options: Any
     ) -> None:
-        super().__init__(task, changes, render_mode, size, theme)
+        super().__init__(task, **options)
         self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
         if self.max_cycles < 1:
             raise ParameterError(f"max_cycles: {max_cycles}, but a whole number of at least 1 was wanted")
@@ -90,8 +83,7 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         for robot, agent in enumerate(self.possible_agents):
             if agent in self.agents:
                 values[robot] = _action(actions, agent)
-        acting = list(self.agents)
-        over = episode.cycle + 1 >= self.max_cycles
+        acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(values, last=over)
         self.agents = self._working()
         told = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]

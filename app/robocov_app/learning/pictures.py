@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,27 +23,29 @@ METADATA = {"render_modes": list(RENDER_MODES), "render_fps": 10}
 class EpisodeEnv:
     """An environment with `changes` of a task, whose `episode` is drawn as runs are drawn everywhere.
 
-    The mode is ``rgb_array``, ``human``, which opens a window and needs a display, or None; `size` is width
-    and height in pixels, `theme` light or dark. Raises ParameterError on others.
+    `render_mode` is ``rgb_array``, ``human``, which opens a window and needs a display, or None; `size` is
+    width and height in pixels, `theme` light or dark. Several may share the `scenarios` of their task. Raises
+    InputError when the task makes no sense or a map cannot be read.
     """
 
     def __init__(
         self,
-        task: CoverageTask | None,
-        changes: Mapping[str, Any],
-        mode: str | None,
-        size: tuple[int, int],
-        theme: str,
+        task: CoverageTask | None = None,
+        *,
+        render_mode: str | None = None,
+        size: tuple[int, int] = (640, 480),
+        theme: str = "light",
         scenarios: Scenarios | None = None,
+        **changes: Any,
     ) -> None:
         self.task = changed_task(task, changes)
-        if mode is not None and mode not in RENDER_MODES:
-            raise ParameterError(f"render_mode: {unknown_name('mode', str(mode), RENDER_MODES)}")
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ParameterError(f"render_mode: {unknown_name('mode', str(render_mode), RENDER_MODES)}")
         if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
             raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
         if theme not in ("light", "dark"):
             raise ParameterError(f"theme: {unknown_name('theme', str(theme), ('light', 'dark'))}")
-        self.render_mode, self._theme, self._size = mode, theme, (int(size[0]), int(size[1]))
+        self.render_mode, self._theme, self._size = render_mode, theme, (int(size[0]), int(size[1]))
         self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
         self.episode: Episode | None = None
         self._painter: Painter | None = None
@@ -65,7 +66,6 @@ class EpisodeEnv:
         return painter.frame(scene).copy()
 
     def close(self) -> None:
-        """Close the window, if there is one."""
         if self._window is not None:
             import pygame
 

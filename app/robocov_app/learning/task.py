@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
@@ -19,14 +20,11 @@ from robocov_app.learning.layout import ObservationLayout
 
 Action: TypeAlias = Literal["force", "velocity"]
 """A force in N, or a velocity in m/s."""
-
-ACTIONS: tuple[Action, ...] = ("force", "velocity")
-
+ACTIONS: tuple[Action, ...] = get_args(Action)
 FOLLOWING = 0.1  # time constant in seconds with which a robot follows a velocity that it is told
 
 
 def checked_kind(what: str, given: str, known: Sequence[str]) -> None:
-    """Raise ParameterError when there is no kind of `what` that is called so."""
     if given not in known:
         raise ParameterError(f"{what}: {unknown_name(f'kind of {what}', str(given), known)}")
 
@@ -69,8 +67,7 @@ def actions_of(action: Action, forces: Array, velocities: Array, team: Team) -> 
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
 """Sharing of rewards among robots; see `shares`."""
-
-REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
+REWARDS: tuple[Reward, ...] = get_args(Reward)
 
 
 def reference_distance(area: float, robots: int) -> float:
@@ -99,24 +96,18 @@ def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: 
     decrease = before.mean_distance - after.mean_distance
     if reward == "shared":
         return np.full(n, decrease)
-    moved = after.positions - before.positions
-    slope = _slope(before) + _slope(after)
-    own = -0.5 * (slope * moved).sum(axis=1)
+    slope = np.zeros_like(after.positions)  # of the mean distance, before and after together
+    for result in (before, after):
+        if result.value:
+            slope += result.gradient * (result.mean_distance / result.value)
+    own = -0.5 * (slope * (after.positions - before.positions)).sum(axis=1)
     return np.asarray(own + (decrease - own.sum()) / n)
-
-
-def _slope(result: CoverageResult) -> Array:
-    """Return the derivative of the mean distance by every robot's position, (n, 2)."""
-    if not result.value:
-        return np.zeros_like(result.positions)
-    return result.gradient * (result.mean_distance / result.value)
 
 
 MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
 """A map, its name or path, or what makes one of a seed."""
 
 SEEDS = 2**31  # a maker of maps is given a seed below this
-
 _KEPT = 64  # maps with their costs that are kept at most
 
 
@@ -162,8 +153,7 @@ class Scenarios:
         if not given:
             raise ParameterError("maps: none, but at least one was wanted")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
-        self._lattice = lattice
-        self._costs: dict[Environment, CoverageCost] = {}
+        self.cost = lru_cache(_KEPT)(partial(CoverageCost, lattice=lattice))
 
     @property
     def only(self) -> Environment | None:
@@ -175,16 +165,6 @@ class Scenarios:
         """Return one of the maps, each as likely, or a new one of its maker."""
         source = self._sources[int(rng.integers(len(self._sources)))]
         return map_of(source, int(rng.integers(SEEDS)))
-
-    def cost(self, environment: Environment) -> CoverageCost:
-        """Return the coverage cost of a map."""
-        cost = self._costs.pop(environment, None)
-        if cost is None:
-            cost = CoverageCost(environment, self._lattice)
-        self._costs[environment] = cost  # the last one is the last that was asked for
-        if len(self._costs) > _KEPT:
-            del self._costs[next(iter(self._costs))]
-        return cost
 
 
 def map_of(given: object, seed: int) -> Environment:
@@ -273,7 +253,6 @@ class CoverageTask:
 
     @property
     def whole_team(self) -> Team:
-        """The team, whether it was given or not."""
         return Team.homogeneous(self.robots) if self.team is None else self.team
 
     @property
@@ -304,8 +283,6 @@ def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Cover
     for name in changes:
         if name not in known:
             raise ParameterError(unknown_name("part of a task", name, known))
-    if task is None:
-        return CoverageTask(**changes)
     # the number of robots goes with the team, and would else be that of the old one
     team: dict[str, Any] = {"team": None} if "robots" in changes else {}
-    return replace(task, **(team | dict(changes)))
+    return replace(task or CoverageTask(), **(team | dict(changes)))
