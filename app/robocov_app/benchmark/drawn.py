@@ -42,12 +42,10 @@ def drawn_map(kind: str, seed: int) -> Environment:
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([_ORDER.index(kind), seed, attempt])
         boundary, obstacles = KINDS[kind](rng)
-        plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
-        if (environment := _accepted(plan)) is not None:
+        if environment := _accepted(Environment(f"{kind} {seed}", boundary, tuple(obstacles))):
             return environment
-    raise ParameterError(
-        f"map {kind}-{seed}: no plan of {_ATTEMPTS} is in one piece; another seed was wanted"
-    )
+    none = f"no plan of {_ATTEMPTS} is in one piece"
+    raise ParameterError(f"map {kind}-{seed}: {none}; another seed was wanted")
 
 
 def _accepted(plan: Environment) -> Environment | None:
@@ -69,17 +67,25 @@ def _accepted(plan: Environment) -> Environment | None:
 
 
 def _rounded(points: Array | list[tuple[float, float]]) -> Ring:
-    return tuple((round(float(x), 2), round(float(y), 2)) for x, y in np.asarray(points))
+    return tuple((round(float(x), 2), round(float(y), 2)) for x, y in points)
 
 
 def _box(left: float, bottom: float, right: float, top: float) -> Ring:
     return _rounded([(left, bottom), (right, bottom), (right, top), (left, top)])
 
 
-def _turned(middle: Array, width: float, height: float, angle: float) -> Ring:
+def _block(x: float, y: float, width: float, height: float) -> Obstacle:
+    return PolygonObstacle(_box(x, y, x + width, y + height))
+
+
+def _turned(middle: Array, width: float, height: float, angle: float) -> Obstacle:
     corners = np.array([(-width, -height), (width, -height), (width, height), (-width, height)]) / 2.0
     along = np.array([np.cos(angle), np.sin(angle)])
-    return _rounded(middle + corners @ np.array([along, [-along[1], along[0]]]))
+    return PolygonObstacle(_rounded(middle + corners @ np.array([along, [-along[1], along[0]]])))
+
+
+def _circle(middle: Array, radius: float) -> Obstacle:
+    return CircleObstacle(_rounded(middle[None])[0], round(radius, 2))
 
 
 def _wall_with_door(
@@ -108,18 +114,14 @@ def _home(rng: np.random.Generator) -> Plan:
             if right - left > wide + 2.2 and top - bottom > deep + 2.2:
                 x = left + 0.06 if rng.random() < 0.5 else right - 0.06 - wide
                 y = bottom + 0.06 if rng.random() < 0.5 else top - 0.06 - deep
-                furniture.append(PolygonObstacle(_box(x, y, x + wide, y + deep)))
+                furniture.append(_block(x, y, wide, deep))
             return
         at = low + (high - low) * rng.uniform(0.38, 0.62)
         begin, end = (bottom, top) if across else (left, right)
         door = rng.uniform(begin + 0.8, end - 0.8)
         walls.extend(_wall_with_door(across, at, begin, end, door, rng.uniform(0.8, 1.1)))
-        if across:
-            divided(left, bottom, at, top)
-            divided(at, bottom, right, top)
-        else:
-            divided(left, bottom, right, at)
-            divided(left, at, right, top)
+        divided(left, bottom, *((at, top) if across else (right, at)))
+        divided(*((at, bottom) if across else (left, at)), right, top)
 
     divided(0.0, 0.0, width, height)
     return _box(0.0, 0.0, width, height), [*walls, *furniture]
@@ -128,7 +130,7 @@ def _home(rng: np.random.Generator) -> Plan:
 def _office(rng: np.random.Generator) -> Plan:
     """Draw an office floor: cells on one side of a corridor, an open room with desks on the other."""
     width, height = rng.uniform(16.0, 20.0), rng.uniform(10.0, 12.0)
-    low, high = height * rng.uniform(0.48, 0.56), 0.0
+    low = height * rng.uniform(0.48, 0.56)
     high = low + rng.uniform(1.4, 1.9)
     obstacles: list[Obstacle] = []
     cuts = np.linspace(0.0, width, int(rng.integers(5, 8)))
@@ -146,12 +148,12 @@ def _office(rng: np.random.Generator) -> Plan:
     for x in np.arange(2.2, width - 2.5, rng.uniform(2.9, 3.6)):
         for y in (1.3, low - 1.9):
             if rng.random() < 0.85:
-                obstacles.append(PolygonObstacle(_box(x, y, x + 1.6, y + 0.8)))
+                obstacles.append(_block(x, y, 1.6, 0.8))
     return _box(0.0, 0.0, width, height), obstacles
 
 
-def _free_places(rng: np.random.Generator, shapes: list[Obstacle], gap: float) -> list[Obstacle]:
-    """Return the shapes that keep a gap from those before them, and from the boundary's square."""
+def _spaced(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
+    """Return the shapes that keep a gap from those before them."""
     kept: list[Obstacle] = []
     for shape in shapes:
         if all(shape.polygon.distance(other.polygon) >= gap for other in kept):
@@ -171,7 +173,7 @@ def _yard(rng: np.random.Generator) -> Plan:
 
     def house() -> Obstacle:
         at, width, depth = place(), rng.uniform(2.0, 3.6), rng.uniform(1.6, 2.6)
-        return PolygonObstacle(_turned(at, width, depth, rng.uniform(0.0, np.pi)))
+        return _turned(at, width, depth, rng.uniform(0.0, np.pi))
 
     def pond() -> Obstacle:
         around = np.linspace(0.0, 2.0 * np.pi, 14, endpoint=False)
@@ -186,15 +188,14 @@ def _yard(rng: np.random.Generator) -> Plan:
         return WallObstacle(_rounded(begin + rng.uniform(1.4, 2.4) * corner), 0.3)
 
     def tree() -> Obstacle:
-        x, y = place().tolist()
-        return CircleObstacle((round(x, 2), round(y, 2)), round(rng.uniform(0.2, 0.45), 2))
+        return _circle(place(), rng.uniform(0.2, 0.45))
 
     shapes = [draw() for draw in (*5 * [house], pond, *6 * [hedge], *14 * [tree])]
     land = shapely.Polygon(boundary)
     inside = [
         each for each in shapes if land.contains(each.polygon) and land.exterior.distance(each.polygon) > 0.7
     ]
-    return boundary, _free_places(rng, inside, 0.7)
+    return boundary, _spaced(inside, 0.7)
 
 
 def _plant(rng: np.random.Generator) -> Plan:
@@ -211,14 +212,11 @@ def _plant(rng: np.random.Generator) -> Plan:
     for _ in range(30):
         at = np.array([rng.uniform(split + 1.6, width - 1.4), rng.uniform(1.4, height - 1.4)])
         if len(shapes) % 3 == 2:
-            shapes.append(CircleObstacle((round(at[0], 2), round(at[1], 2)), round(rng.uniform(0.2, 0.7), 2)))
+            shapes.append(_circle(at, rng.uniform(0.2, 0.7)))
         else:
-            shapes.append(
-                PolygonObstacle(
-                    _turned(at, rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.2), rng.choice([0.0, 0.6, 1.2]))
-                )
-            )
-    return _box(0.0, 0.0, width, height), [*obstacles, *_free_places(rng, shapes, 0.9)[:7]]
+            wide, deep = rng.uniform(0.8, 2.0), rng.uniform(0.6, 1.2)
+            shapes.append(_turned(at, wide, deep, rng.choice([0.0, 0.6, 1.2])))
+    return _box(0.0, 0.0, width, height), [*obstacles, *_spaced(shapes, 0.9)[:7]]
 
 
 def _traffic(rng: np.random.Generator) -> Plan:
@@ -228,8 +226,8 @@ def _traffic(rng: np.random.Generator) -> Plan:
     left, right = rng.uniform(4.2, 5.0), width - rng.uniform(2.2, 3.0)
     for y in (3.0, 7.2):
         middle = rng.uniform(8.2, 9.8)
-        obstacles.append(PolygonObstacle(_box(left, y, middle - 0.8, y + rng.uniform(0.8, 1.3))))
-        obstacles.append(PolygonObstacle(_box(middle + 0.8, y, right, y + rng.uniform(0.8, 1.3))))
+        for begin, end in ((left, middle - 0.8), (middle + 0.8, right)):
+            obstacles.append(PolygonObstacle(_box(begin, y, end, y + rng.uniform(0.8, 1.3))))
     for y in (5.7, 9.6, 1.5)[: int(rng.integers(2, 4))]:
         ends = _rounded([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
         path = ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
@@ -238,10 +236,6 @@ def _traffic(rng: np.random.Generator) -> Plan:
 
 
 KINDS: dict[str, Callable[[np.random.Generator], Plan]] = {
-    "homes": _home,
-    "offices": _office,
-    "yards": _yard,
-    "plants": _plant,
-    "traffic": _traffic,
-}
+    "homes": _home, "offices": _office, "yards": _yard, "plants": _plant, "traffic": _traffic
+}  # fmt: skip
 """The kinds of drawn maps by their names."""

@@ -33,9 +33,9 @@ from robocov_app.report.tables import Table
 from robocov_app.report.theme_css import theme_rules
 
 AXES: Mapping[str, tuple[str, str, Callable[[Rating], float]]] = {
-    "path": ("way", "mean way of a robot (m)", lambda rating: rating.path),
-    "computing": ("computing time", "µs for a robot-second", lambda rating: 1e6 * rating.computing),
-    "told": ("bytes told", "bytes that a robot tells a second", lambda rating: rating.told),
+    "path": ("way", "mean way of a robot (m)", lambda each: each.median("path_length_m")),
+    "computing": ("computing time", "µs for a robot-second", lambda each: 1e6 * each.rate("deciding_s")),
+    "told": ("bytes told", "bytes that a robot tells a second", lambda each: each.rate("told_bytes")),
 }
 """Quantities that the gap is plotted against: title, axis label, and the value of an entry."""
 
@@ -126,10 +126,9 @@ def _plots(
 ) -> Iterator[Plot]:
     for axis, (title, label, of) in AXES.items():
         points = [
-            Point(
-                looks[each.label], each.label, of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
-            )
+            Point(looks[name], name, of(each), 100.0 * each.gap.estimate, knows[name] != WHOLE)
             for each in ratings
+            for name in [each.label]
         ]
         fine = [point for point in points if np.isfinite((point.x, point.gap)).all()]
         values = [point.x for point in fine]

@@ -1,11 +1,12 @@
 """Ratings of results on each track, over the runs that all of them have."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, median_time
 
@@ -22,52 +23,32 @@ class Rating:
     rows: Sequence[Mapping[str, Any]]  # those that did not fail
     failed: int
 
-    def values(
-        self, of: Callable[[Mapping[str, Any]], float | None]
-    ) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def values(self, figure: str) -> Array:
         """Return a figure of each run that has it."""
-        return np.array([value for row in self.rows if (value := of(row)) is not None], dtype=float)
+        return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
 
-    def median(self, of: Callable[[Mapping[str, Any]], float | None]) -> float:
+    def median(self, figure: str) -> float:
         """Return the median of a figure, nan for none."""
-        values = self.values(of)
+        values = self.values(figure)
         return float(np.median(values)) if len(values) else float("nan")
 
     @property
     def gap(self) -> Interval:
         """The median gap with its interval, drawn by maps."""
-        rows = [row for row in self.rows if row["gap"] is not None]
-        if not rows:
-            return Interval(*3 * [float("nan")])
-        return bootstrap([row["gap"] for row in rows], "median", [row["map"] for row in rows])
+        maps = [row["map"] for row in self.rows if row["gap"] is not None]
+        return bootstrap(self.values("gap"), "median", maps) if maps else Interval(*3 * [float("nan")])
 
     def at_rest(self) -> tuple[float, float | None]:
         """Return the share of runs at rest at the end, and the Kaplan-Meier median of the time to rest, s."""
-        rest = [row["settled_at_s"] for row in self.rows if row["settled_at_s"] is not None]
+        rest = self.values("settled_at_s").tolist()
         censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest))
         median = median_time(rest, censored) if rest else np.inf
         return len(rest) / len(self.rows), median if np.isfinite(median) else None
 
-    @property
-    def robot_seconds(self) -> float:
-        """Robots times seconds of a run."""
+    def rate(self, figure: str) -> float:
+        """Return the median of a figure for a simulated second of one robot."""
         track = suite.TRACKS[self.track]
-        return track.robots * track.duration
-
-    @property
-    def computing(self) -> float:
-        """Median processor time of the law for a simulated second of one robot, s."""
-        return self.median(lambda row: row["deciding_s"]) / self.robot_seconds
-
-    @property
-    def told(self) -> float:
-        """Median bytes that a robot tells a second."""
-        return self.median(lambda row: row["told_bytes"]) / self.robot_seconds
-
-    @property
-    def path(self) -> float:
-        """Median way of a robot, m."""
-        return self.median(lambda row: row["path_length_m"])
+        return self.median(figure) / (track.robots * track.duration)
 
 
 def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
@@ -79,19 +60,11 @@ def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
             {(row["map"], row["seed"]): row for row in each["rows"] if row["track"] == track}
             for each in results
         ]
-        shared = (
-            set[tuple[str, int]].intersection(*(set(rows) for rows in own if rows)) if any(own) else set()
-        )
-        ratings = []
         for result, label, rows in zip(results, labels, own, strict=True):
-            some = [row for key, row in rows.items() if key in shared]
+            some = [row for key, row in rows.items() if all(key in other for other in own if other)]
             if some:
-                fine = [row for row in some if "error" not in row]
-                ratings.append(
-                    Rating(label, result["entry"]["controller"], track, fine, len(some) - len(fine))
-                )
-        if ratings:
-            found[track] = ratings
+                name, fine = result["entry"]["controller"], [row for row in some if "error" not in row]
+                found.setdefault(track, []).append(Rating(label, name, track, fine, len(some) - len(fine)))
     return found
 
 
@@ -138,11 +111,11 @@ NOTES = (
 
 def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
     """Return the cells of one entry's row under `HEAD`."""
-    gap, gaps = rating.gap, rating.values(lambda row: row["gap"])
+    gap, gaps = rating.gap, rating.values("gap")
     runs = str(len(rating.rows)) + (f" (+{rating.failed} failed)" if rating.failed else "")
     if len(gaps) < len(rating.rows):
         runs += f", {len(rating.rows) - len(gaps)} without gap"
-    bounds = rating.values(lambda row: row["gap_to_bound"])
+    bounds = rating.values("gap_to_bound")
     surely = f" (≤ {100.0 * float(np.median(bounds)):.1f})" if len(bounds) == len(gaps) > 0 else ""
     share, rest = rating.at_rest()
     best = [row["mean_distance_m"] / (1.0 + row["gap"]) for row in rating.rows if row["gap"] is not None]
@@ -153,11 +126,11 @@ def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
     return (
         *(rating.label, knows, runs, number(100.0 * gap.estimate, ".1f") + surely),
         NOTHING if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}",
-        *(number(100.0 * of(gaps) if len(gaps) else None, ".1f") for of in (np.mean, np.max)),
-        *(number(rating.median(lambda row: row["near_final_s"]), ".0f"), number(integral, ".0f")),
-        *(number(rating.path, ".1f"), number(rating.median(lambda row: row["work_J"]), ".0f")),
+        *(number(100.0 * float(of(gaps)) if len(gaps) else None, ".1f") for of in (np.mean, np.max)),
+        *(number(rating.median("near_final_s"), ".0f"), number(integral, ".0f")),
+        *(number(rating.median("path_length_m"), ".1f"), number(rating.median("work_J"), ".0f")),
         *(f"{touched} of {len(rating.rows)}", f"{share:.0%}", number(rest, ".0f")),
-        *(number(rating.told, ".0f"), number(1e6 * rating.computing, ".0f")),
+        *(number(rating.rate("told_bytes"), ".0f"), number(1e6 * rating.rate("deciding_s"), ".0f")),
     )
 
 
@@ -167,9 +140,7 @@ def family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[
     rows = []
     for rating in ratings:
         parts = [[row for row in rating.rows if suite.family_of(row["map"]) == family] for family in families]
-        gaps = [
-            Rating(rating.label, "", rating.track, part, 0).median(lambda row: row["gap"]) for part in parts
-        ]
+        gaps = (replace(rating, rows=part).median("gap") for part in parts)
         rows.append((rating.label, *(number(100.0 * gap, ".1f") for gap in gaps)))
     return ("Controller", *families), rows
 

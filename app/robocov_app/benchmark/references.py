@@ -60,23 +60,24 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
     left = total = len(searches) + len(bounds)
     _save(path, maps)
     with progress("references", total, quiet=quiet) as update:
-        questions = {key: _question(environment(key), int(wanted[key][1])) for key in searches}
+
+        def kept() -> None:
+            nonlocal left
+            left -= 1
+            _save(path, maps)
+            update(total - left)
+
+        how = (suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
+        questions = {key: Question(to_json(environment(key)), int(wanted[key][1]), *how) for key in searches}
         for key, answer in searched(questions, workers, stop) if questions else ():
             name, robots, _ = wanted[key]
             maps[name]["references"][robots] = entry_of(environment(key), answer)
-            left -= 1
-            _save(path, maps)
-            update(total - left)
+            kept()
         asked = {key: (to_json(environment(key)), found(key)["positions_m"]) for key in bounds if found(key)}
-        for key, bound in searched(asked, workers, stop, _BOUNDING) if asked else ():
+        for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():
             found(key)["lower_bound_m"] = bound
-            left -= 1
-            _save(path, maps)
-            update(total - left)
+            kept()
     return 2 * len(wanted) - left, left
-
-
-_BOUNDING = "robocov_app.benchmark.references:Bounding"
 
 
 class Bounding:
@@ -91,10 +92,6 @@ class Bounding:
         document, positions = questions[-1]
         how: Any = {"radius": suite.RADIUS, "lattice": suite.LATTICE, "precision": PRECISION}
         return lower_bound(from_json(document), np.array(positions), **how).mean_distance
-
-
-def _question(environment: Environment, robots: int) -> Question:
-    return Question(to_json(environment), robots, suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
 
 
 def entry_of(environment: Environment, answer: Reference) -> dict[str, Any]:

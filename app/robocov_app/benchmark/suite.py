@@ -47,13 +47,12 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
 }
 """The maps of the ideal track by their families."""
 
+_DRAWN = [kind for kind in FAMILIES if kind != "bundled"]
 _OTHERS: Mapping[str, tuple[str, ...]] = {
-    "density": tuple(
-        f"dense-{each}" for kind in FAMILIES if kind != "bundled" for each in _numbered(kind, 1)
-    ),
+    "density": tuple(f"dense-{each}" for kind in _DRAWN for each in _numbered(kind, 1)),
     "moving": ("forklifts", *_numbered("traffic", 5)),
     "large": tuple(f"large-{each}" for kind in _LARGE_KINDS for each in _numbered(kind, 2)),
-    "tuning": tuple(name for kind in FAMILIES if kind != "bundled" for name in _numbered(kind, 2, first=1)),
+    "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
 }
 """The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
 
@@ -74,7 +73,6 @@ class Track:
 
     @property
     def survivors(self) -> int:
-        """Number of robots that work at the end."""
         return self.robots - len(self.failures)
 
 
@@ -113,7 +111,6 @@ def heading(track: str) -> str:
 
 
 def family_of(name: str) -> str:
-    """Return the family of a map."""
     return next(family for family, names in {**FAMILIES, **_OTHERS}.items() if name in names)
 
 
@@ -138,7 +135,6 @@ def made_map(name: str) -> Environment:
 
 
 def hash_of(environment: Environment) -> str:
-    """Return the SHA-256 of a map's content."""
     document = {**to_json(environment), "$schema": None}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
@@ -170,9 +166,9 @@ def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[s
     found = {}
     for name in tracks or (QUICK if quick else RATED):
         own = TRACKS[name].maps
-        if quick and not maps:
-            own = tuple({family_of(each): each for each in reversed(own)}[family_of(each)] for each in own)
-        found[name] = tuple(each for each in dict.fromkeys(own) if not maps or each in maps)
+        if quick and not maps:  # the first of each family
+            own = tuple({family_of(each): each for each in reversed(own)}.values())[::-1]
+        found[name] = tuple(each for each in own if not maps or each in maps)
     if not any(found.values()):
         raise ParameterError(f"--maps: {', '.join(maps)}, but a map of {', '.join(found)} was wanted")
     return {name: own for name, own in found.items() if own}
@@ -183,21 +179,9 @@ def study_of(
 ) -> Study:
     """Return the runs of one controller on a track."""
     track = TRACKS[name]
-    changes = dict(track.changes)
+    changes: dict[str, Any] = {"robots": (track.robots,), "duration": track.duration, "radius": RADIUS}
+    changes |= {"lattice": LATTICE, "cost_hz": 2.0, "record_hz": 0.0, "metrics": True, **track.changes}
     if track.failures:
         words = " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)
         changes["conditions"] = {"fail": words}
-    given: dict[str, Any] = {
-        "robots": (track.robots,),
-        "duration": track.duration,
-        "seeds": seeds,
-        "radius": RADIUS,
-    }
-    kept: dict[str, Any] = {
-        "lattice": LATTICE,
-        "cost_hz": 2.0,
-        "record_hz": 0.0,
-        "metrics": True,
-        "folder": folder,
-    }
-    return Study(tuple(maps), (controller,), **given, **kept, **changes, **more)
+    return Study(tuple(maps), (controller,), seeds=seeds, folder=folder, **changes, **more)
