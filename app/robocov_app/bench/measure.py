@@ -41,7 +41,6 @@ class Row:
 
     @property
     def case(self) -> str:
-        """The parameters in words."""
         words = {"lattice": "{0} x {0}", "map": "{0}"}
         given = self.parameters.items()
         return ", ".join(words.get(name, "{0} " + name).format(value) for name, value in given)

@@ -44,7 +44,6 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
 
 
 def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> None:
-    """Draw a dot at each ratio and a bar at each goal, a line each."""
     theme = page.theme
     page.text(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
     axes = page.axes((LEFT, top + GAP - 26, WIDTH - LEFT - RIGHT, ROW * len(rows)))

@@ -53,7 +53,6 @@ def _rows(n: int, quick: bool) -> Iterator[Row]:
 
 
 def _together(quick: bool) -> Iterator[Row]:
-    """Measure a step of many runs of six robots, for one of them."""
     campus, n = load_map("campus"), 6
     starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
     simulation = Simulation(campus, Rapf(), np.concatenate(starts), runs=TOGETHER)

@@ -153,7 +153,6 @@ def _office(rng: np.random.Generator) -> Plan:
 
 
 def _spaced(shapes: list[Obstacle], gap: float) -> list[Obstacle]:
-    """Return the shapes that keep a gap from those before them."""
     kept: list[Obstacle] = []
     for shape in shapes:
         if all(shape.polygon.distance(other.polygon) >= gap for other in kept):

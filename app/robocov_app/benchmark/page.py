@@ -193,7 +193,6 @@ def label_places(marks: Array, points: Sequence[Point]) -> Array:
 
 
 def _shared(one: Array, other: Array) -> float:
-    """Return the area that two boxes (left, bottom, right, top) have in common."""
     sides = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
     return float(np.maximum(sides, 0.0).prod())
 
@@ -212,7 +211,6 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def _entries(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Table:
-    """Return what was rated, and with what."""
     rows = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]

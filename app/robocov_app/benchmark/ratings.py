@@ -34,7 +34,6 @@ class Rating:
 
     @property
     def gap(self) -> Interval:
-        """The median gap with its interval, drawn by maps."""
         maps = [row["map"] for row in self.rows if row["gap"] is not None]
         return bootstrap(self.values("gap"), "median", maps) if maps else Interval(*3 * [float("nan")])
 
@@ -146,7 +145,6 @@ def family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[
 
 
 def summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of a small table of one result, a row for each track."""
     rows = []
     for track, ratings in ratings_of([result]).items():
         cells = dict(zip(HEAD, rating_row(ratings[0], ""), strict=True))

@@ -169,7 +169,6 @@ def _suite() -> dict[str, str]:
 
 
 def method() -> list[str]:
-    """Return how the figures were made, in sentences."""
     return [
         f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
         f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
@@ -245,7 +244,6 @@ def _identity(result: Mapping[str, Any]) -> list[Any]:
 
 
 def _require(given: Any, kinds: Mapping[str, Any], where: object) -> None:
-    """Raise InputError unless a JSON object has values of these kinds."""
     for name, kind in kinds.items():
         if not isinstance(given, dict) or name not in given:
             raise InputError(f"{where}: {name}: missing, but a whole result was wanted")

@@ -115,7 +115,6 @@ def family_of(name: str) -> str:
 
 
 def every_map() -> tuple[str, ...]:
-    """Return the names of all maps, in the order of the families."""
     return tuple(name for names in (*FAMILIES.values(), *_OTHERS.values()) for name in names)
 
 
@@ -177,7 +176,6 @@ def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[s
 def study_of(
     name: str, maps: Sequence[StudyMap], controller: str, seeds: Sequence[int], folder: Path, **more: Any
 ) -> Study:
-    """Return the runs of one controller on a track."""
     track = TRACKS[name]
     changes: dict[str, Any] = {"robots": (track.robots,), "duration": track.duration, "radius": RADIUS}
     changes |= {"lattice": LATTICE, "cost_hz": 2.0, "record_hz": 0.0, "metrics": True, **track.changes}

@@ -10,7 +10,6 @@ __all__ = ["env", "parallel_env", "raw_env"]
 
 
 def parallel_env(**options: Any) -> CoverageParallelEnv:
-    """Return a `CoverageParallelEnv` with these options."""
     return CoverageParallelEnv(**options)
 
 

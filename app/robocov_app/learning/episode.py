@@ -109,7 +109,6 @@ class SharedSimulation:
         self._told: tuple[Observations | None, Rows] = None, np.empty((0, 0), dtype=np.float32)
 
     def begin(self, run: int, positions: Array) -> Simulation:
-        """Put the team of an episode to its start."""
         task, count = self._task, self._count
         if self._simulation is None:  # the others follow
             starts, team = np.tile(positions, (count, 1)), Team.joined([task.whole_team] * count)
@@ -132,7 +131,6 @@ class SharedSimulation:
         }
 
     def rows(self) -> Rows:
-        """Return what each robot of all episodes is told now."""
         assert self._simulation is not None
         seen = self._simulation.observe()
         if seen is not self._told[0]:
@@ -192,7 +190,6 @@ class Episode:
 
     @property
     def cycle(self) -> int:
-        """Number of actions so far."""
         return len(self.trail) - 1
 
     def observations(self) -> Rows:
@@ -224,7 +221,6 @@ class Episode:
         return self.moved(contact, last or self.due())
 
     def due(self) -> bool:
-        """Return whether the cost is rewarded after the next action."""
         since = self.cycle + 1 - self._rewarded
         return since >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 

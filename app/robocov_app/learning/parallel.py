@@ -117,7 +117,6 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
 
 
 def _action(actions: Mapping[str, Any], agent: str) -> Array:
-    """Return the action of one agent, (2,)."""
     if agent not in actions:
         raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
     try:

@@ -93,7 +93,6 @@ class EpisodeEnv:
         return self._painter, scene
 
     def _show(self) -> None:
-        """Show the present moment where there is a window."""
         if self.render_mode != "human":
             return
         import pygame

@@ -87,7 +87,6 @@ class PolicyController:
 
     @property
     def scanning(self) -> Scanning | None:
-        """The scans that the observations need."""
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
     def act(self, observation: NDArray[np.float32]) -> Any:

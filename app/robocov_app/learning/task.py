@@ -157,12 +157,10 @@ class Scenarios:
 
     @property
     def only(self) -> Environment | None:
-        """The map, where there is but one."""
         source = self._sources[0]
         return source if len(self._sources) == 1 and isinstance(source, Environment) else None
 
     def draw(self, rng: np.random.Generator) -> Environment:
-        """Return one of the maps, each as likely, or a new one of its maker."""
         source = self._sources[int(rng.integers(len(self._sources)))]
         return map_of(source, int(rng.integers(SEEDS)))
 
@@ -262,12 +260,10 @@ class CoverageTask:
 
     @property
     def cycles(self) -> int:
-        """Number of actions of an episode."""
         return max(1, round(self.duration / self.period))
 
     @property
     def agents(self) -> list[str]:
-        """Names of the robots: ``robot_1``, ``robot_2``, ..."""
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:

@@ -27,8 +27,10 @@ from robocov_app.terminal.output import finite, write_csv, write_json
 from robocov_app.terminal.progress import counting, progress
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
-_FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
-_TIMED = ("mean_time_s",)  # where robots are not equally fast
+_FIGURES = (
+    *("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m"),
+    "mean_time_s",  # where robots are not equally fast
+)
 
 
 def performed(
@@ -82,8 +84,7 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
             "controller": name,
             "label": run.record.label,
             "gains": dict(run.record.gains),
-            **{figure: run.summary[figure] for figure in _FIGURES},
-            **{figure: run.summary[figure] for figure in _TIMED if figure in run.summary},
+            **{figure: run.summary[figure] for figure in _FIGURES if figure in run.summary},
             "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
             "above_best": run.summary["mean_distance_m"] / best - 1.0,
         }
@@ -92,7 +93,6 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
 
 
 def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
-    """Write which folders belong to the comparison, so that also one that is killed can be read."""
     write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
 
 

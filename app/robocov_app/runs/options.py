@@ -276,12 +276,10 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     @property
     def record_words(self) -> str:
-        """Note on a thinned record, for the command's last line."""
         every = self.record_every
         return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 
     def made_team(self) -> Team:
-        """Return the team that the options describe, or raise InputError."""
         from robocov.robots import LIMITS, Team, read_team
 
         said = {name: getattr(self, name) for name in LIMITS if name != "mass"}

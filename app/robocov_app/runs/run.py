@@ -72,7 +72,6 @@ def saved_run(
     options: RunOptions,
     stop: Interruption,
 ) -> Run:
-    """Simulate and evaluate a run, and save its numbers in a part of a folder."""
     record = simulated(spec, options.record_every, stop, quiet=options.json)
     record.save(result.new / part)
     result.keep()  # what took long is safe, whatever happens to the evaluation

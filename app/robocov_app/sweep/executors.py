@@ -89,7 +89,6 @@ class Executor(ABC):
 
     @property
     def busy(self) -> int:
-        """Number of tasks that have not come back."""
         return self._out + len(self._backlog) + len(self._alone)
 
     @property
@@ -124,7 +123,6 @@ class Executor(ABC):
             self._hand_out(self._alone.popleft())
 
     def _considered(self, task: Task, lost: Lost, together: bool) -> Outcome | None:
-        """Return that a task has failed, None where it is to be done again."""
         self.lost += 1
         self._in_a_row += 1
         if self._in_a_row > max(_IN_A_ROW, 4 * self.most):

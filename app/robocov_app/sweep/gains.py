@@ -194,7 +194,6 @@ def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
 
 
 def once(values: Sequence[object], path: Place) -> None:
-    """Raise ParameterError, with both places, when something is given twice."""
     seen: dict[object, int] = {}
     for k, value in enumerate(values):
         first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)

@@ -55,7 +55,6 @@ class Survey:
     failed: int = 0
 
     def words(self, *, keep_versions: bool) -> list[str]:
-        """Return what people should know before the runs begin, line by line."""
         lines = []
         if self.damaged:
             count, rest = len(self.damaged), len(self.damaged) - _NAMED
@@ -90,7 +89,6 @@ class Ledger:
     def survey(
         self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
     ) -> Survey:
-        """Check all files of all runs; return which are to be done, and why again."""
         found = Survey()
         for task in tasks:
             entry = None

@@ -218,12 +218,10 @@ class Study:
 
     @property
     def swept(self) -> tuple[str, ...]:
-        """The parameters of a team, and the conditions, of which there is more than one value."""
         return tuple(name for name in self.teams[0] if len({team[name] for team in self.teams}) > 1)
 
     @property
     def mixed_speeds(self) -> bool:
-        """Whether some robots of a team are faster than others."""
         return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
@@ -243,7 +241,6 @@ class Study:
         return controller_kind(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of ``study.json``: the whole study, with maps, sources and all gains."""
         return {
             "format": "robocov-study",
             "version": 1,
@@ -390,7 +387,6 @@ class Task:
 
     @property
     def name(self) -> str:
-        """The name of the run's folder."""
         words = (self.map, self.controller.rpartition(":")[2], self.robots, self.start, self.seed)
         return "-".join([*(_fit(str(word)) for word in words), self.digest[:_DIGITS]])
 

@@ -80,7 +80,6 @@ class Teller:
         self._task = None if bar is None else bar.add_task(title, total=count.total, said="", left="")
 
     def __call__(self, count: Count, *, at_once: bool = False) -> None:
-        """Take the count, whenever it has changed or some time has passed."""
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=count.over, said=str(count), left=count.ahead)
             return
@@ -341,7 +340,6 @@ def rehearsed(
 
 
 def axes_of(study: Study) -> dict[str, int]:
-    """Return how many values there are of each thing that a study varies."""
     sizes = {name: len(getattr(study, name)) for name in ("maps", "robots", "teams")}
     sizes["starts"] = sum(len(study.starts_on(each)) for each in study.maps)
     sizes |= {name: len(getattr(study, name)) for name in ("seeds", "controllers")}

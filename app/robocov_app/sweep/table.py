@@ -104,7 +104,6 @@ def gain_column(name: str) -> str:
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
-    """Return the row of a run, by the names of the columns."""
     return {
         **{column.name: getattr(task, column.name) for column in _BEFORE},
         **{gain_column(name): value for name, value in task.gains.items()},

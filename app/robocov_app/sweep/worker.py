@@ -84,7 +84,6 @@ class Performing:
 
 
 def failed(message: str, details: str) -> Outcome:
-    """Return the outcome of a run that failed."""
     # one line of what files can hold, whatever a controller of a user's says
     message = " ".join(message.split()).encode(errors="replace").decode()
     content = {"error": message, "traceback": details}
