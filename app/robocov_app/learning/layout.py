@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robocov.arrays import Array, IntArray
 from robocov.compiled import kernel
 from robocov.controllers.base import cells_seen
-from robocov.errors import ParameterError, checked, shown
+from robocov.errors import ParameterError, checked, required
 from robocov.observation import MOST_RAYS, Observations, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -59,9 +59,7 @@ class ObservationLayout:
     def __post_init__(self) -> None:
         for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
             checked(f"observation.{name}", getattr(self, name), 0, most, whole=True)
-        if not isinstance(self.centroid, bool):
-            told = f"{shown(self.centroid)}, but true or false was wanted"
-            raise ParameterError(f"observation.centroid: {told}")
+        required("observation.centroid", self.centroid, bool, "true or false")
 
     @cached_property
     def blocks(self) -> dict[str, slice]:

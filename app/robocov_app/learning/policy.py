@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.controllers import informed
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import gain, validate_gains
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, required
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
@@ -76,8 +76,7 @@ class PolicyController:
 
     def __post_init__(self) -> None:
         checked_kind("action", self.action, ACTIONS)
-        if not isinstance(self.layout, ObservationLayout):
-            raise ParameterError(f"layout: {shown(self.layout)}, but an ObservationLayout was wanted")
+        required("layout", self.layout, ObservationLayout, "an ObservationLayout")
         validate_gains(self)
 
     def __init_subclass__(cls) -> None:

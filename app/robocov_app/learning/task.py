@@ -12,7 +12,7 @@ from robocov.arrays import Array
 from robocov.conditions import Conditions
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment
-from robocov.errors import ParameterError, checked, counted, shown, unknown_name
+from robocov.errors import ParameterError, checked, counted, required, shown, unknown_name
 from robocov.mapfile import load_map
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
@@ -168,9 +168,7 @@ class Scenarios:
 def map_of(given: object, seed: int) -> Environment:
     """Return a map: itself, that of a name or path, or what somebody's function makes of the seed."""
     source = _source(given, "map")
-    if isinstance(source, Environment):
-        return source
-    environment = source(seed)
+    environment = source if isinstance(source, Environment) else source(seed)
     if not isinstance(environment, Environment):
         raise ParameterError(f"maps: for seed {seed} {shown(environment)}, but an Environment was wanted")
     return environment
@@ -181,9 +179,8 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
         return load_map(given)
     if isinstance(given, Environment) or callable(given):
         return given
-    raise ParameterError(
-        f"{where}: {shown(given)}, but a map, its name or path, or a function from a seed to one was wanted"
-    )
+    wanted = "a map, its name or path, or a function from a seed to one"
+    raise ParameterError(f"{where}: {shown(given)}, but {wanted} was wanted")
 
 
 MOST_ROBOTS = 10_000
@@ -226,24 +223,19 @@ class CoverageTask:
         for name, most in (("robots", MOST_ROBOTS), ("repeat", 100_000), ("reward_every", 100_000)):
             checked(name, getattr(self, name), 1, most, whole=True)
         if not np.isfinite(self.duration) or self.duration < self.period - 5e-7:
-            raise ParameterError(
-                f"duration: {shown(self.duration)} s, but at least the time of one action, "
-                f"{self.period:g} s, was wanted"
-            )
+            wanted = f"at least the time of one action, {self.period:g} s, was wanted"
+            raise ParameterError(f"duration: {shown(self.duration)} s, but {wanted}")
         if not 0.0 <= self.contact_penalty < np.inf:
-            raise ParameterError(
-                f"contact_penalty: {shown(self.contact_penalty)}, but a finite number from 0 was wanted"
-            )
+            found = shown(self.contact_penalty)
+            raise ParameterError(f"contact_penalty: {found}, but a finite number from 0 was wanted")
         checked_kind("reward", self.reward, REWARDS)
         checked_kind("action", self.action, ACTIONS)
         if self.action == "velocity" and self.dt > FOLLOWING:
-            raise ParameterError(
-                f"dt: {self.dt:g} s, but at most {FOLLOWING:g} s was wanted for robots to follow velocities"
-            )
+            wanted = f"at most {FOLLOWING:g} s was wanted for robots to follow velocities"
+            raise ParameterError(f"dt: {self.dt:g} s, but {wanted}")
         for name, kind in (("team", Team), ("observation", ObservationLayout), ("conditions", Conditions)):
-            value = getattr(self, name)
-            if not isinstance(value, kind) and not (value is None and name != "observation"):
-                raise ParameterError(f"{name}: {shown(value)}, but a {kind.__name__} was wanted")
+            if getattr(self, name) is not None or name == "observation":
+                required(name, getattr(self, name), kind, f"a {kind.__name__}")
         if self.conditions is not None:
             self.conditions.check_team(len(self.whole_team))
         object.__setattr__(self, "team", self.whole_team)
@@ -267,10 +259,8 @@ class CoverageTask:
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:
-        return (
-            f"<CoverageTask {counted(self.robots, 'robot')}, {self.duration:g} s, "
-            f"{counted(self.cycles, 'action')}, {self.action}, reward {self.reward}>"
-        )
+        size = f"{counted(self.robots, 'robot')}, {self.duration:g} s, {counted(self.cycles, 'action')}"
+        return f"<CoverageTask {size}, {self.action}, reward {self.reward}>"
 
 
 def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> CoverageTask:

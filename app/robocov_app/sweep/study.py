@@ -17,7 +17,7 @@ from robocov.controllers import controller_kind
 from robocov.controllers.gains import Value
 from robocov.controllers.user_modules import Source, own_modules
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, checked, place, shown, unknown_name
+from robocov.errors import InputError, ParameterError, checked, place, required, shown, unknown_name
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
@@ -177,8 +177,7 @@ class Study:
                 raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
             object.__setattr__(self, "robots", (size,))
         for k, controller in enumerate(self.controllers):
-            if not isinstance(controller, str):
-                raise ParameterError(f"controllers[{k}]: {shown(controller)}, but a text was wanted")
+            required(f"controllers[{k}]", controller, str, "a text")
         for k, each in enumerate(self.maps):
             name = each.name
             if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
@@ -191,8 +190,7 @@ class Study:
         for name, most in (("duration", 1e6), ("dt", 1.0), ("cost_hz", 1e4), ("record_hz", 1e4)):
             object.__setattr__(self, name, checked(name, getattr(self, name), 0.0, most))
         check_dt(self.dt)
-        if not isinstance(self.metrics, bool):
-            raise ParameterError(f"metrics: {shown(self.metrics)}, but true or false was wanted")
+        required("metrics", self.metrics, bool, "true or false")
         for name in ("maps", "controllers", "robots", "seeds"):
             if not getattr(self, name):
                 raise ParameterError(f"{name}: none, but at least one was wanted")
@@ -205,10 +203,8 @@ class Study:
             raise ParameterError(f"runs: {len(self):.3g}, but at most {MOST_RUNS:.0e} were wanted")
         rows = self.duration / self.dt * max(self.robots)
         if rows > MOST_ROWS:
-            raise ParameterError(
-                f"duration: {self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} "
-                f"rows of a record, but at most {MOST_ROWS:.0e} were wanted"
-            )
+            rows_of = f"{self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} rows"
+            raise ParameterError(f"duration: {rows_of} of a record, but at most {MOST_ROWS:.0e} were wanted")
 
     def __len__(self) -> int:
         """Number of runs."""
