@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 from robocov.conditions import UNITS as CONDITION_UNITS
@@ -64,12 +64,11 @@ def parameter_text(name: str, value: TeamValue) -> str:
         return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
     groups = []
     for group in json.loads(str(value)):
-        count = group.pop("count")
-        own = (
-            f"{key.replace('_', ' ')} {each if isinstance(each, str) else f'{each:g}'} {UNITS[key]}"
-            for key, each in group.items()
-        )
-        groups.append(f"{count} {'with ' + ', '.join(own) if group else 'as the rest'}")
+        count, own = group.pop("count"), []
+        for key, each in group.items():
+            text = each if isinstance(each, str) else f"{each:g}"
+            own.append(f"{key.replace('_', ' ')} {text} {UNITS[key]}")
+        groups.append(f"{count} {'with ' + ', '.join(own) if own else 'as the rest'}")
     return "; ".join(groups)
 
 
@@ -96,10 +95,9 @@ def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -
 
 def _condition(name: str, value: object, path: Place) -> TeamValue:
     if name in EVENTS:
-        if not isinstance(value, str):
-            raise ParameterError(f'{place(path)}: {shown(value)}, but a text, as in "3@20", was wanted')
+        required(place(path), value, str, 'a text, as in "3@20",')
         try:
-            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in value.split())
+            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:
             raise ParameterError(f"{place(path)}: {error}") from None
     if name == "message_rate" and value in (None, NO_LIMIT):
@@ -197,8 +195,8 @@ class Study:
             once([item.name for item in self.maps] if name == "maps" else getattr(self, name), (name,))
         self._check_starts()
         object.__setattr__(self, "teams", self._every_team())
-        object.__setattr__(self, "sources", self._read_sources())
-        object.__setattr__(self, "gains", self._every_gain())
+        for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
+            object.__setattr__(self, name, value)
         if len(self) > MOST_RUNS:
             raise ParameterError(f"runs: {len(self):.3g}, but at most {MOST_RUNS:.0e} were wanted")
         rows = self.duration / self.dt * max(self.robots)
@@ -221,17 +219,11 @@ class Study:
         return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
-        gains = self.gains[controller]
-        assert isinstance(gains, Gains)
-        return gains
+        return cast("Gains", self.gains[controller])
 
     def starts_on(self, each: StudyMap) -> tuple[str, ...]:
-        environment = each.environment
-        if not self.starts:
-            return (environment.start().name,)
-        if self.starts == (ALL,):
-            return tuple(environment.starts) or (environment.start().name,)
-        return tuple(self.starts)
+        known = tuple(each.environment.starts) if self.starts == (ALL,) else tuple(self.starts)
+        return known or (each.environment.start().name,)
 
     def kind(self, controller: str) -> type[Any]:
         return controller_kind(controller, source=self.sources.get(controller))
@@ -243,7 +235,7 @@ class Study:
             "runs": len(self),
             "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
             "controllers": [
-                {"name": name, **source_json(self.sources.get(name))} for name in self.controllers
+                {"name": each, **source_json(self.sources.get(each))} for each in self.controllers
             ],
             "gains": {name: asdict(self.gains_of(name)) for name in self.controllers},
             "sampling": None if self.sampling is None else asdict(self.sampling),
@@ -253,23 +245,19 @@ class Study:
             "seeds": list(self.seeds),
             "duration_s": self.duration,
             "dt_s": self.dt,
-            "lattice": self.lattice,
-            "cost_hz": self.cost_hz,
-            "record_hz": self.record_hz,
-            "metrics": self.metrics,
+            **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
 
     def _check_starts(self) -> None:
         once(self.starts, ("starts",))
-        for k, name in enumerate(self.starts if self.starts != (ALL,) else ()):
+        for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
             if name == ALL:
                 beside = "is all of them, so nothing beside it was wanted"
                 raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
-            for each in self.maps:
-                try:
-                    each.environment.start(name)
-                except InputError as error:
-                    raise type(error)(f"starts[{k}]: {error}") from None
+            try:
+                each.environment.start(name)
+            except InputError as error:
+                raise type(error)(f"starts[{k}]: {error}") from None
 
     def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
         names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
@@ -284,40 +272,32 @@ class Study:
             conditions_of(team, 0, robots)
         return teams
 
-    def _read_sources(self) -> dict[str, Source]:
-        sources = {}
-        for k, name in enumerate(self.controllers):
-            file, _, class_name = name.rpartition(":")
-            if not (class_name and file.endswith(".py")):
-                continue
-            path = (self.folder / file).resolve()
-            try:
-                sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
-                raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
-        return sources
-
-    def _every_gain(self) -> dict[str, Gains]:
+    def _controllers(self) -> tuple[dict[str, Source], dict[str, Gains]]:
+        """Return the sources of the users' controllers, and what is tried of each controller."""
         for name in self.gains:
             if name not in self.controllers:
                 known = unknown_name("controller of the study", name, self.controllers)
                 raise ParameterError(f"{place(('gains', name))}: {known}")
-        found = {}
+        sources, gains = {}, {}
         for k, name in enumerate(self.controllers):
+            file, _, class_name = name.rpartition(":")
+            if class_name and file.endswith(".py"):
+                path = (self.folder / file).resolve()
+                try:
+                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
+                except (OSError, ValueError) as error:
+                    reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
+                    raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
             try:
-                kind = self.kind(name)
+                kind = controller_kind(name, source=sources.get(name))
             except ParameterError as error:
                 raise ParameterError(f"controllers[{k}]: {error}") from error
-            if name in self.sources:
-                # now: it may have added folders to sys.path
-                source = self.sources[name]
-                sources = {**self.sources, name: source._replace(modules=own_modules(source.text))}
-                object.__setattr__(self, "sources", sources)
-            found[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
-        if self.sampling is not None and not any(gains.ranges for gains in found.values()):
+            if source := sources.get(name):  # now: it may have added folders to sys.path
+                sources[name] = source._replace(modules=own_modules(source.text))
+            gains[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
+        if self.sampling is not None and not any(each.ranges for each in gains.values()):
             raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
-        return found
+        return sources, gains
 
 
 def source_json(source: Source | None) -> dict[str, Any]:
@@ -335,10 +315,9 @@ def _team_value(name: str, value: object, path: Place) -> TeamValue:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
-    number = float(value)
-    one: dict[str, Any] = {name: number}
+    one: dict[str, Any] = {name: float(value)}
     placed(path, lambda: Team.homogeneous(1, **one))
-    return number
+    return float(value)
 
 
 def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
@@ -350,9 +329,7 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     return Team.homogeneous(robots, **values)
 
 
-_FORMAT = "robocov-task 1"
-"""Version of the digest; that the same inputs give other results is told by `made_with`."""
-
+_FORMAT = "robocov-task 1"  # of the digest; that the same inputs give other results is told by `made_with`
 _SHORT = 24  # characters of each name in the name of a folder
 _DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 
@@ -384,7 +361,9 @@ class Task:
     @property
     def name(self) -> str:
         words = (self.map, self.controller.rpartition(":")[2], self.robots, self.start, self.seed)
-        return "-".join([*(_fit(str(word)) for word in words), self.digest[:_DIGITS]])
+        # what can be a part of a folder's name on any system
+        parts = (re.sub(r"[^A-Za-z0-9_.]+", "-", str(word)).strip(".-")[:_SHORT] or "x" for word in words)
+        return "-".join([*parts, self.digest[:_DIGITS]])
 
 
 def tasks_of(study: Study) -> Iterator[Task]:
@@ -415,12 +394,3 @@ def tasks_of(study: Study) -> Iterator[Task]:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-def _fit(word: str) -> str:
-    """Return a word as it can be a part of a folder's name on any system.
-
-    >>> _fit("Two rooms: a/b")
-    'Two-rooms-a-b'
-    """
-    return re.sub(r"[^A-Za-z0-9_.]+", "-", word).strip(".-")[:_SHORT] or "x"

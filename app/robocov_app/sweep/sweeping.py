@@ -61,6 +61,10 @@ class Count:
         """Estimated time left, or the reason why everything waits."""
         return self.waiting or (f"{duration(self.left)} left" if self.left else "")
 
+    @property
+    def line(self) -> str:
+        return ", ".join(filter(None, (str(self), self.ahead)))
+
     def __str__(self) -> str:
         words = [f"{self.over} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
@@ -74,20 +78,18 @@ class Count:
 class Teller:
     """Tells how far a sweep is: by a bar of rich, in lines now and then, or if `quiet` not at all."""
 
-    def __init__(self, title: str, count: Count, *, quiet: bool = False, bar: Progress | None = None) -> None:
+    def __init__(self, title: str, *, quiet: bool = False, bar: Progress | None = None) -> None:
         self._title, self._quiet, self._bar = title, quiet, bar
         self._said, self._waiting = time.perf_counter(), ""
-        self._task = None if bar is None else bar.add_task(title, total=count.total, said="", left="")
 
-    def __call__(self, count: Count, *, at_once: bool = False) -> None:
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=count.over, said=str(count), left=count.ahead)
-            return
+    def __call__(self, count: Count) -> None:
         now = time.perf_counter()
         due = now - self._said >= PERIOD and not count.waiting  # that is told once
-        if at_once or due or count.waiting != self._waiting:
+        if (bar := self._bar) is not None:
+            bar.update(bar.task_ids[0], completed=count.over, said=str(count), left=count.ahead)
+        elif due or count.waiting != self._waiting:
             self._said, self._waiting = now, count.waiting
-            self.say(", ".join(filter(None, (str(count), count.ahead))))
+            self.say(count.line)
 
     def say(self, line: str) -> None:
         if self._bar is not None:
@@ -100,9 +102,9 @@ class Teller:
 def sweep_progress(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
     """Give what tells of the count: a bar in a terminal, a line now and then elsewhere."""
     if quiet or not sys.stderr.isatty():
-        teller = Teller(title, count, quiet=quiet)
+        teller = Teller(title, quiet=quiet)
         yield teller
-        teller(count, at_once=True)
+        teller.say(count.line)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -110,7 +112,8 @@ def sweep_progress(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]
     words = ("{task.description}", "{task.fields[said]}", "{task.fields[left]}")
     name, said, left = (TextColumn(each, markup=False) for each in words)
     with Progress(name, BarColumn(), said, left, console=Console(stderr=True)) as bar:
-        yield Teller(title, count, bar=bar)
+        bar.add_task(title, total=count.total, said="", left="")
+        yield Teller(title, bar=bar)
 
 
 def duration(seconds: float) -> str:
@@ -126,28 +129,22 @@ def duration(seconds: float) -> str:
     return f"{whole} s"
 
 
-MOST_WORKERS = 1024
-
 _PATIENCE = 0.2  # seconds between two looks at what else there is to do
 _ERRORS = 3  # different errors of runs that are told
 
 
 @dataclass
 class Totals:
-    """Totals of the runs of a study.
-
-    `failed` counts earlier ones too. `errors`: the first different ones, by run. `versions`: how many runs
-    were made with which. `table_replaced`: false where the table would have become shorter.
-    """
+    """Totals of the runs of a study."""
 
     done: int
-    failed: int
+    failed: int  # earlier ones too
     reused: int
     interrupted: bool
-    errors: dict[str, str] = field(default_factory=dict, compare=False)
+    errors: dict[str, str] = field(default_factory=dict, compare=False)  # the first different ones, by run
     damaged: list[str] = field(default_factory=list, compare=False)
-    versions: dict[str, int] = field(default_factory=dict, compare=False)
-    table_replaced: bool = field(default=True, compare=False)
+    versions: dict[str, int] = field(default_factory=dict, compare=False)  # how many were made with which
+    table_replaced: bool = field(default=True, compare=False)  # not where it would have become shorter
 
 
 def sweep(
@@ -171,7 +168,7 @@ def sweep(
     cannot be written; what is done is kept.
     """
     if workers is not None:
-        checked("workers", workers, 1, MOST_WORKERS, whole=True)
+        checked("workers", workers, 1, 1024, whole=True)
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop
@@ -214,16 +211,10 @@ def sweep(
             rows.write(whatever=True)
     if failure is not None:
         raise failure
-    return Totals(
-        done=count.done,
-        failed=count.failed + survey.failed,
-        reused=count.reused - survey.failed,
-        interrupted=count.over < count.total,
-        errors={run: error for error, run in rows.errors.items()},
-        damaged=survey.damaged,
-        versions=dict(rows.versions),
-        table_replaced=table.replaced,
-    )
+    failed, reused = count.failed + survey.failed, count.reused - survey.failed
+    errors = {run: error for error, run in rows.errors.items()}
+    details = errors, survey.damaged, dict(rows.versions), table.replaced
+    return Totals(count.done, failed, reused, count.over < count.total, *details)
 
 
 def worked_off(
@@ -258,9 +249,9 @@ def worked_off(
 class _Rows:
     """Writes the rows of a table in the order of the tasks, whatever the order in which they are finished."""
 
-    def __init__(self, ledger: Ledger, table: Table, tasks: Iterable[tuple[int, Task]]) -> None:
-        self._ledger, self._table, self._tasks = ledger, table, iter(tasks)
-        self._head = next(self._tasks, None)
+    def __init__(self, ledger: Ledger, table: Table, tasks: Iterator[tuple[int, Task]]) -> None:
+        self._ledger, self._table, self._tasks = ledger, table, tasks
+        self._head = next(tasks, None)
         self._finished: set[str] = set()
         self.errors: dict[str, str] = {}
         self.versions: Counter[str] = Counter()
@@ -287,7 +278,7 @@ class _Rows:
         self._table.add(row_of(task, entry))
         if entry.versions:
             self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
-        if entry.error is not None and (entry.error in self.errors or len(self.errors) < _ERRORS):
+        if entry.error is not None and len(self.errors) < _ERRORS:
             self.errors.setdefault(entry.error, task.name)
 
 
@@ -323,20 +314,10 @@ def rehearsed(
     prepared(chosen)  # once for all runs on a map
     began = time.perf_counter()
     outcome = perform(chosen)
-    seconds = time.perf_counter() - began
-    size = sum(map(len, outcome.files.values()))
-    return Rehearsal(
-        runs=len(study),
-        left=left,
-        axes=axes_of(study),
-        run=chosen.name,
-        error=outcome.error,
-        seconds_a_run=seconds,
-        bytes_a_run=size,
-        seconds=seconds * left / max(1, min(workers, left)),
-        bytes=size * len(study),
-        notes=survey.words(keep_versions=keep_versions),
-    )
+    seconds, size = time.perf_counter() - began, sum(map(len, outcome.files.values()))
+    one = axes_of(study), chosen.name, outcome.error, seconds, size
+    every = seconds * left / max(1, min(workers, left)), size * len(study)
+    return Rehearsal(len(study), left, *one, *every, survey.words(keep_versions=keep_versions))
 
 
 def axes_of(study: Study) -> dict[str, int]:
