@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
 from robocov.files.atomic import locked, on_disk
+from robocov.files.result_folder import for_results
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
@@ -66,10 +67,9 @@ class Survey:
         if self.outdated and not keep_versions:
             lines.append("--keep-versions uses them as they are")
         if self.unchecked:
-            lines.append(
-                f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums will "
-                f"be used; damage to their cost curves and trajectories would not be noticed"
-            )
+            runs = f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums"
+            damage = "damage to their cost curves and trajectories would not be noticed"
+            lines.append(f"{runs} will be used; {damage}")
         return lines
 
 
@@ -128,7 +128,7 @@ class Ledger:
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
             raise Damaged from fault
 
-    def keep(self, task: Task, outcome: Outcome) -> Entry:
+    def keep(self, task: Task, outcome: Outcome) -> None:
         """Write the folder of a run, in the place of an earlier one: all of it, or nothing."""
         target = self._runs / task.name
         part = self._runs / f".{task.name}.part"
@@ -149,30 +149,23 @@ class Ledger:
             with suppress(OSError):
                 _remove(part)
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
-        return Entry(outcome.figures, outcome.error, outcome.versions)
 
 
 def difference_of(versions: Mapping[str, str]) -> str:
     """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
-    return ", ".join(
-        f"{name} {versions[name]} instead of {version}"
-        for name, version in made_with().items()
-        if versions.get(name, version) != version
-    )
+    differing = {name: here for name, here in made_with().items() if versions.get(name, here) != here}
+    return ", ".join(f"{name} {versions[name]} instead of {here}" for name, here in differing.items())
 
 
 @contextmanager
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     """Give the ledger of a sweep, for one process at a time; `study` is the content of ``study.json``."""
-    try:
+    with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
         used = any(not path.name.startswith(".") for path in folder.iterdir())
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
     if used and not is_sweep(folder):
-        raise InputError(
-            f"{folder}: the folder is not empty, and what is in it is no sweep; another --out was wanted"
-        )
+        foreign = "the folder is not empty, and what is in it is no sweep"
+        raise InputError(f"{folder}: {foreign}; another --out was wanted")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
     with locked(folder):
@@ -233,7 +226,7 @@ def _check_sum(row: Mapping[str, Any]) -> str:
 
 
 def _remove(path: Path) -> None:
-    if path.is_symlink() or path.is_file():
-        path.unlink()
-    elif path.exists():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
