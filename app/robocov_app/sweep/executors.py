@@ -16,7 +16,6 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from itertools import count
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
@@ -126,10 +125,8 @@ class Executor(ABC):
         self.lost += 1
         self._in_a_row += 1
         if self._in_a_row > max(_IN_A_ROW, 4 * self.most):
-            raise OutputError(
-                f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}; "
-                f"what is done is kept, and the same command goes on"
-            )
+            ends = f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}"
+            raise OutputError(f"{ends}; what is done is kept, and the same command goes on")
         if together and not lost.blamed:
             self._alone.append(task)
             return None
@@ -137,13 +134,11 @@ class Executor(ABC):
         if self._ends[task.name] < _ENDS:
             (self._backlog if lost.blamed else self._alone).appendleft(task)
             return None
-        del self._ends[task.name]
         return failed(lost.cause, lost.details)
 
 
 _STARTS = 3  # how often a process may end before it has begun
 _LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
-
 _OUTSIDE = -getattr(signal, "SIGKILL", 9)
 """The status of a process that was ended from outside: by a user, or because memory ran out."""
 
@@ -239,7 +234,6 @@ def processors() -> int:
 
 
 PATIENCE = 10.0  # seconds that a scheduler has for an answer
-
 _LEAST = 4  # tasks that are handed out to a cluster which has no workers yet
 _LOOK = 2.0  # seconds between two looks at how many workers there are; they may come and go
 
@@ -251,17 +245,21 @@ class Cluster(Executor):
         super().__init__()
         if importlib.util.find_spec("distributed") is None:
             raise InputError('--scheduler: Dask is not installed; pip install "robocov[dask]" was wanted')
-        import distributed
-
-        client: Any = distributed.Client  # it has no types
-        self._address = address
+        dask: Any = importlib.import_module("distributed")  # it has no types
+        self._address, self._killed = address, dask.KilledWorker
         self._futures: set[Any] = set()
-        # a result is that of this sweep alone, whatever else the cluster does
-        self._prefix = f"robocov-{uuid.uuid4().hex[:8]}"
-        self._numbers = count(1)
+
+        async def greet() -> None:
+            """Do as Dask's own client, which would wait for an answer for ever."""
+            arguments = dask.Security().get_connection_args("client")
+            line = await asyncio.wait_for(dask.comm.connect(address, timeout=PATIENCE, **arguments), PATIENCE)
+            await line.close()
+
         try:
-            _require_answer(address)
-            self._client = client(address, timeout=PATIENCE, set_as_default=False)
+            if not address.startswith("inproc://"):  # that is in this process
+                with ThreadPoolExecutor(1) as thread:  # this one may have a loop of events: in a notebook
+                    thread.submit(lambda: asyncio.run(greet())).result()
+            self._client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, TypeError, TimeoutError) as error:
             reason = " ".join(str(error).split()) or f"no answer in {PATIENCE:g} s"
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
@@ -297,41 +295,19 @@ class Cluster(Executor):
         return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _hand_out(self, task: Task) -> None:
-        key = f"{self._prefix}-{next(self._numbers)}"
+        # a result is that of this sweep alone, whatever else the cluster does
+        key = f"robocov-{uuid.uuid4().hex}"
         future: Any = self._client.submit(perform, task, key=key, pure=False)
         self._futures.add(future)
         self._awaited(task, future)
 
     def _result(self, future: Any) -> Outcome | Lost:
-        from distributed import KilledWorker
-
         self._futures.remove(future)
         try:
             return super()._result(future)
-        except KilledWorker as error:
-            # so has every task that waited for the same worker
-            return Lost("the process of its worker ended", str(error), blamed=False)
         except Exception as error:
+            if isinstance(error, self._killed):  # so has every task that waited for the same worker
+                return Lost("the process of its worker ended", str(error), blamed=False)
             reason = getattr(error, "reason", None) or f"{type(error).__name__}: {error}"
             reason = " ".join(str(reason).split())
             raise OutputError(f"--scheduler: {self._address}: the runs cannot go on: {reason}") from error
-
-
-def _require_answer(address: str) -> None:
-    """Greet a scheduler as Dask's own client does, which would wait for an answer for ever."""
-    import distributed
-    from distributed import comm
-
-    if address.startswith("inproc://"):  # it is in this process
-        return
-    security: Any = distributed.Security  # they have no types
-    talk: Any = comm
-
-    async def greet() -> None:
-        arguments = security().get_connection_args("client")
-        line = await asyncio.wait_for(talk.connect(address, timeout=PATIENCE, **arguments), PATIENCE)
-        await line.close()
-
-    # in a notebook, this thread has a loop of events that runs already
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(lambda: asyncio.run(greet())).result()
