@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
@@ -78,15 +79,11 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
 def _overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:
     """Return the median gaps of all entries on all tracks, those first that are ahead on most."""
     gaps = {(each.label, name): each.gap.estimate for name, own in tracks.items() for each in own}
-    ranks: dict[str, list[int]] = {label: [] for label in labels}
-    for ratings in tracks.values():
-        for rank, each in enumerate(ratings):
-            ranks[each.label].append(rank)
+    every = [(each.label, rank) for own in tracks.values() for rank, each in enumerate(own)]
+    ranks = {label: [rank for other, rank in every if other == label] for label in labels}
     order = sorted((label for label in labels if ranks[label]), key=lambda label: np.mean(ranks[label]))
-    rows = [
-        (label, *(number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks))
-        for label in order
-    ]
+    percent = [[number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks] for label in order]
+    rows = [(label, *cells) for label, cells in zip(order, percent, strict=True)]
     heads = (suite.heading(name) for name in tracks)
     return Table("Median gap to the best placement known, %", ("Controller", *heads), rows)
 
@@ -95,16 +92,15 @@ def _section(
     name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> dict[str, Any]:
     track, some = suite.TRACKS[name], ratings[0]
-    runs = len(some.rows) + some.failed
     maps = len({row["map"] for rating in ratings for row in rating.rows})
     head, families = family_rows(ratings)
-    shared = f"{counted(runs, 'run')} on {counted(maps, 'map')}, the same for all entries"
+    runs = f"{counted(len(some.rows) + some.failed, 'run')} on {counted(maps, 'map')}"
     team = f"{counted(track.robots, 'robot')}, {track.duration:g} s"
     rows = [rating_row(each, knows[each.label]) for each in ratings]
     return {
         "name": name,
         "title": suite.heading(name),
-        "summary": f"{track.summary.capitalize()}; {team}. {shared}.",
+        "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
         "table": Table("Ratings", HEAD, rows, frozenset({1})),
         "families": Table("Median gap by families of maps, %", head, families),
         "plots": list(_plots(name, ratings, looks, knows)) if len(ratings) > 1 else [],
@@ -125,11 +121,10 @@ def _plots(
     name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> Iterator[Plot]:
     for axis, (title, label, of) in AXES.items():
-        points = [
-            Point(looks[name], name, of(each), 100.0 * each.gap.estimate, knows[name] != WHOLE)
-            for each in ratings
-            for name in [each.label]
-        ]
+        points = []
+        for each in ratings:
+            x, gap, rival = of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
+            points.append(Point(looks[each.label], each.label, x, gap, rival))
         fine = [point for point in points if np.isfinite((point.x, point.gap)).all()]
         values = [point.x for point in fine]
         # what is the same for all tells nothing
@@ -172,29 +167,21 @@ def pareto_figure(points: Sequence[Point], label: str) -> Figure:
 
 def label_places(marks: Array, points: Sequence[Point]) -> Array:
     """Return where the middles of the labels are, (n, 2) pixels, so that they hide no mark and no label."""
-    taken = [np.concatenate([mark - 6.0, mark + 6.0]) for mark in marks]
-    frame = np.array([0.0, 0.0, *PANEL])
-    middles = []
+    taken = list(shapely.box(*(marks - 6.0).T, *(marks + 6.0).T))
+    frame, middles = shapely.box(0.0, 0.0, *PANEL), []
     for mark, point in zip(marks, points, strict=True):
         half = np.array([0.5 * _LETTER * len(point.label), 0.5 * _LINE])
-        beside, tried = half[0] + _AWAY, []
+        beside, steps = half[0] + _AWAY, []
         for up in (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8):
-            steps = [(beside, up), (-beside, up)] + [(0.0, up)] * (abs(up) > 1.0)
-            tried += [mark + np.array([x, y * _LINE]) for x, y in steps]
-        boxes = [np.concatenate([middle - half, middle + half]) for middle in tried]
-        overlaps = [
-            sum(_shared(box, other) for other in taken) + 1e3 * (half.prod() * 4.0 - _shared(box, frame))
-            for box in boxes
-        ]
-        best = int(np.argmin(np.round(overlaps, 6)))
+            steps += [(beside, up * _LINE), (-beside, up * _LINE)] + [(0.0, up * _LINE)] * (abs(up) > 1.0)
+        tried = mark + np.array(steps)
+        boxes = shapely.box(*(tried - half).T, *(tried + half).T)
+        hidden = shapely.area(shapely.intersection(boxes[:, None], taken)).sum(axis=1)
+        outside = shapely.area(shapely.difference(boxes, frame))
+        best = int(np.argmin(np.round(hidden + 1e3 * outside, 6)))
         taken.append(boxes[best])
         middles.append(tried[best])
     return np.array(middles)
-
-
-def _shared(one: Array, other: Array) -> float:
-    sides = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
-    return float(np.maximum(sides, 0.0).prod())
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
@@ -218,6 +205,5 @@ def _entries(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Tab
         source = f"source {entry['source_sha256'][:12]}" if entry["source_sha256"] else "built in"
         versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
         rows.append((label, entry["controller"], source, gains or "–", versions))
-    return Table(
-        "Entries", ("Controller", "Name", "Code", "Gains", "Made with"), rows, frozenset({1, 2, 3, 4})
-    )
+    head = ("Controller", "Name", "Code", "Gains", "Made with")
+    return Table("Entries", head, rows, frozenset({1, 2, 3, 4}))

@@ -70,8 +70,7 @@ def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
 def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return what each result is called: its controller, the gains that were set, a number for twins."""
     labels: list[str] = []
-    for result in results:
-        entry = result["entry"]
+    for entry in (result["entry"] for result in results):
         changed = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
         label = f"{entry['label']} ({changed})" if changed else str(entry["label"])
         twins = sum(each == label or each.startswith(f"{label} #") for each in labels)
@@ -114,13 +113,15 @@ def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
     runs = str(len(rating.rows)) + (f" (+{rating.failed} failed)" if rating.failed else "")
     if len(gaps) < len(rating.rows):
         runs += f", {len(rating.rows) - len(gaps)} without gap"
-    bounds = rating.values("gap_to_bound")
+    bounds, (share, rest) = rating.values("gap_to_bound"), rating.at_rest()
     surely = f" (≤ {100.0 * float(np.median(bounds)):.1f})" if len(bounds) == len(gaps) > 0 else ""
-    share, rest = rating.at_rest()
-    best = [row["mean_distance_m"] / (1.0 + row["gap"]) for row in rating.rows if row["gap"] is not None]
-    over = [row["mean_distance_over_run_m"] for row in rating.rows if row["gap"] is not None]
+    integrals = [
+        row["mean_distance_over_run_m"] / (row["mean_distance_m"] / (1.0 + row["gap"]))
+        for row in rating.rows
+        if row["gap"] is not None
+    ]
     duration = suite.TRACKS[rating.track].duration
-    integral = float(np.median(np.array(over) / best)) * duration if best else None
+    integral = float(np.median(integrals)) * duration if integrals else None
     touched = sum(row["contacts"] > 0 for row in rating.rows)
     return (
         *(rating.label, knows, runs, number(100.0 * gap.estimate, ".1f") + surely),

@@ -77,14 +77,12 @@ class Track:
 
 
 _FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
+_LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
 
 TRACKS: Mapping[str, Track] = {
     "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
     "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
-    "lossy": Track(
-        "2 messages a second, 0.5 s late, 30 % lost",
-        changes={"conditions": {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}},
-    ),
+    "lossy": Track("2 messages a second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
     "unicycle": Track("robots on two wheels turn before they drive", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
@@ -148,18 +146,15 @@ def suite_map(name: str) -> Environment:
     """Return a map of the suite; raises InputError where it is not the one that was frozen."""
     environment = made_map(name)
     if name not in frozen() or hash_of(environment) != frozen()[name]["sha256"]:
-        raise InputError(
-            f"map {name}: it is not the one of suite {VERSION}: its file or its generator has changed; "
-            f"the map whose hash is in {FILE.name} was wanted"
-        )
+        changed = f"it is not the one of suite {VERSION}: its file or its generator has changed"
+        raise InputError(f"map {name}: {changed}; the map whose hash is in {FILE.name} was wanted")
     return environment
 
 
 def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
     """Return the maps of each track that are wanted, by default all; raises ParameterError."""
-    for name in tracks:
-        if name not in TRACKS:
-            raise ParameterError(f"--track: {unknown_name('track', name, TRACKS)}")
+    if unknown := [name for name in tracks if name not in TRACKS]:
+        raise ParameterError(f"--track: {unknown_name('track', unknown[0], TRACKS)}")
     for name in maps:
         made_map(name)
     found = {}
