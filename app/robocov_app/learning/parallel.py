@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import compress
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -11,10 +11,8 @@ from pettingzoo import ParallelEnv
 
 from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
-from robocov_app.learning.episode import drawn_episode
-from robocov_app.learning.layout import Rows
-from robocov_app.learning.pictures import METADATA, EpisodeEnv
-from robocov_app.learning.task import CoverageTask, action_limit
+from robocov_app.learning.episode import EpisodeEnv, drawn_episode
+from robocov_app.learning.task import CoverageTask, Rows, action_limit
 
 _T = TypeVar("_T")
 Flags: TypeAlias = dict[str, bool]
@@ -29,13 +27,13 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
     `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
 
-    The `options` are those of `robocov_app.learning.pictures.EpisodeEnv`, with changes of the task, as in
+    The `options` are those of `robocov_app.learning.episode.EpisodeEnv`, with changes of the task, as in
     ``CoverageParallelEnv(maps="museum", robots=4)``.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
-    metadata: ClassVar[dict[str, Any]] = METADATA | {"name": "robocov_coverage_v0", "is_parallelizable": True}
+    metadata = EpisodeEnv.metadata | {"name": "robocov_coverage_v0", "is_parallelizable": True}
 
     def __init__(
         self, task: CoverageTask | None = None, *, max_cycles: int | None = None, **options: Any

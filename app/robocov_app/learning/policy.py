@@ -16,8 +16,14 @@ from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov_app.learning.episode import Episode
-from robocov_app.learning.layout import ObservationLayout
-from robocov_app.learning.task import ACTIONS, Action, actions_of, checked_kind, driving_forces
+from robocov_app.learning.task import (
+    ACTIONS,
+    Action,
+    ObservationLayout,
+    actions_of,
+    checked_kind,
+    driving_forces,
+)
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
 """From an observation, (size,), to an action, (2,)."""

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, TypeAlias, get_args
 from robocov.errors import InputError, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.sweep.gains import NO_LIMIT, Method, Place, Range, Sampling, Scale, once
-from robocov_app.sweep.study import ALL, CONDITIONS, MOST_RUNS, TEAM, UNICYCLES, Study, StudyMap
+from robocov_app.sweep import study
+from robocov_app.sweep.study import NO_LIMIT, Method, Place, Range, Sampling, Scale, Study, StudyMap, once
 
 Check: TypeAlias = Callable[[Any], Any]
 """Returns a value as it is meant; raises ValueError when it is of another kind."""
@@ -78,9 +78,9 @@ _STUDY = _Table(
         "metrics": _Value("true or false", _of(bool)),
         "team": _Table(
             "a table [team]",
-            {**dict.fromkeys((*TEAM, *UNICYCLES), _TEAM), "kinematics": _TEXTS, "group": _GROUPS},
+            {**dict.fromkeys((*study.TEAM, *study.UNICYCLES), _TEAM), "kinematics": _TEXTS, "group": _GROUPS},
         ),
-        "conditions": _Table("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
+        "conditions": _Table("a table [conditions]", dict.fromkeys(study.CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
         "sampling": _Table(
             "a table [sampling]",
@@ -142,8 +142,8 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
     try:
         if isinstance(given.get("seeds"), int):
             count = given["seeds"]
-            if not 1 <= count <= MOST_RUNS:
-                wanted = f"a whole number from 1 to {MOST_RUNS}"
+            if not 1 <= count <= study.MOST_RUNS:
+                wanted = f"a whole number from 1 to {study.MOST_RUNS}"
                 raise InputError(f"seeds: {shown(count)}, but {wanted} was wanted")
             given["seeds"] = range(count)
         for name in ("maps", "controllers", "robots", "starts"):
@@ -161,7 +161,7 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
 
 def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
     known = bundled_maps()
-    if entries == [ALL]:
+    if entries == [study.ALL]:
         entries = list(known)
     once(entries, ("maps",))
     maps: dict[str, StudyMap] = {}
