@@ -173,18 +173,17 @@ class Table:
 
     def _write(self, line: str) -> None:
         """Append a line to the CSV file, all of it or nothing, and show the file when it is time."""
+        rest = memoryview(line.encode())
+        size = self._size + len(rest)
         with _told(self._folder / CSV):
-            data = line.encode()
             try:
-                rest = memoryview(data)
                 while rest:
                     rest = rest[self._csv.write(rest) :]
             except OSError:
                 with suppress(OSError):
                     os.ftruncate(self._csv.fileno(), self._size)
                 raise
-            self._size += len(data)
-            self._count += 1
+            self._size, self._count = size, self._count + 1
             if self._count >= self._shown_from:
                 self._csv.close()  # open files cannot be renamed everywhere
                 (self._folder / _CSV_PART).replace(self._folder / CSV)
@@ -238,9 +237,10 @@ def _former_rows(folder: Path) -> tuple[int, bool]:
     """Return how many rows an earlier table has, and whether it may be replaced by one that grows."""
     for name in (CSV, PARQUET):
         writable(folder / name)
+    rows = 0
     with suppress(OSError), (folder / CSV).open("rb") as file:
-        return max(0, sum(1 for _ in file) - 1), not (folder / PARQUET).exists()
-    return 0, not (folder / PARQUET).exists()
+        rows = max(0, sum(1 for _ in file) - 1)
+    return rows, not (folder / PARQUET).exists()
 
 
 def _csv_line(values: Any) -> str:

@@ -5,10 +5,10 @@ import io
 import json
 import threading
 import traceback
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +42,7 @@ TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
 
+_ONE_AT_A_TIME = threading.Lock()
 _RESULTS = 3
 """Counted up whenever the same inputs give other results: 3 since only robots in contact are substepped."""
 
@@ -65,13 +66,23 @@ class Outcome:
 
 
 def perform(task: Task) -> Outcome:
-    """Do a run; what goes wrong in it is a part of the outcome."""
-    with _undisturbed():
+    """Do a run; what goes wrong in it is a part of the outcome.
+
+    No other thread of this process comes near the physics meanwhile, for which pymunk is not made. What runs
+    leave behind is collected here too: another thread would free bodies amid the next run's steps.
+    """
+    with _ONE_AT_A_TIME:
+        enabled = gc.isenabled()
+        gc.disable()
         try:
             return _performed(task)
         except (Exception, SystemExit) as error:
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return failed(message, traceback.format_exc())
+        finally:
+            gc.collect(1)  # what is older than the run is none of its garbage
+            if enabled:
+                gc.enable()
 
 
 class Performing:
@@ -96,18 +107,10 @@ def simulated(task: Task, environment: Environment) -> Record:
 
 def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, float | None]]:
     """Simulate a run, and return the whole of it, and what it took: what ``effort.json`` holds."""
-    spec = RunSpec(
-        environment,
-        task.controller,
-        task.gains,
-        task.source,
-        team_of(task.robots, task.team),
-        task.start,
-        task.seed,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=conditions_of(task.team, task.seed, task.robots),
-    )
+    law, team = (task.controller, task.gains, task.source), team_of(task.robots, task.team)
+    more: dict[str, Any] = {"duration": task.duration, "dt": task.dt}
+    more["conditions"] = conditions_of(task.team, task.seed, task.robots)
+    spec = RunSpec(environment, *law, team, task.start, task.seed, **more)
     with provided(spec.source.modules if spec.source else {}):
         simulation = spec.simulation()
         telling = Telling(simulation)
@@ -162,26 +165,6 @@ def prepared(task: Task) -> tuple[Environment, CoverageCost]:
 def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, CoverageCost]:
     environment = from_json(json.loads(document), name)
     return environment, CoverageCost(environment, lattice)
-
-
-_ONE_AT_A_TIME = threading.Lock()
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let no other thread of this process near the physics, for which pymunk is not made.
-
-    What runs leave behind is collected here too: another thread would free bodies amid the next run's steps.
-    """
-    with _ONE_AT_A_TIME:
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
-            yield
-        finally:
-            gc.collect(1)  # what is older than the run is none of its garbage
-            if enabled:
-                gc.enable()
 
 
 def _performed(task: Task) -> Outcome:
