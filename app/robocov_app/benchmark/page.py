@@ -11,17 +11,8 @@ from matplotlib.ticker import NullLocator
 from robocov import __version__
 from robocov.arrays import Array
 from robocov.errors import ParameterError, counted
-from robocov_app.benchmark import suite
-from robocov_app.benchmark.ratings import (
-    HEAD,
-    NOTES,
-    Rating,
-    family_rows,
-    labels_of,
-    number,
-    rating_row,
-    ratings_of,
-)
+from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.ratings import Rating, number
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import quiet_axes, tone
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
@@ -51,12 +42,12 @@ _SPAN = 8.0  # times that values differ from which on their axis is logarithmic
 
 def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
     """Return the page of some results, a section for each track; same results, same page."""
-    labels = labels_of(results)
+    labels = ratings.labels_of(results)
     looks = dict(zip(labels, styles_of([each["entry"]["controller"] for each in results]), strict=True))
     knows = {label: each["entry"]["information"] for label, each in zip(labels, results, strict=True)}
     tracks = {
-        name: sorted(ratings, key=lambda each: (np.isnan(each.gap.estimate), each.gap.estimate))
-        for name, ratings in ratings_of(results).items()
+        name: sorted(own, key=lambda each: (np.isnan(each.gap.estimate), each.gap.estimate))
+        for name, own in ratings.ratings_of(results).items()
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
@@ -69,8 +60,8 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
         marks=MARKS,
         looks=looks,
         overview=_overview(labels, tracks),
-        tracks=[_section(name, ratings, looks, knows) for name, ratings in tracks.items()],
-        notes=NOTES,
+        tracks=[_section(name, own, looks, knows) for name, own in tracks.items()],
+        notes=ratings.NOTES,
         method=method,
         entries=_entries(results, labels),
     )
@@ -89,21 +80,21 @@ def _overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> 
 
 
 def _section(
-    name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
+    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> dict[str, Any]:
-    track, some = suite.TRACKS[name], ratings[0]
-    maps = len({row["map"] for rating in ratings for row in rating.rows})
-    head, families = family_rows(ratings)
+    track, some = suite.TRACKS[name], own[0]
+    maps = len({row["map"] for rating in own for row in rating.rows})
+    head, families = ratings.family_rows(own)
     runs = f"{counted(len(some.rows) + some.failed, 'run')} on {counted(maps, 'map')}"
     team = f"{counted(track.robots, 'robot')}, {track.duration:g} s"
-    rows = [rating_row(each, knows[each.label]) for each in ratings]
+    rows = [ratings.rating_row(each, knows[each.label]) for each in own]
     return {
         "name": name,
         "title": suite.heading(name),
         "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
-        "table": Table("Ratings", HEAD, rows, frozenset({1})),
+        "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
         "families": Table("Median gap by families of maps, %", head, families),
-        "plots": list(_plots(name, ratings, looks, knows)) if len(ratings) > 1 else [],
+        "plots": list(_plots(name, own, looks, knows)) if len(own) > 1 else [],
     }
 
 
@@ -118,11 +109,11 @@ class Point(NamedTuple):
 
 
 def _plots(
-    name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
+    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> Iterator[Plot]:
     for axis, (title, label, of) in AXES.items():
         points = []
-        for each in ratings:
+        for each in own:
             x, gap, rival = of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
             points.append(Point(looks[each.label], each.label, x, gap, rival))
         fine = [point for point in points if np.isfinite((point.x, point.gap)).all()]

@@ -165,13 +165,10 @@ class Episode:
         self._counted = self._cost.counted(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
-            raise ParameterError(
-                f"lattice: {task.lattice}, but a finer one was wanted for map {environment.name!r}"
-            )
+            wanted = f"a finer one was wanted for map {environment.name!r}"
+            raise ParameterError(f"lattice: {task.lattice}, but {wanted}")
         self.result = self.initial = result
-        self.reference = tasks.reference_distance(
-            environment.free_area - result.uncovered_area, len(self.team)
-        )
+        self.reference = tasks.reference_distance(environment.free_area - result.uncovered_area, n)
         self.trail = [self.positions]
         self._rewarded = 0
         self._scans = self.simulation.observe().scans
@@ -302,9 +299,8 @@ def checked_actions(actions: Any, count: int) -> Array:
         raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")
     if not np.isfinite(array).all():
         robot = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise ParameterError(
-            f"action of robot_{robot + 1}: {shown(array[robot].tolist())}, but finite numbers were wanted"
-        )
+        told = f"{shown(array[robot].tolist())}, but finite numbers were wanted"
+        raise ParameterError(f"action of robot_{robot + 1}: {told}")
     return array
 
 
@@ -373,18 +369,15 @@ class EpisodeEnv:
 
         if self._painter is None or self._painter.environment is not episode.environment:
             self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
-        trail = np.array(episode.trail)
-        scene = Scene.of(
-            episode.environment,
-            episode.team,
-            episode.simulation.snapshot,
-            starts=trail[0],
-            trail=trail,
-            trail_time=np.arange(float(len(trail))) * episode.task.period,
-            label=f"action {episode.cycle} of {episode.task.cycles}",
-            cost=f"mean distance {episode.result.mean_distance:.3f} m",
+        drawn, trail = (
+            (episode.environment, episode.team, episode.simulation.snapshot),
+            np.array(episode.trail),
         )
-        return self._painter, scene
+        ways = {"starts": trail[0], "trail": trail}
+        ways["trail_time"] = np.arange(float(len(trail))) * episode.task.period
+        label = f"action {episode.cycle} of {episode.task.cycles}"
+        cost = f"mean distance {episode.result.mean_distance:.3f} m"
+        return self._painter, Scene.of(*drawn, **ways, label=label, cost=cost)
 
     def _show(self) -> None:
         if self.render_mode != "human":

@@ -15,15 +15,9 @@ from robocov.errors import ParameterError, required
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
+from robocov_app.learning import task as tasks
 from robocov_app.learning.episode import Episode
-from robocov_app.learning.task import (
-    ACTIONS,
-    Action,
-    ObservationLayout,
-    actions_of,
-    checked_kind,
-    driving_forces,
-)
+from robocov_app.learning.task import Action, ObservationLayout, actions_of, driving_forces
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
 """From an observation, (size,), to an action, (2,)."""
@@ -81,7 +75,7 @@ class PolicyController:
     period: float = gain(0.1, "s", "for which an action is held")
 
     def __post_init__(self) -> None:
-        checked_kind("action", self.action, ACTIONS)
+        tasks.checked_kind("action", self.action, tasks.ACTIONS)
         required("layout", self.layout, ObservationLayout, "an ObservationLayout")
         validate_gains(self)
 

@@ -262,9 +262,11 @@ class RunOptions(ScenarioOptions, JsonOption):
             checked("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
+            told = (
+                f"{self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are {rows:.3g} rows"
+            )
             raise ParameterError(
-                f"--record-hz: {self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are "
-                f"{rows:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
+                f"--record-hz: {told} of the record, but at most {MOST_ROWS:.0e} were wanted"
             )
 
     @property
@@ -293,17 +295,9 @@ class RunOptions(ScenarioOptions, JsonOption):
         """Return what is to be run; raises InputError when it cannot be."""
         from robocov_app.runs.spec import RunSpec
 
-        spec = RunSpec(
-            environment,
-            controller,
-            gains,
-            team=self.made_team(),
-            start=self.start,
-            seed=self.seed,
-            duration=self.duration,
-            dt=self.dt,
-            conditions=self.conditions.conditions(self.seed, self.robots),
-        )
+        said: dict[str, Any] = {name: getattr(self, name) for name in ("start", "seed", "duration", "dt")}
+        conditions = self.conditions.conditions(self.seed, self.robots)
+        spec = RunSpec(environment, controller, gains, team=self.made_team(), conditions=conditions, **said)
         spec.check()
         return spec
 

@@ -210,10 +210,8 @@ def once(values: Sequence[object], path: Place) -> None:
     for k, value in enumerate(values):
         first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)
         if first < k:
-            raise ParameterError(
-                f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}; "
-                f"each once was wanted"
-            )
+            told = f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}"
+            raise ParameterError(f"{told}; each once was wanted")
 
 
 TeamValue: TypeAlias = float | str | None
