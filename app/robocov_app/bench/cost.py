@@ -22,16 +22,13 @@ from robocov_app.bench.measure import Call, Case, Row, in_turn
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
 ROBOTS = (6, 50, 200)
-
 GOALS = {
     (128, 200, 50): 0.75, (256, 200, 50): 0.45, (512, 200, 50): 0.25, (256, 1000, 50): 0.9,
     (128, 200, 6): 1.0, (256, 200, 6): 0.65, (512, 200, 6): 0.45,
 }  # fmt: skip
 """Wanted ratios, by lattice, vertices and robots."""
-
 BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
 """Wanted seconds for what is computed once for a map, by lattice and vertices."""
-
 YARDSTICK = "scikit-fmm, order 2"
 
 
@@ -117,7 +114,6 @@ def _marched(cost: CoverageCost, places: Places) -> float:
 # on bundled maps, against the distances that a k-d tree finds: the least that a coverage cost takes
 
 TREE = "k-d tree of the robots"
-
 BEFORE = {
     ("rooms", 64, 6): 4.5, ("rooms", 128, 6): 2.8, ("rooms", 256, 6): 1.7,
     ("rooms", 64, 50): 4.9, ("rooms", 128, 50): 2.4, ("rooms", 256, 50): 1.0,
@@ -128,7 +124,6 @@ BEFORE = {
     ("campus", 64, 1000): 136.8,
 }  # fmt: skip
 """Multiples of the time of the tree, by map, lattice and robots; see `Row.before`."""
-
 FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
 """Wanted speed-ups by lattice; twice that on campus, ten times for 1000 robots."""
 

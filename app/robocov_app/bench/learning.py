@@ -14,9 +14,7 @@ from robocov_app.bench.measure import Case, Row, in_turn
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
 ROBOTS, LATTICE, TOGETHER = 6, 32, 64
-
 SIDE = 20.0  # of the square that the point masses are in, m
-
 YARDSTICK = f"{ROBOTS} point masses, gymnasium"
 
 

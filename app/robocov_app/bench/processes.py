@@ -15,7 +15,6 @@ from robocov_app.sweep.sweeping import sweep
 
 NUMPY = "import numpy"  # the yardstick
 BEFORE = 6.0  # see `Row.before`
-
 MAPS, CONTROLLERS, DURATION, WORKERS = ("rooms", "museum", "campus"), ("rapf", "lloyd"), 20.0, 2
 
 
@@ -43,7 +42,6 @@ def _rows(seeds: int) -> Iterator[Row]:
 # how long a command takes before it does anything
 
 EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
-
 WORDS: dict[str, tuple[str, ...]] = {
     "robocov --help": ("-m", "robocov_app", "--help"),
     "robocov run --help": ("-m", "robocov_app", "run", "--help"),
@@ -52,7 +50,6 @@ WORDS: dict[str, tuple[str, ...]] = {
     "import robocov, all of it": ("-c", EVERYTHING),
 }
 """First actions of a user, with the interpreter's arguments for each."""
-
 GOALS = {"robocov --help": 2.0}
 
 

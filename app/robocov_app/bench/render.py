@@ -21,7 +21,6 @@ from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import png_bytes, save_film
 
 SIZE = (1280, 720)
-
 FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots
 
 

@@ -14,13 +14,10 @@ from robocov_app.bench.measure import Case, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
-
 BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}
 """Ratios before; see `Row.before`."""
-
 TOGETHER, TOGETHER_GOAL = 64, 5.0
 """Runs of six robots that are moved on together, and the wanted multiple of bare physics for each."""
-
 BARE = "bare Space.step"  # the physics engine alone: the same bodies in an empty space
 WARM_UP = 120  # steps before the first that counts: two seconds, by when the team is on its way
 

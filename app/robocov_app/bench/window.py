@@ -20,12 +20,9 @@ from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
 SIZE = (1280, 720)
-
 DRAWING_GOAL, FRAME_GOALS = {50: 4e-3}, {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 """Wanted seconds for the drawing of a frame and for everything that it takes, by number of robots."""
-
 LONGEST = 50e-3  # seconds that no frame may exceed
-
 _CROWD = 100  # from so many robots on they are smaller, so that there is room for them
 
 

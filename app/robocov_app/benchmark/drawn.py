@@ -25,7 +25,6 @@ from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 
 Plan: TypeAlias = tuple[Ring, list[Obstacle]]  # the boundary, and what stands in it
-
 _ORDER = ("homes", "offices", "plants", "traffic", "yards")  # new kinds come last: seeds depend on it
 _ATTEMPTS = 400  # plans that are drawn before a seed counts as impossible
 _PASSAGE = 0.6  # least width of a passage

@@ -30,7 +30,6 @@ AXES: Mapping[str, tuple[str, str, Callable[[Rating], float]]] = {
     "told": ("bytes told", "bytes that a robot tells a second", lambda each: each.rate("told_bytes")),
 }
 """Quantities that the gap is plotted against: title, axis label, and the value of an entry."""
-
 WHOLE = "whole map"  # what those know that are no rivals
 PANEL = 560, 350  # of a plot in pixels: there are many labels
 _POINTS = 72.0  # in an inch

@@ -92,7 +92,6 @@ HEAD = (
     *("Path, m", "Work, J", "Contacts", "At rest", "Rest, s", "B/s", "µs/s"),
 )
 """The columns of a track's table; `NOTES` say what they are."""
-
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "

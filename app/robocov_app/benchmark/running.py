@@ -31,13 +31,11 @@ TRACKS = "tracks"  # folder of the tracks' sweeps
 ORACLE = "oracle"
 _FORMAT = {"format": "robocov-benchmark", "version": 1}
 _ALIKE = 1e-6  # m² by which uncovered areas of the same rooms differ at most
-
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "uncovered_area_m2", "near_final_s", "settled_at_s"),
     *("path_length_m", "work_J", "contacts", "min_clearance_m", "stuck_robots"),
 )
 """The figures of a run that a result holds, beside those of its effort and its gap."""
-
 Row: TypeAlias = dict[str, Any]
 
 

@@ -22,11 +22,9 @@ from robocov_app.sweep.study import Study, StudyMap
 
 VERSION = "v1"
 FILE = Path(__file__).parent / f"suite-{VERSION}.json"
-
 LATTICE = 128  # sites along a side for all costs and references
 RADIUS = 0.1  # m, of the robots
 TEAM = 6
-
 _FIRST = 7001  # seed of the first map of a kind; those of tuning begin at 1
 _BUNDLED = (
     *("blocks-a", "blocks-b", "cave", "corridor", "courtyard", "gaps", "l-shape", "museum", "office"),
@@ -46,7 +44,6 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     **{kind: _numbered(kind, 6) for kind in KINDS if kind != "traffic"},
 }
 """The maps of the ideal track by their families."""
-
 _DRAWN = [kind for kind in FAMILIES if kind != "bundled"]
 _OTHERS: Mapping[str, tuple[str, ...]] = {
     "density": tuple(f"dense-{each}" for kind in _DRAWN for each in _numbered(kind, 1)),
@@ -55,7 +52,6 @@ _OTHERS: Mapping[str, tuple[str, ...]] = {
     "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
 }
 """The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
-
 _CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
@@ -78,7 +74,6 @@ class Track:
 
 _FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
 _LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
-
 TRACKS: Mapping[str, Track] = {
     "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
     "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
@@ -93,7 +88,6 @@ TRACKS: Mapping[str, Track] = {
     "tuning": Track("as ideal, for choosing gains: no result", _OTHERS["tuning"]),
 }
 """The tracks by their names; `RATED` are those that count."""
-
 RATED = tuple(name for name in TRACKS if name != "tuning")
 QUICK = ("ideal", "short-range")
 """The tracks of ``--quick``, of which it takes the first map of each family, with the first seed."""

@@ -54,7 +54,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ControllerPolicy", "CoverageEnv", "CoverageParallelEnv", "CoverageTask", "CoverageVectorEnv"]
 __all__ += ["GeneratedMaps", "ObservationLayout", "PolicyController"]
-
 _HOME = dict.fromkeys(("ControllerPolicy", "PolicyController"), "policy")
 _HOME |= dict.fromkeys(("CoverageEnv", "CoverageVectorEnv"), "gym")
 _HOME |= dict.fromkeys(("CoverageTask", "GeneratedMaps", "ObservationLayout"), "task")

@@ -21,7 +21,6 @@ from robocov_app.learning.task import Action, ObservationLayout, actions_of, dri
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
 """From an observation, (size,), to an action, (2,)."""
-
 _SOON = 5e-7  # seconds that sums of control periods may miss
 
 

@@ -111,7 +111,6 @@ def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: 
 
 MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
 """A map, its name or path, or what makes one of a seed."""
-
 SEEDS = 2**31  # a maker of maps is given a seed below this
 _KEPT = 64  # maps with their costs that are kept at most
 
@@ -190,7 +189,6 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
 
 Rows: TypeAlias = NDArray[np.float32]
 """(n, size): one row for each robot."""
-
 MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
 
 

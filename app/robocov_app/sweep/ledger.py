@@ -23,12 +23,10 @@ RUNS = "runs"  # name of the folder of the runs' folders
 STUDY = "study.json"
 _ROW = "row.json"  # what the table holds of a run, in its folder
 _HEAD = {"format": "robocov-row", "version": 2}
-
 _LEFT_OVER = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
 """Names of what a sweep that was killed has left half-written."""
-
 _NAMED = 5  # damaged runs that are named
 
 

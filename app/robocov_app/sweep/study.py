@@ -32,12 +32,10 @@ from robocov_app.runs.spec import MOST_ROWS
 T = TypeVar("T")
 Scale: TypeAlias = Literal["linear", "log"]
 Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
-
 NO_LIMIT = "null"  # what stands for None where a file has no word for it
 MOST_SAMPLES = 100_000
 _SAMPLE_DIGITS = 6
 """Digits of a sampled gain: more say nothing, and the last ones differ from one processor to the next."""
-
 Place: TypeAlias = tuple[str | int, ...]
 
 
@@ -86,7 +84,6 @@ class Sampling:
 
 Choice: TypeAlias = Mapping[str, Value]
 """A value for every gain of a controller."""
-
 Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
 """Accepted forms of a controller's gains in a study; see `Gains.of`."""
 
@@ -216,15 +213,12 @@ def once(values: Sequence[object], path: Place) -> None:
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
-
 EVENTS = {"fail": Failure, "join": Join}  # conditions that are texts: ``3@20 5@40`` are two in one run
 CONDITIONS = (*LIMITS, *EVENTS)  # the conditions that a study may sweep
 WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
-
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
 """Units of all that may be varied."""
-
 _KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m", "rad/s": "_rad_s"}
 _KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
 """Units in the names of columns."""
@@ -297,16 +291,13 @@ def _condition(name: str, value: object, path: Place) -> TeamValue:
 
 MOST_RUNS = 1_000_000
 ALL = "*"  # stands for all starts of a map
-
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
 UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
 """More of them, with defaults: what is as by default a study does not tell."""
-
 _RANGES = ("sensing_range", "communication_range")  # those that may be without limit
 _LONGEST_NAME = 100
 _HUGE = 1e300  # what a float can hold, with some to spare
-
 Swept: TypeAlias = float | Sequence[float | None] | None
 """One value, or several, each of which is tried."""
 

@@ -31,17 +31,14 @@ from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run
-
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
     *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
 )
 """Figures of a run in the table, in this order."""
-
 TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
-
 _ONE_AT_A_TIME = threading.Lock()
 _RESULTS = 3
 """Counted up whenever the same inputs give other results: 3 since only robots in contact are substepped."""
