@@ -175,11 +175,7 @@ def label_places(marks: Array, points: Sequence[Point]) -> Array:
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return which points no other one beats in both, by their first values.
-
-    >>> pareto_front([(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (2.0, 2.0)])
-    [1, 3, 0]
-    """
+    """Return which points no other one beats in both, by their first values."""
     front: list[int] = []
     for k in sorted(range(len(points)), key=lambda k: points[k]):
         if not front or points[k][1] < points[front[-1]][1]:

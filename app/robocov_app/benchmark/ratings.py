@@ -79,11 +79,7 @@ def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as text, a dash for none.
-
-    >>> number(0.12345), number(None), number(float("nan"))
-    ('0.123', '–', '–')
-    """
+    """Return a number as text, a dash for None and nan."""
     return NOTHING if value is None or not np.isfinite(value) else f"{value:{form}}"
 
 

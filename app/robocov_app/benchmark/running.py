@@ -110,18 +110,11 @@ def reference(name: str, robots: int) -> Mapping[str, Any]:
 
 
 def run_benchmark(
-    contender: Contender,
-    selection: Selection,
-    out: Path,
-    *,
-    stop: Interruption,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    quiet: bool = False,
+    contender: Contender, selection: Selection, out: Path, *, stop: Interruption, **how: Any
 ) -> dict[str, Any] | None:
     """Do all runs that are not done yet, and write ``result.json``; return it, None where it was stopped.
 
-    Raises InputError where the folder holds something else.
+    `how`: as of `sweep`. Raises InputError where the folder holds something else.
     """
     foreign = {path.name for path in out.iterdir()} - {RESULT, TRACKS} if out.is_dir() else set()
     if foreign or (out.exists() and not out.is_dir()):
@@ -130,8 +123,7 @@ def run_benchmark(
     rows: list[Row] = []
     for track, study in studies.items():
         folder = out / TRACKS / track
-        where: dict[str, Any] = {"workers": workers, "scheduler": scheduler}
-        if sweep(study, folder, **where, quiet=quiet, title=track, stop=stop).interrupted:
+        if sweep(study, folder, title=track, stop=stop, **how).interrupted:
             return None
         ledger = Ledger(folder)
         for task in tasks_of(study):
@@ -181,7 +173,7 @@ def method() -> list[str]:
     ]
 
 
-def row_of(track: str, task: Task, entry: Entry, effort: bytes) -> Row:
+def row_of(track: str, task: Task, entry: Entry | Outcome, effort: bytes) -> Row:
     """Return what a result holds of a run, whose ``effort.json`` is the last argument."""
     head: Row = {"track": track, "map": task.map, "seed": task.seed}
     if entry.error is not None:
@@ -277,9 +269,8 @@ def verify(
         raise InputError(f"{path}: --controller: {name} is not the source that was rated: its digest differs")
     found = [f"made with {words}" for words in [difference_of(result["versions"])] if words]
     told = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
-    tasks = {
-        (track, task.map, task.seed): task for track, study in studies.items() for task in tasks_of(study)
-    }
+    every = ((track, task) for track, study in studies.items() for task in tasks_of(study))
+    tasks = {(track, task.map, task.seed): task for track, task in every}
     found += [f"{_where(key)}: no row, but one was wanted" for key in tasks.keys() - told.keys()]
     found += [f"{_where(key)}: a row of a run that was not selected" for key in told.keys() - tasks.keys()]
     for key, row in told.items():
@@ -290,8 +281,7 @@ def verify(
 
     def compare(task: Task, outcome: Outcome) -> None:
         key = again[task.name]
-        entry = Entry(outcome.figures, outcome.error, outcome.versions)
-        row = row_of(key[0], task, entry, outcome.files.get(EFFORT, b"{}"))
+        row = row_of(key[0], task, outcome, outcome.files.get(EFFORT, b"{}"))
         found.extend(_differences(key, told[key], row))
 
     count, runs = Count(len(again)), [tasks[key] for key in again.values()]

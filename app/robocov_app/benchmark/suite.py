@@ -94,11 +94,6 @@ QUICK = ("ideal", "short-range")
 
 
 def heading(track: str) -> str:
-    """Return the name of a track as a heading.
-
-    >>> heading("short-range")
-    'Short range'
-    """
     return track.capitalize().replace("-", " ")
 
 

@@ -69,10 +69,8 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         return self._rows(), reward, ended, over, self._info(outcome.contact)
 
     def _rows(self) -> Rows:
-        episode = self._present()
-        rows = episode.observations()
-        if episode.shared is None:
-            rows[~episode.working] = 0.0
+        rows = self._present().observations()
+        rows[~self._present().working] = 0.0
         return rows
 
     def _info(self, contact: Array) -> dict[str, Any]:

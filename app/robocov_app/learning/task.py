@@ -40,10 +40,6 @@ def action_limit(action: Action, team: Team) -> Array:
     A force of m a + nu v is what it takes to go at the largest speed v and be accelerated by the largest
     acceleration a all the same; what is more has no effect. Larger actions are no mistake: the world limits
     speed and acceleration, for learners as for all controllers.
-
-    >>> from robocov.robots import Team
-    >>> action_limit("force", Team.homogeneous(2))
-    array([4., 4.])
     """
     if action == "velocity":
         return team.max_speed
@@ -81,9 +77,6 @@ def reference_distance(area: float, robots: int) -> float:
     The mean distance to the middle of a disc, 2/3 of its radius, is the least among all shapes of its
     area; with n equal parts of the area A it is ``2/3 sqrt(A / (pi n))``. It makes costs of maps and teams of
     different sizes comparable.
-
-    >>> round(reference_distance(100.0, 6), 3)
-    1.536
     """
     return 2.0 / 3.0 * float(np.sqrt(area / (np.pi * robots)))
 

@@ -36,11 +36,7 @@ FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
 
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Return which row of a record of ascending times, (T,) s, each frame shows, the last one for `hold`, s.
-
-    >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
-    [0, 2, 4]
-    """
+    """Return which row of ascending times, (T,) s, each frame of a film shows, the last one for `hold`, s."""
     count = int(np.ceil(float(time[-1] - time[0]) / speed * fps - 1e-9)) + 1
     at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
     # half a microsecond forgives the rounding of sums of steps

@@ -225,11 +225,7 @@ _KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
 
 
 def parameter_column(name: str) -> str:
-    """Return the name of the column of a parameter of the team, or of a condition.
-
-    >>> parameter_column("max_speed"), parameter_column("delay"), parameter_column("loss")
-    ('max_speed_m_s', 'delay_s', 'loss')
-    """
+    """Return the name of the column of a parameter of the team, or of a condition, as ``max_speed_m_s``."""
     return f"{name}{_KEY_UNITS[UNITS[name]]}"
 
 
