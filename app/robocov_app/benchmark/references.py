@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,14 +25,12 @@ _HEAD = {"format": "robocov-benchmark-suite", "version": suite.VERSION}
 
 
 def wanted_references() -> Iterator[tuple[str, int, float]]:
-    """Yield map, team size and moment (s) of every reference: with obstacles that move, those of the end."""
-    seen = set()
+    """Return map, team size and moment (s) of every reference: with obstacles that move, those of the end."""
+    moments: dict[tuple[str, int], float] = {}
     for track in suite.TRACKS.values():
-        for name in track.maps:
-            for robots in range(track.survivors, track.robots + 1):
-                if (name, robots) not in seen:
-                    seen.add((name, robots))
-                    yield name, robots, track.duration
+        for wanted in product(track.maps, range(track.survivors, track.robots + 1)):
+            moments.setdefault(wanted, track.duration)
+    return ((name, robots, time) for (name, robots), time in moments.items())
 
 
 def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
@@ -45,15 +43,14 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
         own = suite.hash_of(suite.made_map(name))
         if maps.get(name, {}).get("sha256") != own:
             maps[name] = {"sha256": own, "family": suite.family_of(name), "references": {}}
-    wanted = {f"{name} {robots}": (name, str(robots), time) for name, robots, time in wanted_references()}
+    wanted: dict[str, tuple[dict[str, Any], str, Environment]] = {
+        f"{name} {robots}": (maps[name]["references"], str(robots), suite.made_map(name).at(time))
+        for name, robots, time in wanted_references()
+    }
 
     def found(key: str) -> dict[str, Any]:
-        name, robots, _ = wanted[key]
-        return maps[name]["references"].get(robots, {})  # type: ignore[no-any-return]
-
-    def environment(key: str) -> Environment:
-        name, _, time = wanted[key]
-        return suite.made_map(name).at(time)
+        held, robots, _ = wanted[key]
+        return held.get(robots, {})  # type: ignore[no-any-return]
 
     searches = [key for key in wanted if not found(key)]
     bounds = [key for key in wanted if found(key).get("lower_bound_m") is None]
@@ -68,12 +65,12 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
             update(total - left)
 
         how = (suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
-        questions = {key: Question(to_json(environment(key)), int(wanted[key][1]), *how) for key in searches}
+        questions = {key: Question(to_json(wanted[key][2]), int(wanted[key][1]), *how) for key in searches}
         for key, answer in searched(questions, workers, stop) if questions else ():
-            name, robots, _ = wanted[key]
-            maps[name]["references"][robots] = entry_of(environment(key), answer)
+            held, robots, environment = wanted[key]
+            held[robots] = entry_of(environment, answer)
             kept()
-        asked = {key: (to_json(environment(key)), found(key)["positions_m"]) for key in bounds if found(key)}
+        asked = {key: (to_json(wanted[key][2]), found(key)["positions_m"]) for key in bounds if found(key)}
         for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():
             found(key)["lower_bound_m"] = bound
             kept()
@@ -97,7 +94,7 @@ class Bounding:
 def entry_of(environment: Environment, answer: Reference) -> dict[str, Any]:
     """Return what the file holds of a reference: its cost is that of the places as they stand there."""
     places = np.round(answer.positions, _DIGITS)
-    result = _cost(environment)(places)
+    result = CoverageCost(environment, suite.LATTICE)(places)
     return {
         "mean_distance_m": result.mean_distance,
         "uncovered_area_m2": result.uncovered_area,
@@ -105,11 +102,6 @@ def entry_of(environment: Environment, answer: Reference) -> dict[str, Any]:
         "lower_bound_m": None,
         "positions_m": places.tolist(),
     }
-
-
-@lru_cache(2)
-def _cost(environment: Environment) -> CoverageCost:
-    return CoverageCost(environment, suite.LATTICE)
 
 
 def _save(path: Path, maps: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ import json
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -139,13 +140,12 @@ def run_benchmark(
         "entry": contender.facts(next(iter(studies.values()))),
         "versions": made_with(),
         "method": method(),
-        "rows": rows,
     }
-    head = json.dumps({key: value for key, value in result.items() if key != "rows"}, indent=1)
+    head = json.dumps(result, indent=1)
     lines = ",\n".join(json.dumps(row, allow_nan=False) for row in rows)
     with written(out / RESULT) as part:
         part.write_text(f'{head[:-2]},\n "rows": [\n{lines}\n]}}\n', encoding="utf-8")
-    return result
+    return {**result, "rows": rows}
 
 
 def _suite() -> dict[str, str]:
@@ -204,9 +204,8 @@ def read_result(path: Path) -> dict[str, Any]:
     result = parse(data, str(path))
     if not isinstance(result, dict) or {name: result.get(name) for name in _FORMAT} != _FORMAT:
         raise InputError(f"{path}: it is no result of robocov benchmark, which was wanted")
-    if result.get("suite") != _suite():
-        wanted = f"that of {suite.FILE.name} here was wanted"
-        raise InputError(f"{path}: suite: {result.get('suite')}, but {wanted}")
+    if (found := result.get("suite")) != _suite():
+        raise InputError(f"{path}: suite: {found}, but that of {suite.FILE.name} here was wanted")
     parts = {**dict.fromkeys(("entry", "selection", "versions"), dict), "rows": list, "method": list}
     _require(result, parts, path)
     words = {**dict.fromkeys(("controller", "label", "information"), str), "gains": dict, "set": dict}
@@ -224,13 +223,10 @@ def read_result(path: Path) -> dict[str, Any]:
 
 def bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
     """Return the results of the built-in controllers that are none of the others."""
-    given = [_identity(each) for each in others]
+    identity = itemgetter("controller", "set", "source_sha256")
+    given = [identity(each["entry"]) for each in others]
     results = [read_result(path) for path in sorted(ENTRIES.glob("*.json.gz"))]
-    return [result for result in results if _identity(result) not in given]
-
-
-def _identity(result: Mapping[str, Any]) -> list[Any]:
-    return [result["entry"][name] for name in ("controller", "set", "source_sha256")]
+    return [result for result in results if identity(result["entry"]) not in given]
 
 
 def _require(given: Any, kinds: Mapping[str, Any], where: object) -> None:
@@ -261,8 +257,8 @@ def verify(
     name = controller or entry["controller"]
     if entry["source_sha256"] and controller is None and name != "oracle":
         raise InputError(f"{path}: its controller {name} is a file; --controller FILE.py:CLASS was wanted")
-    selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     contender = Contender(name, entry["set"])
+    selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     studies = dict(contender.studies(selection))
     digest = contender.facts(next(iter(studies.values())))["source_sha256"]
     if digest != entry["source_sha256"]:
