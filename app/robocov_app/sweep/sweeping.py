@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
 from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
-from robocov_app.sweep.ledger import Entry, Ledger, difference_of, opened
+from robocov_app.sweep.ledger import Ledger, difference_of, opened
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.worker import Outcome, perform, prepared
@@ -191,13 +191,12 @@ def sweep(
             return LocalPool(min(workers or processors(), sum(survey.todo)))
 
         def keep(task: Task, outcome: Outcome) -> None:
-            difference = difference_of(outcome.versions)
-            if difference and not keep_versions:
-                raise OutputError(
-                    f"a worker has {difference}; the same versions everywhere, or --keep-versions, was wanted"
-                )
+            if (difference := difference_of(outcome.versions)) and not keep_versions:
+                wanted = "the same versions everywhere, or --keep-versions, was wanted"
+                raise OutputError(f"a worker has {difference}; {wanted}")
             ledger.keep(task, outcome)
-            rows.finished(task)
+            rows.finished.add(task.name)
+            rows.write()
 
         failure: RobocovError | None = None
         try:
@@ -225,13 +224,12 @@ def worked_off(
     keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
     """Have tasks done, and keep what comes back; yield whenever the count may have changed."""
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        left = iter(tasks)
-        task = next(left, None)
-        while (task is not None or (executor is not None and executor.busy)) and not stop.requested:
-            if executor is None:
-                executor = stack.enter_context(open_executor())
+    left = iter(tasks)
+    task = next(left, None)
+    if task is None or stop.requested:
+        return
+    with open_executor() as executor:
+        while (task is not None or executor.busy) and not stop.requested:
             while task is not None and not executor.full:
                 executor.submit(task)
                 task = next(left, None)
@@ -252,34 +250,27 @@ class _Rows:
     def __init__(self, ledger: Ledger, table: Table, tasks: Iterator[tuple[int, Task]]) -> None:
         self._ledger, self._table, self._tasks = ledger, table, tasks
         self._head = next(tasks, None)
-        self._finished: set[str] = set()
+        self.finished: set[str] = set()
         self.errors: dict[str, str] = {}
         self.versions: Counter[str] = Counter()
-
-    def finished(self, task: Task) -> None:
-        self._finished.add(task.name)
-        self.write()
 
     def write(self, *, whatever: bool = False) -> None:
         """Write the next rows, up to the first run that is still to be done; or `whatever` is there."""
         while self._head is not None:
             todo, task = self._head
-            if todo and task.name not in self._finished and not whatever:
+            if todo and task.name not in self.finished and not whatever:
                 return
             entry = self._ledger.entry(task)
             if entry is not None:
-                self._add(task, entry)
+                self._table.add(row_of(task, entry))
+                if entry.versions:
+                    self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
+                if entry.error is not None and len(self.errors) < _ERRORS:
+                    self.errors.setdefault(entry.error, task.name)
             elif not whatever:
                 raise OutputError(f"{self._ledger.folder}: {task.name} was removed by somebody else")
-            self._finished.discard(task.name)
+            self.finished.discard(task.name)
             self._head = next(self._tasks, None)
-
-    def _add(self, task: Task, entry: Entry) -> None:
-        self._table.add(row_of(task, entry))
-        if entry.versions:
-            self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
-        if entry.error is not None and len(self.errors) < _ERRORS:
-            self.errors.setdefault(entry.error, task.name)
 
 
 @dataclass(frozen=True)
