@@ -102,10 +102,8 @@ class PolicyController:
         if memory.actions is None or due:
             rows = self.layout.rows(seen, memory.team)
             given = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
-            for action in given:
-                if action.shape != (2,):
-                    told = f"an action of shape {action.shape}, but (2,) was wanted"
-                    raise ParameterError(f"{self.name}: {told}")
+            if wrong := [action.shape for action in given if action.shape != (2,)]:
+                raise ParameterError(f"{self.name}: an action of shape {wrong[0]}, but (2,) was wanted")
             memory = Held(memory.team, np.array(given), seen.time + self.period)
         assert memory.actions is not None
         forces = driving_forces(self.action, memory.actions, seen.velocities, memory.team)

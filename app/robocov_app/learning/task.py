@@ -146,7 +146,7 @@ class Scenarios:
 
     def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
         several = isinstance(maps, Sequence) and not isinstance(maps, str)
-        given: Sequence[Any] = maps if several else (maps,)  # type: ignore[assignment]
+        given: Any = maps if several else (maps,)
         if not given:
             raise ParameterError("maps: none, but at least one was wanted")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]

@@ -262,12 +262,9 @@ class RunOptions(ScenarioOptions, JsonOption):
             checked("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
-            told = (
-                f"{self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are {rows:.3g} rows"
-            )
-            raise ParameterError(
-                f"--record-hz: {told} of the record, but at most {MOST_ROWS:.0e} were wanted"
-            )
+            size = f"{self.duration:g} s of {self.robots} robots are {rows:.3g} rows of the record"
+            wanted = f"at most {MOST_ROWS:.0e} were wanted"
+            raise ParameterError(f"--record-hz: {self.record_hz:g} Hz for {size}, but {wanted}")
 
     @property
     def record_every(self) -> int:
