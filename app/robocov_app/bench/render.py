@@ -13,7 +13,7 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.render.picture import Painter
 from robocov_app.render.scene import record_scene
 from robocov_app.runs.film import iter_frames
@@ -32,18 +32,20 @@ def cases(*, quick: bool = False) -> list[Case]:
 def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
     record = _travelled(name, n)
     painter = Painter(record.environment, SIZE)
-    canvas, empty = pygame.Surface(SIZE), pygame.Surface(SIZE)
+    canvas = pygame.Surface(SIZE)
     scenes = cycle([record_scene(record, k) for k in range(len(record))])
-
-    def clear_and_flip() -> None:
-        empty.fill((255, 255, 255))
-        canvas.blit(empty, (0, 0))
-
-    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": clear_and_flip}
+    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": cleared(canvas)}
     taken = in_turn(calls, 40 if quick else 150)
     frame, bare = taken["frame"], ("clear and flip", taken["bare"])
     goal = FRAME_GOALS.get(n)
     yield Row("render", "one frame", {"robots": n, "map": name}, frame, *bare, goal_seconds=goal)
+
+
+def cleared(canvas: pygame.Surface | None) -> Call:
+    """Return what fills an empty picture and copies it."""
+    assert canvas is not None
+    empty = pygame.Surface(SIZE)
+    return lambda: (empty.fill((255, 255, 255)), canvas.blit(empty, (0, 0)))
 
 
 def _films(quick: bool) -> Iterator[Row]:

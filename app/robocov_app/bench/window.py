@@ -11,6 +11,7 @@ import pygame
 from robocov.cost import LATTICE
 from robocov.mapfile import load_map
 from robocov_app.bench.measure import Call, Case, Row, in_turn
+from robocov_app.bench.render import SIZE, cleared
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import Costs
@@ -19,7 +20,6 @@ from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, Team
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-SIZE = (1280, 720)
 DRAWING_GOAL, FRAME_GOALS = {50: 4e-3}, {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 """Wanted seconds for the drawing of a frame and for everything that it takes, by number of robots."""
 LONGEST = 50e-3  # seconds that no frame may exceed
@@ -43,7 +43,8 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
                 frames, drawing, answers = _played(window, seconds)
         finally:
             viewer.costs.close()
-        bare = in_turn({"bare": _clear_and_flip()}, len(frames))["bare"]
+        clear_and_flip: list[Call] = [cleared(pygame.display.get_surface()), pygame.display.flip]
+        bare = in_turn({"bare": lambda: [call() for call in clear_and_flip]}, len(frames))["bare"]
     for name, took, goal, note in (
         ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
         ("drawing", median(drawing), DRAWING_GOAL.get(n), ""),
@@ -73,15 +74,3 @@ def _played(window: Window, seconds: float) -> tuple[list[float], list[float], i
         drawing.append(done - drawn)
         clock.tick(FPS)
     return frames, drawing, len(curve) - known
-
-
-def _clear_and_flip() -> Call:
-    screen, empty = pygame.display.get_surface(), pygame.Surface(SIZE)
-    assert screen is not None
-
-    def call() -> None:
-        empty.fill((255, 255, 255))
-        screen.blit(empty, (0, 0))
-        pygame.display.flip()
-
-    return call
