@@ -131,10 +131,10 @@ def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
 
 def family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return head and rows of the median gaps, in percent, of each entry by families of maps."""
-    families = list(dict.fromkeys(suite.family_of(row["map"]) for rating in ratings for row in rating.rows))
+    families = list(dict.fromkeys(suite.FAMILY_OF[row["map"]] for rating in ratings for row in rating.rows))
     rows = []
     for rating in ratings:
-        parts = [[row for row in rating.rows if suite.family_of(row["map"]) == family] for family in families]
+        parts = [[row for row in rating.rows if suite.FAMILY_OF[row["map"]] == family] for family in families]
         gaps = (replace(rating, rows=part).median("gap") for part in parts)
         rows.append((rating.label, *(number(100.0 * gap, ".1f") for gap in gaps)))
     return ("Controller", *families), rows

@@ -39,10 +39,10 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
     Whatever ends it, the same call goes on. A map whose hash is not that of the file loses its references.
     """
     maps: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))["maps"] if path.exists() else {}
-    for name in suite.every_map():
+    for name in suite.FAMILY_OF:
         own = suite.hash_of(suite.made_map(name))
         if maps.get(name, {}).get("sha256") != own:
-            maps[name] = {"sha256": own, "family": suite.family_of(name), "references": {}}
+            maps[name] = {"sha256": own, "family": suite.FAMILY_OF[name], "references": {}}
     wanted: dict[str, tuple[dict[str, Any], str, Environment]] = {
         f"{name} {robots}": (maps[name]["references"], str(robots), suite.made_map(name).at(time))
         for name, robots, time in wanted_references()
@@ -108,7 +108,7 @@ def _save(path: Path, maps: Mapping[str, Any]) -> None:
     how = {"lattice": suite.LATTICE, "restarts": RESTARTS, "seed": SEED, "radius_m": suite.RADIUS}
     how["precision"] = PRECISION
     lines = []
-    for name in suite.every_map():
+    for name in suite.FAMILY_OF:
         own = dict(sorted(maps[name]["references"].items(), key=lambda item: int(item[0])))
         lines.append(f"{json.dumps(name)}: {json.dumps({**maps[name], 'references': own})}")
     head = json.dumps({**_HEAD, "search": how})[:-1]

@@ -216,7 +216,7 @@ def read_result(path: Path) -> dict[str, Any]:
     for k, row in enumerate(result["rows"]):
         failed = isinstance(row, dict) and "error" in row
         _require(row, {**place, "error": str} if failed else {**place, **figures}, f"{path}: rows[{k}]")
-        if row["track"] not in suite.TRACKS or row["map"] not in suite.every_map():
+        if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
             raise InputError(f"{path}: rows[{k}]: {row['track']} on {row['map']} is no run of the suite")
     return result
 

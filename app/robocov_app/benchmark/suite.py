@@ -52,6 +52,8 @@ _OTHERS: Mapping[str, tuple[str, ...]] = {
     "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
 }
 """The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
+FAMILY_OF = {name: family for family, names in {**FAMILIES, **_OTHERS}.items() for name in names}
+"""All maps, in the order of the families."""
 _CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
@@ -97,19 +99,11 @@ def heading(track: str) -> str:
     return track.capitalize().replace("-", " ")
 
 
-def family_of(name: str) -> str:
-    return next(family for family, names in {**FAMILIES, **_OTHERS}.items() if name in names)
-
-
-def every_map() -> tuple[str, ...]:
-    return tuple(name for names in (*FAMILIES.values(), *_OTHERS.values()) for name in names)
-
-
 @cache
 def made_map(name: str) -> Environment:
     """Return the map of a name as it is made here and now; raises ParameterError for an unknown one."""
-    if name not in every_map():
-        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, every_map())}")
+    if name not in FAMILY_OF:
+        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, FAMILY_OF)}")
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):
         return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
@@ -150,7 +144,7 @@ def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[s
     for name in tracks or (QUICK if quick else RATED):
         own = TRACKS[name].maps
         if quick and not maps:  # the first of each family
-            own = tuple({family_of(each): each for each in reversed(own)}.values())[::-1]
+            own = tuple({FAMILY_OF[each]: each for each in reversed(own)}.values())[::-1]
         found[name] = tuple(each for each in own if not maps or each in maps)
     if not any(found.values()):
         raise ParameterError(f"--maps: {', '.join(maps)}, but a map of {', '.join(found)} was wanted")
