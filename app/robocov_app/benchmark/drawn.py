@@ -10,17 +10,9 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
+from robocov import environment as world
 from robocov.arrays import Array
-from robocov.environment import (
-    CircleObstacle,
-    DiscStart,
-    Environment,
-    Obstacle,
-    ObstaclePath,
-    PolygonObstacle,
-    Ring,
-    WallObstacle,
-)
+from robocov.environment import CircleObstacle, Environment, Obstacle, PolygonObstacle, Ring, WallObstacle
 from robocov.errors import MapError, ParameterError
 from robocov.mapfile import from_json, to_json
 
@@ -57,7 +49,7 @@ def _accepted(plan: Environment) -> Environment | None:
     if start.is_empty:
         return None
     at = shapely.shortest_line(start, shapely.Point(plan.region.bounds[:2])).coords[0]
-    disc = DiscStart((round(at[0], 2), round(at[1], 2)), _START)
+    disc = world.DiscStart((round(at[0], 2), round(at[1], 2)), _START)
     document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": disc}))
     try:
         return from_json(document, plan.name)
@@ -92,11 +84,8 @@ def _wall_with_door(
 ) -> list[Obstacle]:
     """Return the two pieces of a wall beside its door, upright if `across`; short pieces are left out."""
     pieces = [(begin, door - width / 2.0), (door + width / 2.0, end)]
-    return [
-        WallObstacle(_rounded([(at, a), (at, b)] if across else [(a, at), (b, at)]), _WALL)
-        for a, b in pieces
-        if b - a > 0.15
-    ]
+    ends = [[(at, a), (at, b)] if across else [(a, at), (b, at)] for a, b in pieces if b - a > 0.15]
+    return [WallObstacle(_rounded(each), _WALL) for each in ends]
 
 
 def _home(rng: np.random.Generator) -> Plan:
@@ -190,19 +179,16 @@ def _yard(rng: np.random.Generator) -> Plan:
 
     shapes = [draw() for draw in (*5 * [house], pond, *6 * [hedge], *14 * [tree])]
     land = shapely.Polygon(boundary)
-    inside = [
-        each for each in shapes if land.contains(each.polygon) and land.exterior.distance(each.polygon) > 0.7
-    ]
-    return boundary, _spaced(inside, 0.7)
+    inside = [each for each in shapes if land.contains(each.polygon)]
+    return boundary, _spaced([each for each in inside if land.exterior.distance(each.polygon) > 0.7], 0.7)
 
 
 def _plant(rng: np.random.Generator) -> Plan:
     """Draw a factory hall: rows of racks, machines, a partition with a gate, columns."""
     width, height = rng.uniform(15.0, 19.0), rng.uniform(10.0, 13.0)
     split = width * rng.uniform(0.48, 0.58)
-    obstacles = _wall_with_door(
-        True, split, 0.0, height, rng.uniform(2.0, height - 2.0), rng.uniform(1.4, 2.2)
-    )
+    gate = rng.uniform(2.0, height - 2.0)
+    obstacles = _wall_with_door(True, split, 0.0, height, gate, rng.uniform(1.4, 2.2))
     for y in np.arange(2.0, height - 1.4, rng.uniform(1.9, 2.4)):
         left = rng.uniform(1.2, 2.2)
         obstacles.append(PolygonObstacle(_box(left, y, split - rng.uniform(1.2, 1.8), y + 0.7)))
@@ -228,7 +214,7 @@ def _traffic(rng: np.random.Generator) -> Plan:
             obstacles.append(PolygonObstacle(_box(begin, y, end, y + rng.uniform(0.8, 1.3))))
     for y in (5.7, 9.6, 1.5)[: int(rng.integers(2, 4))]:
         ends = _rounded([(rng.uniform(4.0, 5.0), y), (rng.uniform(11.5, 14.0), y)])
-        path = ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
+        path = world.ObstaclePath(ends, round(rng.uniform(0.2, 0.4), 2), "back-and-forth")
         obstacles.append(CircleObstacle(ends[0], round(rng.uniform(0.3, 0.45), 2), path=path))
     return _box(0.0, 0.0, width, height), obstacles
 

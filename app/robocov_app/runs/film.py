@@ -59,7 +59,10 @@ def iter_frames(
     painter = _painter(record, film, size, layers or standard_layers(film.colours), scale)
     rows = frame_rows(record.time, film.fps, film.film_speed) if rows is None else rows
     for row, shown in groupby(rows.tolist()):
-        text = _cost_text(mean_label(record.environment), float(record.time[row]), cost)
+        text = ""
+        if cost is not None and (known := np.searchsorted(cost.time, record.time[row] + 5e-7, side="right")):
+            mean_time = None if cost.mean_time is None else cost.mean_time[known - 1]
+            text = cost_label(mean_label(record.environment), cost.mean_distance[known - 1], mean_time)
         field = fields if painter.needs_field else None
         frame = painter.frame(record_scene(record, row, cost=text, fields=field))
         yield from (frame for _ in shown)
@@ -71,14 +74,6 @@ def _painter(
     painter = Painter(record.environment, size, film.colour_theme, layers, scale)
     painter.change(*film.layers())
     return painter
-
-
-def _cost_text(what: str, time: float, cost: CostHistory | None) -> str:
-    if cost is None:
-        return ""
-    known = int(np.searchsorted(cost.time, time + 5e-7, side="right")) - 1
-    mean_time = None if cost.mean_time is None else cost.mean_time[known]
-    return cost_label(what, cost.mean_distance[known], mean_time) if known >= 0 else ""
 
 
 class PaneLayout(NamedTuple):

@@ -90,10 +90,6 @@ class Executor(ABC):
     def busy(self) -> int:
         return self._out + len(self._backlog) + len(self._alone)
 
-    @property
-    def full(self) -> bool:
-        return self.busy >= self.most
-
     def submit(self, task: Task) -> None:
         self._backlog.append(task)
         self._feed()

@@ -230,7 +230,7 @@ def worked_off(
         return
     with open_executor() as executor:
         while (task is not None or executor.busy) and not stop.requested:
-            while task is not None and not executor.full:
+            while task is not None and executor.busy < executor.most:
                 executor.submit(task)
                 task = next(left, None)
             back = executor.next(_PATIENCE)
