@@ -369,15 +369,13 @@ class EpisodeEnv:
 
         if self._painter is None or self._painter.environment is not episode.environment:
             self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
-        drawn, trail = (
-            (episode.environment, episode.team, episode.simulation.snapshot),
-            np.array(episode.trail),
-        )
+        drawn, trail = (episode.environment, episode.team), np.array(episode.trail)
         ways = {"starts": trail[0], "trail": trail}
         ways["trail_time"] = np.arange(float(len(trail))) * episode.task.period
         label = f"action {episode.cycle} of {episode.task.cycles}"
         cost = f"mean distance {episode.result.mean_distance:.3f} m"
-        return self._painter, Scene.of(*drawn, **ways, label=label, cost=cost)
+        scene = Scene.of(*drawn, episode.simulation.snapshot, **ways, label=label, cost=cost)
+        return self._painter, scene
 
     def _show(self) -> None:
         if self.render_mode != "human":

@@ -219,14 +219,12 @@ WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
 """Units of all that may be varied."""
-_KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m", "rad/s": "_rad_s"}
-_KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
-"""Units in the names of columns."""
 
 
 def parameter_column(name: str) -> str:
     """Return the name of the column of a parameter of the team, or of a condition, as ``max_speed_m_s``."""
-    return f"{name}{_KEY_UNITS[UNITS[name]]}"
+    unit = UNITS[name].lower().replace("1/", "per ").replace("²", "2")
+    return "_".join([name, *re.findall(r"\w+", unit)])
 
 
 def parameter_text(name: str, value: TeamValue) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
@@ -93,35 +94,24 @@ _STUDY = _Table(
 """Schema of a study file. What is not given is as `Study` has it."""
 
 
-class _Reading:
-    """Takes a document apart; `unknown` keys are told first: a misspelt one is also a missing one."""
-
-    def __init__(self) -> None:
-        self.unknown: list[str] = []
-        self.mistakes: list[str] = []
-
-    def table(self, given: dict[str, Any], table: _Table, path: Place = ()) -> dict[str, Any]:
+def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], mistakes: list[str]) -> Any:
+    """Return what is given as it is meant; `unknown` keys are told first: a misspelt one is also missing."""
+    one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
+    if table is not None and isinstance(given, dict):
         keys = table.keys if "*" not in table.keys else dict.fromkeys(given, table.keys["*"])
         above = f"{place(path)}: " if path else ""
-        self.unknown += [above + unknown_name("key", key, keys) for key in given if key not in keys]
-        for key in table.required:
-            if key not in given:
-                self.mistakes.append(f"{place((*path, key))}: missing, but {keys[key].wanted} was wanted")
-        return {key: self.value(given[key], keys[key], (*path, key)) for key in keys if key in given}
-
-    def value(self, given: Any, wanted: _Value | _Table, path: Place) -> Any:
-        one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
-        if table is not None and isinstance(given, dict):
-            return self.table(given, table, path)
-        if item is not None and isinstance(given, list):
-            return [self.value(value, item, (*path, k)) for k, value in enumerate(given)]
-        try:
-            if one is not None:
-                return one(given)
-        except (ValueError, OverflowError):
-            pass
-        self.mistakes.append(f"{place(path)}: {shown(given)}, but {wanted.wanted} was wanted")
-        return None
+        unknown += [above + unknown_name("key", key, keys) for key in given if key not in keys]
+        missing = {place((*path, key)): keys[key].wanted for key in table.required if key not in given}
+        mistakes += [f"{at}: missing, but {what} was wanted" for at, what in missing.items()]
+        there = [key for key in keys if key in given]
+        return {key: _read(given[key], keys[key], (*path, key), unknown, mistakes) for key in there}
+    if item is not None and isinstance(given, list):
+        return [_read(value, item, (*path, k), unknown, mistakes) for k, value in enumerate(given)]
+    with suppress(ValueError, OverflowError):
+        if one is not None:
+            return one(given)
+    mistakes.append(f"{place(path)}: {shown(given)}, but {wanted.wanted} was wanted")
+    return None
 
 
 def read_study(path: Path | str) -> Study:
@@ -133,10 +123,10 @@ def read_study(path: Path | str) -> Study:
 
 def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
     """Return the study that a parsed file describes; relative paths begin at `folder`."""
-    reading = _Reading()
-    given = reading.table(document, _STUDY)
-    mistakes = reading.unknown + reading.mistakes
-    if mistakes:
+    unknown: list[str] = []
+    mistakes: list[str] = []
+    given = _read(document, _STUDY, (), unknown, mistakes)
+    if mistakes := unknown + mistakes:
         more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
         raise InputError(f"{where}: {mistakes[0]}{more}")
     try:
