@@ -224,9 +224,8 @@ class _Hand:
 
 
 def processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else ()
+    return len(allowed) or os.cpu_count() or 1
 
 
 PATIENCE = 10.0  # seconds that a scheduler has for an answer

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
@@ -18,9 +18,6 @@ from robocov.files.atomic import on_disk, writable
 from robocov_app.sweep.ledger import STUDY, Entry
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 CSV, PARQUET = "results.csv", "results.parquet"
 _CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
@@ -131,11 +128,20 @@ class Table:
         self._size, self._count = 0, -1  # the header is no row
 
     def __enter__(self) -> Table:
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        self._former, grows = _former_rows(self._folder)
-        self._shown_from = self._former if grows else math.inf
-        self._schema = _schema(self._columns)
+        for name in (CSV, PARQUET):
+            writable(self._folder / name)
+        self._former = 0  # rows of an earlier table, which only one that grows replaces before the end
+        with suppress(OSError), (self._folder / CSV).open("rb") as file:
+            self._former = max(0, sum(1 for _ in file) - 1)
+        self._shown_from = math.inf if (self._folder / PARQUET).exists() else self._former
+        fields = (
+            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
+            for name, kind, unit, meaning in self._columns
+        )
+        self._schema = pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
         with ExitStack() as stack:
             for part in (_CSV_PART, _PARQUET_PART):
                 stack.callback((self._folder / part).unlink, missing_ok=True)
@@ -233,28 +239,8 @@ def _told(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def _former_rows(folder: Path) -> tuple[int, bool]:
-    """Return how many rows an earlier table has, and whether it may be replaced by one that grows."""
-    for name in (CSV, PARQUET):
-        writable(folder / name)
-    rows = 0
-    with suppress(OSError), (folder / CSV).open("rb") as file:
-        rows = max(0, sum(1 for _ in file) - 1)
-    return rows, not (folder / PARQUET).exists()
-
-
 def _csv_line(values: Any) -> str:
     """Return a line of CSV; numbers keep all their digits, and null is nothing."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(values)
     return text.getvalue()
-
-
-def _schema(columns: Sequence[Column]) -> pa.Schema:
-    import pyarrow as pa
-
-    fields = [
-        pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
-        for name, kind, unit, meaning in columns
-    ]
-    return pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
