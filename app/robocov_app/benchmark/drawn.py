@@ -5,6 +5,7 @@ Lengths are in metres, and coordinates whole centimetres, which are the same on 
 
 import itertools
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeAlias
 
 import numpy as np
@@ -31,30 +32,27 @@ def drawn_map(kind: str, seed: int) -> Environment:
     Raises ParameterError where there is none.
     """
     for attempt in range(_ATTEMPTS):
-        rng = np.random.default_rng([_ORDER.index(kind), seed, attempt])
-        boundary, obstacles = KINDS[kind](rng)
-        if environment := _accepted(Environment(f"{kind} {seed}", boundary, tuple(obstacles))):
-            return environment
+        boundary, obstacles = KINDS[kind](np.random.default_rng([_ORDER.index(kind), seed, attempt]))
+        plan = Environment(f"{kind} {seed}", boundary, tuple(obstacles))
+        room = plan.free.buffer(-_PASSAGE / 2.0, quad_segs=16)
+        blocked = sum(each.polygon.area for each in plan.obstacles)
+        # a robot would not get everywhere, or there is too little in its way
+        if not (
+            len(plan.free.geoms) == 1 and isinstance(room, shapely.Polygon) and blocked >= _LEAST * plan.area
+        ):
+            continue
+        start = plan.static.free.buffer(-_START - 0.01)
+        if start.is_empty:
+            continue
+        at = shapely.shortest_line(start, shapely.Point(plan.region.bounds[:2])).coords[
+            0
+        ]  # in the lower left
+        disc = world.DiscStart((round(at[0], 2), round(at[1], 2)), _START)
+        document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": disc}))
+        with suppress(MapError):
+            return from_json(document, plan.name)
     none = f"no plan of {_ATTEMPTS} is in one piece"
     raise ParameterError(f"map {kind}-{seed}: {none}; another seed was wanted")
-
-
-def _accepted(plan: Environment) -> Environment | None:
-    """Return the plan with its start in the lower left; None where a robot would not get everywhere."""
-    room = plan.free.buffer(-_PASSAGE / 2.0, quad_segs=16)
-    blocked = sum(each.polygon.area for each in plan.obstacles)
-    if len(plan.free.geoms) != 1 or not isinstance(room, shapely.Polygon) or blocked < _LEAST * plan.area:
-        return None
-    start = plan.static.free.buffer(-_START - 0.01)
-    if start.is_empty:
-        return None
-    at = shapely.shortest_line(start, shapely.Point(plan.region.bounds[:2])).coords[0]
-    disc = world.DiscStart((round(at[0], 2), round(at[1], 2)), _START)
-    document = to_json(Environment(plan.name, plan.boundary, plan.obstacles, {"entry": disc}))
-    try:
-        return from_json(document, plan.name)
-    except MapError:
-        return None
 
 
 def _rounded(points: Array | list[tuple[float, float]]) -> Ring:

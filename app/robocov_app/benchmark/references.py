@@ -13,7 +13,7 @@ from robocov.environment import Environment
 from robocov.files.atomic import written
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
-from robocov_app.replication.references import Question, Reference, searched
+from robocov_app.replication.references import Question, searched
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
 from robocov_app.toolkit.worker import Line
@@ -68,7 +68,15 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
         questions = {key: Question(to_json(wanted[key][2]), int(wanted[key][1]), *how) for key in searches}
         for key, answer in searched(questions, workers, stop) if questions else ():
             held, robots, environment = wanted[key]
-            held[robots] = entry_of(environment, answer)
+            places = np.round(answer.positions, _DIGITS)  # the cost is that of the places as they stand there
+            result = CoverageCost(environment, suite.LATTICE)(places)
+            held[robots] = {
+                "mean_distance_m": result.mean_distance,
+                "uncovered_area_m2": result.uncovered_area,
+                "agreement": answer.agreement,
+                "lower_bound_m": None,
+                "positions_m": places.tolist(),
+            }
             kept()
         asked = {key: (to_json(wanted[key][2]), found(key)["positions_m"]) for key in bounds if found(key)}
         for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():
@@ -89,19 +97,6 @@ class Bounding:
         document, positions = questions[-1]
         how: Any = {"radius": suite.RADIUS, "lattice": suite.LATTICE, "precision": PRECISION}
         return lower_bound(from_json(document), np.array(positions), **how).mean_distance
-
-
-def entry_of(environment: Environment, answer: Reference) -> dict[str, Any]:
-    """Return what the file holds of a reference: its cost is that of the places as they stand there."""
-    places = np.round(answer.positions, _DIGITS)
-    result = CoverageCost(environment, suite.LATTICE)(places)
-    return {
-        "mean_distance_m": result.mean_distance,
-        "uncovered_area_m2": result.uncovered_area,
-        "agreement": answer.agreement,
-        "lower_bound_m": None,
-        "positions_m": places.tolist(),
-    }
 
 
 def _save(path: Path, maps: Mapping[str, Any]) -> None:

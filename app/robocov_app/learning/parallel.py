@@ -1,6 +1,7 @@
 """One learner for each robot: a parallel environment of PettingZoo."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from itertools import compress
 from typing import Any, TypeAlias, TypeVar
 
@@ -9,7 +10,6 @@ from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
 from robocov_app.learning.episode import EpisodeEnv, drawn_episode
 from robocov_app.learning.task import CoverageTask, Rows, action_limit
@@ -78,8 +78,17 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         episode = self._present()
         values = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):
-            if agent in self.agents:
-                values[robot] = _action(actions, agent)
+            if agent not in self.agents:
+                continue
+            if agent not in actions:
+                raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
+            action = np.empty(0)
+            with suppress(TypeError, ValueError):
+                action = np.asarray(actions[agent], dtype=np.float64)
+            if action.shape != (2,) or not np.isfinite(action).all():
+                found = shown(actions[agent])
+                raise ParameterError(f"action of {agent}: {found}, but two finite numbers were wanted")
+            values[robot] = action
         acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(values, last=over)
         self.agents = self._working()
@@ -106,16 +115,3 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         """Return the values of some of the agents, of one for each robot."""
         every = dict(zip(self.possible_agents, values, strict=True))
         return {agent: every[agent] for agent in agents}
-
-
-def _action(actions: Mapping[str, Any], agent: str) -> Array:
-    if agent not in actions:
-        raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
-    try:
-        values = np.asarray(actions[agent], dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape != (2,) or not np.isfinite(values).all():
-        told = f"{shown(actions[agent])}, but two finite numbers were wanted"
-        raise ParameterError(f"action of {agent}: {told}")
-    return values

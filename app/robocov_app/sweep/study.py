@@ -367,7 +367,15 @@ class Study:
             if not getattr(self, name):
                 raise ParameterError(f"{name}: none, but at least one was wanted")
             once([item.name for item in self.maps] if name == "maps" else getattr(self, name), (name,))
-        self._check_starts()
+        once(self.starts, ("starts",))
+        for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
+            if name == ALL:
+                beside = "is all of them, so nothing beside it was wanted"
+                raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
+            try:
+                each.environment.start(name)
+            except InputError as error:
+                raise type(error)(f"starts[{k}]: {error}") from None
         object.__setattr__(self, "teams", self._every_team())
         for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
             object.__setattr__(self, name, value)
@@ -421,17 +429,6 @@ class Study:
             "dt_s": self.dt,
             **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
-
-    def _check_starts(self) -> None:
-        once(self.starts, ("starts",))
-        for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
-            if name == ALL:
-                beside = "is all of them, so nothing beside it was wanted"
-                raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
-            try:
-                each.environment.start(name)
-            except InputError as error:
-                raise type(error)(f"starts[{k}]: {error}") from None
 
     def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
         names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))

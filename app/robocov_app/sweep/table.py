@@ -156,9 +156,28 @@ class Table:
         return self
 
     def __exit__(self, *exception: Any) -> None:
+        """Replace the files of an earlier sweep by those of this one, all after another at once."""
         with self._stack:
-            if exception[0] is None:
-                self._finish()
+            if exception[0] is not None:
+                return
+            self._flush()
+            with _told(self._folder / PARQUET):
+                self._parquet.close()
+            self._csv.close()
+            if not self.complete and self._count < self._former and not self.replaced:
+                return
+            names = {PARQUET: _PARQUET_PART} | ({} if self.replaced else {CSV: _CSV_PART})
+            with _told(self._folder / PARQUET):
+                study = self._folder / STUDY
+                if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
+                    names[STUDY] = ".study.part.json"
+                    (self._folder / names[STUDY]).write_bytes(self._study)
+                grown = [self._folder / CSV] * self.replaced
+                on_disk([self._folder / part for part in names.values()] + grown)
+                for name, part in names.items():
+                    (self._folder / part).replace(self._folder / name)
+                on_disk([self._folder])
+            self.replaced = True
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Append a row; what it does not hold is null."""
@@ -208,26 +227,6 @@ class Table:
     def _close_parquet(self) -> None:
         with suppress(OSError):
             self._parquet.close()
-
-    def _finish(self) -> None:
-        """Replace the files of an earlier sweep by those of this one, all after another at once."""
-        self._flush()
-        with _told(self._folder / PARQUET):
-            self._parquet.close()
-        self._csv.close()
-        if not self.complete and self._count < self._former and not self.replaced:
-            return
-        names = {PARQUET: _PARQUET_PART} | ({} if self.replaced else {CSV: _CSV_PART})
-        with _told(self._folder / PARQUET):
-            study = self._folder / STUDY
-            if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
-                names[STUDY] = ".study.part.json"
-                (self._folder / names[STUDY]).write_bytes(self._study)
-            on_disk([self._folder / part for part in names.values()] + [self._folder / CSV] * self.replaced)
-            for name, part in names.items():
-                (self._folder / part).replace(self._folder / name)
-            on_disk([self._folder])
-        self.replaced = True
 
 
 @contextmanager
