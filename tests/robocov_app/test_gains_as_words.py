@@ -21,7 +21,7 @@ from robocov_app.report.groups import dependences, gain_text
 from robocov_app.report.plots import dependence_plots
 from robocov_app.report.results import gathered
 from robocov_app.report.tables import controllers_table
-from robocov_app.sweep.gains import Gains, Range, Sampling
+from robocov_app.sweep.study import Gains, Range, Sampling
 from robocov_app.sweep.study_file import read_study
 from robocov_app.sweep.sweeping import sweep
 from robocov_app.viewer.session.scenario import ControllerChoice

@@ -4,7 +4,8 @@ Fast marching travels over the same lattice with the same free sites, from the c
 It is not exact and cannot tell whose a site is. The robots move by up to a quarter of a cell between calls.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 from time import perf_counter
@@ -16,32 +17,27 @@ from scipy.spatial import cKDTree
 from robocov.cost import CoverageCost
 from robocov.environment import Environment, PolygonObstacle
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 
 VERTICES = (20, 200, 1000)
 LATTICES = (64, 128, 256, 512)
 ROBOTS = (6, 50, 200)
-
 GOALS = {
     (128, 200, 50): 0.75, (256, 200, 50): 0.45, (512, 200, 50): 0.25, (256, 1000, 50): 0.9,
     (128, 200, 6): 1.0, (256, 200, 6): 0.65, (512, 200, 6): 0.45,
 }  # fmt: skip
 """Wanted ratios, by lattice, vertices and robots."""
-
 BUILD_GOALS = {(128, 200): 0.15, (512, 1000): 8.0}
 """Wanted seconds for what is computed once for a map, by lattice and vertices."""
-
 YARDSTICK = "scikit-fmm, order 2"
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each lattice and number of vertices."""
     sizes = ((128, 200), (256, 200)) if quick else [(n, k) for k in VERTICES for n in LATTICES]
     return [partial(_rows, lattice, vertices, quick) for lattice, vertices in sizes]
 
 
 def has_yardstick() -> bool:
-    """Return whether scikit-fmm is installed."""
     return find_spec("skfmm") is not None
 
 
@@ -64,21 +60,16 @@ def _rows(lattice: int, vertices: int, quick: bool) -> Iterator[Row]:
     begin = perf_counter()
     cost = CoverageCost(environment, lattice)
     built = perf_counter() - begin
-    size: Parameters = {"lattice": lattice, "vertices": vertices}
+    size = {"lattice": lattice, "vertices": vertices}
     yield Row("cost", "built, once a map", size, built, goal_seconds=BUILD_GOALS.get((lattice, vertices)))
     for robots in (6, 50) if quick else ROBOTS:
         if robots > len(cost.points):
             continue
         places = Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {"exact": partial(evaluated, cost, places)}
-        if has_yardstick():
-            calls["marching"] = partial(_marched, cost, places)
-        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
+        exact, *marched = _compared(cost, places, _marched if has_yardstick() else None, quick)
+        row = Row("cost", "evaluated", size | {"robots": robots}, exact)
         goal = GOALS.get((lattice, vertices, robots))
-        yield Row(
-            *("cost", "evaluated", {**size, "robots": robots}, taken["exact"]),
-            *((YARDSTICK, taken["marching"], goal) if "marching" in taken else ()),
-        )
+        yield replace(row, yardstick=YARDSTICK, yardstick_seconds=marched[0], goal=goal) if marched else row
 
 
 class Places:
@@ -87,9 +78,7 @@ class Places:
     def __init__(self, cost: CoverageCost, robots: int) -> None:
         self._rng = np.random.default_rng(1)
         self._start = cost.points[self._rng.choice(len(cost.points), robots, replace=False)]
-        self._step = cost.spacing / 4.0
-        self._geodesics = cost.geodesics
-        self.now = self._start
+        self._step, self._geodesics, self.now = cost.spacing / 4.0, cost.geodesics, self._start
         blocked = np.ones(cost.lattice**2, dtype=bool)
         blocked[cost.cells] = False
         self.blocked = blocked.reshape(cost.lattice, cost.lattice)
@@ -101,9 +90,14 @@ class Places:
         self.now = np.where(free[:, None], places, self._start)
 
 
-def evaluated(cost: CoverageCost, places: Places) -> float:
-    """Return the mean distance, exactly."""
-    return cost(places.now).mean_distance
+def _compared(
+    cost: CoverageCost, places: Places, other: Callable[[CoverageCost, Places], object] | None, quick: bool
+) -> list[float]:
+    """Return the times of the exact cost and of another measure, s, while the robots move."""
+    calls: dict[str, Call] = {"exact": lambda: cost(places.now).mean_distance}
+    if other is not None:
+        calls["other"] = partial(other, cost, places)
+    return list(in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move).values())
 
 
 def _marched(cost: CoverageCost, places: Places) -> float:
@@ -120,7 +114,6 @@ def _marched(cost: CoverageCost, places: Places) -> float:
 # on bundled maps, against the distances that a k-d tree finds: the least that a coverage cost takes
 
 TREE = "k-d tree of the robots"
-
 BEFORE = {
     ("rooms", 64, 6): 4.5, ("rooms", 128, 6): 2.8, ("rooms", 256, 6): 1.7,
     ("rooms", 64, 50): 4.9, ("rooms", 128, 50): 2.4, ("rooms", 256, 50): 1.0,
@@ -131,13 +124,11 @@ BEFORE = {
     ("campus", 64, 1000): 136.8,
 }  # fmt: skip
 """Multiples of the time of the tree, by map, lattice and robots; see `Row.before`."""
-
 FASTER = {64: 4.0, 128: 2.5, 256: 1.7}
 """Wanted speed-ups by lattice; twice that on campus, ten times for 1000 robots."""
 
 
 def map_cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each map and lattice."""
     maps = sorted({(name, lattice) for name, lattice, _ in BEFORE if not quick or lattice == 64})
     return [partial(_on_map, name, lattice, quick) for name, lattice in maps]
 
@@ -145,14 +136,12 @@ def map_cases(*, quick: bool = False) -> list[Case]:
 def _on_map(name: str, lattice: int, quick: bool) -> Iterator[Row]:
     cost = CoverageCost(load_map(name), lattice)
     for robots in [n for known, size, n in BEFORE if (known, size) == (name, lattice)]:
-        places = Places(cost, robots)
-        calls: dict[str, Callable[[], object]] = {
-            "exact": partial(evaluated, cost, places),
-            "tree": lambda: cKDTree(places.now).query(cost.points),  # noqa: B023 - called at once
-        }
-        taken = in_turn(calls, 7, 0.3 if quick else 1.0, before=places.move)
-        before = BEFORE[name, lattice, robots]
+        places, before = Places(cost, robots), BEFORE[name, lattice, robots]
+        exact, tree = _compared(cost, places, _looked_up, quick)
         faster = 10.0 if robots == 1000 else FASTER[lattice] * (2.0 if name == "campus" else 1.0)
-        size: Parameters = {"map": name, "lattice": lattice, "robots": robots}
-        tree = TREE, taken["tree"], before / faster
-        yield Row("maps", "evaluated", size, taken["exact"], *tree, before=before)
+        size: Mapping[str, int | str] = {"map": name, "lattice": lattice, "robots": robots}
+        yield Row("maps", "evaluated", size, exact, TREE, tree, before / faster, before=before)
+
+
+def _looked_up(cost: CoverageCost, places: Places) -> object:
+    return cKDTree(places.now).query(cost.points)

@@ -10,13 +10,11 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Case, Row, in_turn
 from robocov_app.learning import CoverageEnv, CoverageVectorEnv
 
 ROBOTS, LATTICE, TOGETHER = 6, 32, 64
-
 SIDE = 20.0  # of the square that the point masses are in, m
-
 YARDSTICK = f"{ROBOTS} point masses, gymnasium"
 
 
@@ -30,7 +28,6 @@ class PointMasses(gymnasium.Env[Any, Any]):
         self._sites = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 1, 2)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Begin an episode at random places."""
         super().reset(seed=seed)
         self._positions = self.np_random.uniform(0.0, SIDE, (ROBOTS, 2))
         self._velocities = np.zeros((ROBOTS, 2))
@@ -50,7 +47,6 @@ class PointMasses(gymnasium.Env[Any, Any]):
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return the one case: all environments in turn."""
     return [partial(_rows, quick)]
 
 
@@ -70,7 +66,8 @@ def _rows(quick: bool) -> Iterator[Row]:
     # processor time: a step of many is long enough to be interrupted by other programs
     taken = in_turn(calls, 20 if quick else 200, clock=process_time)
     for name, count, goal in (("single", 1, 0.7), ("many", TOGETHER, 4.0)):
-        size: Parameters = {"environments": count}
-        each, yardstick = taken[name] / count, (YARDSTICK, taken["plain"], 1 / goal)
-        rate = f"{taken['plain'] / each:.2f} times its steps a second"
+        each, plain_step = taken[name] / count, taken["plain"]
+        rate = f"{plain_step / each:.2f} times its steps a second"
+        yardstick = YARDSTICK, plain_step, 1 / goal
+        size = {"environments": count}
         yield Row("learning", "a step with reward", size, each, *yardstick, note=rate, before=10.0)

@@ -9,56 +9,43 @@ from time import perf_counter
 from typing import Any, TypeAlias
 
 Call: TypeAlias = Callable[[], object]
-Parameters: TypeAlias = dict[str, int | str]
 Case: TypeAlias = Callable[[], Iterable["Row"]]
-"""Something to measure, which may give several rows."""
+"""Something to measure."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One time, and its yardstick if there is one."""
+    """One median time, and that of its yardstick in the same run if there is one."""
 
     part: str
     name: str
-    parameters: Parameters
-    """Varied quantities, as in ``{"robots": 50}``."""
+    parameters: Mapping[str, int | str]  # what is varied, as in {"robots": 50}
     seconds: float
-    """Median, as of the yardstick in the same run."""
     yardstick: str | None = None
     yardstick_seconds: float | None = None
-    goal: float | None = None
-    """Largest ratio that is wanted,"""
-    goal_seconds: float | None = None
-    """and longest time."""
-    note: str = ""
-    """The time in other words: ``95 x real time``."""
-    before: float | None = None
-    """About the ratio in the last version without compiled kernels (commit 8838167)."""
+    goal: float | None = None  # largest ratio that is wanted
+    goal_seconds: float | None = None  # longest time
+    note: str = ""  # the time in other words: 95 x real time
+    before: float | None = None  # about the ratio when nothing was compiled (commit 8838167)
 
     @property
     def ratio(self) -> float | None:
-        """The time as a multiple of the yardstick's."""
         return None if self.yardstick_seconds is None else self.seconds / self.yardstick_seconds
 
     @property
     def met(self) -> bool | None:
         """Whether what is wanted is reached; None where nothing is."""
-        reached = []
-        if self.goal is not None and self.ratio is not None:
-            reached.append(self.ratio <= self.goal)
-        if self.goal_seconds is not None:
-            reached.append(self.seconds <= self.goal_seconds)
+        limits = ((self.ratio, self.goal), (self.seconds, self.goal_seconds))
+        reached = [value <= goal for value, goal in limits if value is not None and goal is not None]
         return all(reached) if reached else None
 
     @property
     def case(self) -> str:
-        """The parameters in words."""
         words = {"lattice": "{0} x {0}", "map": "{0}"}
         given = self.parameters.items()
         return ", ".join(words.get(name, "{0} " + name).format(value) for name, value in given)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the row as JSON."""
         return asdict(self) | {"ratio": self.ratio, "met": self.met}
 
 

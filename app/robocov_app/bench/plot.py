@@ -5,20 +5,15 @@ from itertools import groupby
 from pathlib import Path
 from typing import cast
 
-import numpy as np
-
 from robocov_app.bench.measure import Row
 from robocov_app.figures.files import plain_style, save_figure
 from robocov_app.figures.page import HEADING, SMALL, TEXT, Page, quiet_axes, tone
 from robocov_app.render.theme import LIGHT, Theme
 
 WIDTH = 1100
-
 ABOVE, ROW, LEFT, RIGHT = 92, 26, 400, 90
 """Pixels: for the title, for a line, for its words, for its value."""
-
 GAP = 66  # pixels between what belongs to one part and the next, for its heading
-
 HEADINGS = {
     "step": "Simulated step", "maps": "Exact coverage cost on maps",
     "cost": "Exact coverage cost among random obstacles", "learning": "Learning environments",
@@ -46,15 +41,13 @@ def save_ratios(rows: Sequence[Row], path: Path, theme: Theme = LIGHT) -> None:
 
 
 def _draw_part(page: Page, heading: str, rows: Sequence[Row], top: float) -> None:
-    """Draw a dot at each ratio and a bar at each goal, a line each."""
     theme = page.theme
     page.text(heading, 24, top + 16, points=TEXT + 1.5, bold=True)
     axes = page.axes((LEFT, top + GAP - 26, WIDTH - LEFT - RIGHT, ROW * len(rows)))
     quiet_axes(axes, theme, grid="x")
     axes.set_xscale("log")
-    ratios = np.array([cast("float", row.ratio) for row in rows])
-    wanted = np.array([row.goal for row in rows if row.goal is not None] + [1.0])
-    low, high = 0.75 * min(ratios.min(), wanted.min()), 1.35 * max(ratios.max(), wanted.max())
+    values = [1.0, *(value for row in rows for value in (row.ratio, row.goal) if value is not None)]
+    low, high = 0.75 * min(values), 1.35 * max(values)
     axes.axvline(1.0, color=tone(theme.faint), linewidth=1)
     for place, row in enumerate(rows):
         ratio, y = cast("float", row.ratio), len(rows) - 1 - place

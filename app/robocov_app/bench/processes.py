@@ -9,17 +9,16 @@ from functools import partial
 from itertools import count
 
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Case, Row, in_turn
 from robocov_app.sweep.study import Study, StudyMap
 from robocov_app.sweep.sweeping import sweep
 
+NUMPY = "import numpy"  # the yardstick
 BEFORE = 6.0  # see `Row.before`
-
 MAPS, CONTROLLERS, DURATION, WORKERS = ("rooms", "museum", "campus"), ("rapf", "lloyd"), 20.0, 2
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return the one case."""
     return [partial(_rows, 1 if quick else 84)]
 
 
@@ -30,23 +29,19 @@ def _rows(seeds: int) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         calls = {
             "sweep": lambda: sweep(study, f"{folder}/{next(folders)}", workers=WORKERS, quiet=True),
-            "numpy": lambda: [subprocess.run([sys.executable, "-c", "import numpy"]) for _ in range(5)],
+            "numpy": lambda: [subprocess.run([sys.executable, "-c", NUMPY]) for _ in range(5)],
         }
         # processor time of all processes: a sweep takes all cores there are
         taken = in_turn(calls, 1, clock=lambda: sum(os.times()[:4]))
-    size: Parameters = {"runs": len(study), "workers": WORKERS}
-    each = taken["sweep"] / len(study)
-    note = f"{WORKERS / each:.1f} runs a second, all cores free"
-    yield Row(
-        *("sweep", f"a run of {DURATION:g} s", size, each, "import numpy", taken["numpy"] / 5),
-        goal=BEFORE / 4, note=note, before=BEFORE,
-    )  # fmt: skip
+    size, each = {"runs": len(study), "workers": WORKERS}, taken["sweep"] / len(study)
+    note, yardstick = f"{WORKERS / each:.1f} runs a second, all cores free", (NUMPY, taken["numpy"] / 5)
+    shown = "sweep", f"a run of {DURATION:g} s", size, each
+    yield Row(*shown, *yardstick, goal=BEFORE / 4, note=note, before=BEFORE)
 
 
 # how long a command takes before it does anything
 
 EVERYTHING = "import robocov\nfor name in robocov.__all__: getattr(robocov, name)"
-
 WORDS: dict[str, tuple[str, ...]] = {
     "robocov --help": ("-m", "robocov_app", "--help"),
     "robocov run --help": ("-m", "robocov_app", "run", "--help"),
@@ -55,14 +50,10 @@ WORDS: dict[str, tuple[str, ...]] = {
     "import robocov, all of it": ("-c", EVERYTHING),
 }
 """First actions of a user, with the interpreter's arguments for each."""
-
 GOALS = {"robocov --help": 2.0}
-
-NUMPY = "import numpy"
 
 
 def start_cases(*, quick: bool = False) -> list[Case]:
-    """Return the one case: all processes in turn."""
     return [partial(_start_rows, quick)]
 
 

@@ -13,20 +13,18 @@ from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.record import Record
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Call, Case, Row, in_turn
 from robocov_app.render.picture import Painter
-from robocov_app.render.scene import Scene
+from robocov_app.render.scene import record_scene
 from robocov_app.runs.film import iter_frames
 from robocov_app.runs.options import FilmOptions
 from robocov_app.runs.recording import png_bytes, save_film
 
 SIZE = (1280, 720)
-
 FRAME_GOALS = {50: 4e-3}  # wanted seconds for a frame, by number of robots
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each size of a team, then one for films and pictures."""
     frames = [partial(_frames, name, n, quick) for name, n in (("rooms", 6), ("rooms", 50), ("campus", 200))]
     return [*frames, partial(_films, quick)]
 
@@ -34,18 +32,20 @@ def cases(*, quick: bool = False) -> list[Case]:
 def _frames(name: str, n: int, quick: bool) -> Iterator[Row]:
     record = _travelled(name, n)
     painter = Painter(record.environment, SIZE)
-    canvas, empty = pygame.Surface(SIZE), pygame.Surface(SIZE)
-    scenes = cycle([_scene_at(record, k) for k in range(len(record))])
-
-    def clear_and_flip() -> None:
-        empty.fill((255, 255, 255))
-        canvas.blit(empty, (0, 0))
-
-    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": clear_and_flip}
+    canvas = pygame.Surface(SIZE)
+    scenes = cycle([record_scene(record, k) for k in range(len(record))])
+    calls = {"frame": lambda: painter.draw(canvas, next(scenes)), "bare": cleared(canvas)}
     taken = in_turn(calls, 40 if quick else 150)
-    size: Parameters = {"robots": n, "map": name}
-    bare = "clear and flip", taken["bare"]
-    yield Row("render", "one frame", size, taken["frame"], *bare, goal_seconds=FRAME_GOALS.get(n))
+    frame, bare = taken["frame"], ("clear and flip", taken["bare"])
+    goal = FRAME_GOALS.get(n)
+    yield Row("render", "one frame", {"robots": n, "map": name}, frame, *bare, goal_seconds=goal)
+
+
+def cleared(canvas: pygame.Surface | None) -> Call:
+    """Return what fills an empty picture and copies it."""
+    assert canvas is not None
+    empty = pygame.Surface(SIZE)
+    return lambda: (empty.fill((255, 255, 255)), canvas.blit(empty, (0, 0)))
 
 
 def _films(quick: bool) -> Iterator[Row]:
@@ -61,19 +61,13 @@ def _films(quick: bool) -> Iterator[Row]:
             "png": lambda: [png_bytes(frame) for frame in frames],
         }
         taken = in_turn(calls, 1 if quick else 3)
-    size: Parameters = {"frames": len(frames)}
     for name, call in (("film encoded", "film"), ("PNGs encoded", "png")):
-        rate = f"{len(frames) / taken[call]:.0f} frames a second"
-        yield Row("render", name, size, taken[call], "drawing the frames", taken["draw"], note=rate)
+        rate, drawn = len(frames) / taken[call], ("drawing the frames", taken["draw"])
+        size = {"frames": len(frames)}
+        yield Row("render", name, size, taken[call], *drawn, note=f"{rate:.0f} frames a second")
 
 
 def _travelled(name: str, n: int) -> Record:
     """Return five seconds of a run, which has trajectories and cells in motion."""
     environment = load_map(name)
     return Simulation(environment, Rapf(), environment.start("uniform").sample(n, seed=0)).run(5.0)
-
-
-def _scene_at(record: Record, k: int) -> Scene:
-    drawn = record.environment, record.team, record.snapshot(k)
-    trail, time = record.positions[: k + 1], record.time[: k + 1]
-    return Scene.of(*drawn, starts=trail[0], trail=trail, trail_time=time, label=record.label)

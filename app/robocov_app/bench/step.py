@@ -1,84 +1,75 @@
 """A whole step (observe, cells, forces, physics) against Qhull's Delaunay triangulation and bare physics."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 import pymunk
 from scipy.spatial import Delaunay
 
-from robocov.arrays import Array
 from robocov.controllers import Rapf
 from robocov.mapfile import load_map
 from robocov.simulation import Simulation
-from robocov_app.bench.measure import Case, Parameters, Row, in_turn
+from robocov_app.bench.measure import Case, Row, in_turn
 
 GOALS = {6: (1.0, 16.0), 50: (0.7, 12.0), 200: (0.5, 9.0), 1000: (0.5, 8.0)}
 """Wanted multiples of the times of the triangulation and of bare physics, by number of robots."""
-
 BEFORE = {6: (4.2, 80.0), 50: (2.6, 57.0), 200: (1.4, 38.0), 1000: (1.0, 31.0)}
 """Ratios before; see `Row.before`."""
-
 TOGETHER, TOGETHER_GOAL = 64, 5.0
 """Runs of six robots that are moved on together, and the wanted multiple of bare physics for each."""
-
 BARE = "bare Space.step"  # the physics engine alone: the same bodies in an empty space
 WARM_UP = 120  # steps before the first that counts: two seconds, by when the team is on its way
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each size of a team that RAPF moves on the large map."""
     return [*(partial(_rows, n, quick) for n in GOALS), partial(_together, quick)]
 
 
 def _rows(n: int, quick: bool) -> Iterator[Row]:
     campus = load_map("campus")
     simulation = Simulation(campus, Rapf(), campus.start("uniform").sample(n, seed=0))
-    for _ in range(WARM_UP):
-        simulation.step()
-    space = _bare_space(simulation.positions)
-    calls: dict[str, Callable[[], object]] = {
-        "step": simulation.step,
-        "delaunay": lambda: Delaunay(simulation.positions),
-        "space": lambda: space.step(simulation.dt),
-    }
-    taken = in_turn(calls, (60 if quick else 300) if n <= 500 else 30 if quick else 100)
+    space = _warmed_up(simulation, n)
+    rounds = (60 if quick else 300) if n <= 500 else 30 if quick else 100
+    taken = in_turn(
+        {
+            "step": simulation.step,
+            "delaunay": lambda: Delaunay(simulation.positions),
+            "space": lambda: space.step(simulation.dt),
+        },
+        rounds,
+    )
     step = taken["step"]
     note = f"{simulation.dt / step:.0f} x real time"
     # six robots 60 times as fast as real ones
     slowest = simulation.dt / 60.0 if n == 6 else None
-    size: Parameters = {"robots": n}
-    triangulated = "Qhull's Delaunay", taken["delaunay"]
+    shown, triangulated = ("step", "one step", {"robots": n}, step), ("Qhull's Delaunay", taken["delaunay"])
     (goal, bare_goal), (before, bare_before) = GOALS[n], BEFORE[n]
-    yield Row("step", "one step", size, step, *triangulated, goal, slowest, note, before)
-    yield Row("step", "one step", size, step, BARE, taken["space"], bare_goal, before=bare_before)
+    yield Row(*shown, *triangulated, goal, slowest, note, before)
+    yield Row(*shown, BARE, taken["space"], bare_goal, before=bare_before)
 
 
 def _together(quick: bool) -> Iterator[Row]:
-    """Measure a step of many runs of six robots, for one of them."""
     campus, n = load_map("campus"), 6
     starts = [campus.start("uniform").sample(n, seed=seed) for seed in range(TOGETHER)]
     simulation = Simulation(campus, Rapf(), np.concatenate(starts), runs=TOGETHER)
-    for _ in range(WARM_UP):
-        simulation.step()
-    space = _bare_space(simulation.positions[:n])
+    space = _warmed_up(simulation, n)
     # as often as there are runs: what one call takes is too short for the clock
     bare = [partial(space.step, simulation.dt)] * TOGETHER
-    calls: dict[str, Callable[[], object]] = {
-        "step": simulation.step,
-        "space": lambda: [call() for call in bare],
-    }
-    taken = in_turn(calls, 60 if quick else 300)
-    size: Parameters = {"robots": n, "runs together": TOGETHER}
-    each, space_each = taken["step"] / TOGETHER, taken["space"] / TOGETHER
-    before = BEFORE[n][1]
-    yield Row("step", "one step of one run", size, each, BARE, space_each, TOGETHER_GOAL, before=before)
+    taken = in_turn(
+        {"step": simulation.step, "space": lambda: [call() for call in bare]}, 60 if quick else 300
+    )
+    size, each = {"robots": n, "runs together": TOGETHER}, taken["step"] / TOGETHER
+    bare_each = BARE, taken["space"] / TOGETHER, TOGETHER_GOAL
+    yield Row("step", "one step of one run", size, each, *bare_each, before=BEFORE[n][1])
 
 
-def _bare_space(positions: Array) -> pymunk.Space:
-    """Return a space with a disc at each place, (n, 2) m, and nothing else."""
+def _warmed_up(simulation: Simulation, n: int) -> pymunk.Space:
+    """Send the team on its way; return a space with discs where its first n robots are, and nothing else."""
+    for _ in range(WARM_UP):
+        simulation.step()
     space = pymunk.Space()
-    for x, y in positions.tolist():
+    for x, y in simulation.positions[:n].tolist():
         body = pymunk.Body(1.0, float("inf"))
         body.position = (x, y)
         space.add(body, pymunk.Circle(body, 0.1))

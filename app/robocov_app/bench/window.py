@@ -10,7 +10,8 @@ import pygame
 
 from robocov.cost import LATTICE
 from robocov.mapfile import load_map
-from robocov_app.bench.measure import Case, Row
+from robocov_app.bench.measure import Call, Case, Row, in_turn
+from robocov_app.bench.render import SIZE, cleared
 from robocov_app.render.picture import standard_layers
 from robocov_app.toolkit.window import FPS, display, undisturbed
 from robocov_app.viewer.costs import Costs
@@ -19,18 +20,13 @@ from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, Team
 from robocov_app.viewer.session.session import Session
 from robocov_app.viewer.window import Window
 
-SIZE = (1280, 720)
-
 DRAWING_GOAL, FRAME_GOALS = {50: 4e-3}, {6: 1 / 60, 50: 1 / 60, 200: 1 / 30, 1000: 1 / 30}
 """Wanted seconds for the drawing of a frame and for everything that it takes, by number of robots."""
-
 LONGEST = 50e-3  # seconds that no frame may exceed
-
 _CROWD = 100  # from so many robots on they are smaller, so that there is room for them
 
 
 def cases(*, quick: bool = False) -> list[Case]:
-    """Return a case for each size of a team."""
     return [partial(_used, n, 4.0 if quick else 15.0) for n in (6, 50, 200, 1000)]
 
 
@@ -47,7 +43,8 @@ def _used(n: int, seconds: float) -> Iterator[Row]:
                 frames, drawing, answers = _played(window, seconds)
         finally:
             viewer.costs.close()
-        bare = _bare(len(frames))
+        clear_and_flip: list[Call] = [cleared(pygame.display.get_surface()), pygame.display.flip]
+        bare = in_turn({"bare": lambda: [call() for call in clear_and_flip]}, len(frames))["bare"]
     for name, took, goal, note in (
         ("all of a frame", median(frames), FRAME_GOALS[n], f"{answers / seconds:.0f} costs a second"),
         ("drawing", median(drawing), DRAWING_GOAL.get(n), ""),
@@ -77,18 +74,3 @@ def _played(window: Window, seconds: float) -> tuple[list[float], list[float], i
         drawing.append(done - drawn)
         clock.tick(FPS)
     return frames, drawing, len(curve) - known
-
-
-def _bare(rounds: int) -> float:
-    """Return what filling, copying and flipping an empty window takes."""
-    screen = pygame.display.get_surface()
-    assert screen is not None
-    empty = pygame.Surface(SIZE)
-    taken = []
-    for _ in range(rounds):
-        began = perf_counter()
-        empty.fill((255, 255, 255))
-        screen.blit(empty, (0, 0))
-        pygame.display.flip()
-        taken.append(perf_counter() - began)
-    return median(taken)

@@ -4,23 +4,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from robocov import __version__
 from robocov.arrays import Array
 from robocov.errors import ParameterError, counted
-from robocov_app.benchmark import suite
-from robocov_app.benchmark.ratings import (
-    HEAD,
-    NOTES,
-    Rating,
-    family_rows,
-    labels_of,
-    number,
-    rating_row,
-    ratings_of,
-)
+from robocov_app.benchmark import ratings, suite
+from robocov_app.benchmark.ratings import Rating, number
 from robocov_app.figures.files import plain_style
 from robocov_app.figures.page import quiet_axes, tone
 from robocov_app.figures.styles import MARKS, CurveStyle, styles_of
@@ -33,12 +25,11 @@ from robocov_app.report.tables import Table
 from robocov_app.report.theme_css import theme_rules
 
 AXES: Mapping[str, tuple[str, str, Callable[[Rating], float]]] = {
-    "path": ("way", "mean way of a robot (m)", lambda rating: rating.path),
-    "computing": ("computing time", "µs for a robot-second", lambda rating: 1e6 * rating.computing),
-    "told": ("bytes told", "bytes that a robot tells a second", lambda rating: rating.told),
+    "path": ("way", "mean way of a robot (m)", lambda each: each.median("path_length_m")),
+    "computing": ("computing time", "µs for a robot-second", lambda each: 1e6 * each.rate("deciding_s")),
+    "told": ("bytes told", "bytes that a robot tells a second", lambda each: each.rate("told_bytes")),
 }
 """Quantities that the gap is plotted against: title, axis label, and the value of an entry."""
-
 WHOLE = "whole map"  # what those know that are no rivals
 PANEL = 560, 350  # of a plot in pixels: there are many labels
 _POINTS = 72.0  # in an inch
@@ -50,12 +41,12 @@ _SPAN = 8.0  # times that values differ from which on their axis is logarithmic
 
 def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
     """Return the page of some results, a section for each track; same results, same page."""
-    labels = labels_of(results)
+    labels = ratings.labels_of(results)
     looks = dict(zip(labels, styles_of([each["entry"]["controller"] for each in results]), strict=True))
     knows = {label: each["entry"]["information"] for label, each in zip(labels, results, strict=True)}
     tracks = {
-        name: sorted(ratings, key=lambda each: (np.isnan(each.gap.estimate), each.gap.estimate))
-        for name, ratings in ratings_of(results).items()
+        name: sorted(own, key=lambda each: (np.isnan(each.gap.estimate), each.gap.estimate))
+        for name, own in ratings.ratings_of(results).items()
     }
     if not tracks:
         raise ParameterError("DIR: the results have no run in common, so there is nothing to compare")
@@ -68,8 +59,8 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
         marks=MARKS,
         looks=looks,
         overview=_overview(labels, tracks),
-        tracks=[_section(name, ratings, looks, knows) for name, ratings in tracks.items()],
-        notes=NOTES,
+        tracks=[_section(name, own, looks, knows) for name, own in tracks.items()],
+        notes=ratings.NOTES,
         method=method,
         entries=_entries(results, labels),
     )
@@ -78,36 +69,31 @@ def page_of(results: Sequence[Mapping[str, Any]], title: str) -> str:
 def _overview(labels: Sequence[str], tracks: Mapping[str, Sequence[Rating]]) -> Table:
     """Return the median gaps of all entries on all tracks, those first that are ahead on most."""
     gaps = {(each.label, name): each.gap.estimate for name, own in tracks.items() for each in own}
-    ranks: dict[str, list[int]] = {label: [] for label in labels}
-    for ratings in tracks.values():
-        for rank, each in enumerate(ratings):
-            ranks[each.label].append(rank)
+    every = [(each.label, rank) for own in tracks.values() for rank, each in enumerate(own)]
+    ranks = {label: [rank for other, rank in every if other == label] for label in labels}
     order = sorted((label for label in labels if ranks[label]), key=lambda label: np.mean(ranks[label]))
-    rows = [
-        (label, *(number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks))
-        for label in order
-    ]
+    percent = [[number(100.0 * gaps.get((label, name), np.nan), ".1f") for name in tracks] for label in order]
+    rows = [(label, *cells) for label, cells in zip(order, percent, strict=True)]
     heads = (suite.heading(name) for name in tracks)
     return Table("Median gap to the best placement known, %", ("Controller", *heads), rows)
 
 
 def _section(
-    name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
+    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> dict[str, Any]:
-    track, some = suite.TRACKS[name], ratings[0]
-    runs = len(some.rows) + some.failed
-    maps = len({row["map"] for rating in ratings for row in rating.rows})
-    head, families = family_rows(ratings)
-    shared = f"{counted(runs, 'run')} on {counted(maps, 'map')}, the same for all entries"
+    track, some = suite.TRACKS[name], own[0]
+    maps = len({row["map"] for rating in own for row in rating.rows})
+    head, families = ratings.family_rows(own)
+    runs = f"{counted(len(some.rows) + some.failed, 'run')} on {counted(maps, 'map')}"
     team = f"{counted(track.robots, 'robot')}, {track.duration:g} s"
-    rows = [rating_row(each, knows[each.label]) for each in ratings]
+    rows = [ratings.rating_row(each, knows[each.label]) for each in own]
     return {
         "name": name,
         "title": suite.heading(name),
-        "summary": f"{track.summary.capitalize()}; {team}. {shared}.",
-        "table": Table("Ratings", HEAD, rows, frozenset({1})),
+        "summary": f"{track.summary.capitalize()}; {team}. {runs}, the same for all entries.",
+        "table": Table("Ratings", ratings.HEAD, rows, frozenset({1})),
         "families": Table("Median gap by families of maps, %", head, families),
-        "plots": list(_plots(name, ratings, looks, knows)) if len(ratings) > 1 else [],
+        "plots": list(_plots(name, own, looks, knows)) if len(own) > 1 else [],
     }
 
 
@@ -122,15 +108,13 @@ class Point(NamedTuple):
 
 
 def _plots(
-    name: str, ratings: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
+    name: str, own: Sequence[Rating], looks: Mapping[str, CurveStyle], knows: Mapping[str, str]
 ) -> Iterator[Plot]:
     for axis, (title, label, of) in AXES.items():
-        points = [
-            Point(
-                looks[each.label], each.label, of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
-            )
-            for each in ratings
-        ]
+        points = []
+        for each in own:
+            x, gap, rival = of(each), 100.0 * each.gap.estimate, knows[each.label] != WHOLE
+            points.append(Point(looks[each.label], each.label, x, gap, rival))
         fine = [point for point in points if np.isfinite((point.x, point.gap)).all()]
         values = [point.x for point in fine]
         # what is the same for all tells nothing
@@ -173,38 +157,25 @@ def pareto_figure(points: Sequence[Point], label: str) -> Figure:
 
 def label_places(marks: Array, points: Sequence[Point]) -> Array:
     """Return where the middles of the labels are, (n, 2) pixels, so that they hide no mark and no label."""
-    taken = [np.concatenate([mark - 6.0, mark + 6.0]) for mark in marks]
-    frame = np.array([0.0, 0.0, *PANEL])
-    middles = []
+    taken = list(shapely.box(*(marks - 6.0).T, *(marks + 6.0).T))
+    frame, middles = shapely.box(0.0, 0.0, *PANEL), []
     for mark, point in zip(marks, points, strict=True):
         half = np.array([0.5 * _LETTER * len(point.label), 0.5 * _LINE])
-        beside, tried = half[0] + _AWAY, []
+        beside, steps = half[0] + _AWAY, []
         for up in (0.0, 0.7, -0.7, 1.4, -1.4, 2.1, -2.1, 2.8, -2.8):
-            steps = [(beside, up), (-beside, up)] + [(0.0, up)] * (abs(up) > 1.0)
-            tried += [mark + np.array([x, y * _LINE]) for x, y in steps]
-        boxes = [np.concatenate([middle - half, middle + half]) for middle in tried]
-        overlaps = [
-            sum(_shared(box, other) for other in taken) + 1e3 * (half.prod() * 4.0 - _shared(box, frame))
-            for box in boxes
-        ]
-        best = int(np.argmin(np.round(overlaps, 6)))
+            steps += [(beside, up * _LINE), (-beside, up * _LINE)] + [(0.0, up * _LINE)] * (abs(up) > 1.0)
+        tried = mark + np.array(steps)
+        boxes = shapely.box(*(tried - half).T, *(tried + half).T)
+        hidden = shapely.area(shapely.intersection(boxes[:, None], taken)).sum(axis=1)
+        outside = shapely.area(shapely.difference(boxes, frame))
+        best = int(np.argmin(np.round(hidden + 1e3 * outside, 6)))
         taken.append(boxes[best])
         middles.append(tried[best])
     return np.array(middles)
 
 
-def _shared(one: Array, other: Array) -> float:
-    """Return the area that two boxes (left, bottom, right, top) have in common."""
-    sides = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
-    return float(np.maximum(sides, 0.0).prod())
-
-
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Return which points no other one beats in both, by their first values.
-
-    >>> pareto_front([(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (2.0, 2.0)])
-    [1, 3, 0]
-    """
+    """Return which points no other one beats in both, by their first values."""
     front: list[int] = []
     for k in sorted(range(len(points)), key=lambda k: points[k]):
         if not front or points[k][1] < points[front[-1]][1]:
@@ -213,7 +184,6 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def _entries(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Table:
-    """Return what was rated, and with what."""
     rows = []
     for result, label in zip(results, labels, strict=True):
         entry = result["entry"]
@@ -221,6 +191,5 @@ def _entries(results: Sequence[Mapping[str, Any]], labels: Sequence[str]) -> Tab
         source = f"source {entry['source_sha256'][:12]}" if entry["source_sha256"] else "built in"
         versions = ", ".join(f"{name} {number}" for name, number in result["versions"].items())
         rows.append((label, entry["controller"], source, gains or "–", versions))
-    return Table(
-        "Entries", ("Controller", "Name", "Code", "Gains", "Made with"), rows, frozenset({1, 2, 3, 4})
-    )
+    head = ("Controller", "Name", "Code", "Gains", "Made with")
+    return Table("Entries", head, rows, frozenset({1, 2, 3, 4}))

@@ -1,11 +1,12 @@
 """Ratings of results on each track, over the runs that all of them have."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from robocov.arrays import Array
 from robocov_app.benchmark import suite
 from robocov_app.figures.statistics import Interval, bootstrap, median_time
 
@@ -22,52 +23,31 @@ class Rating:
     rows: Sequence[Mapping[str, Any]]  # those that did not fail
     failed: int
 
-    def values(
-        self, of: Callable[[Mapping[str, Any]], float | None]
-    ) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def values(self, figure: str) -> Array:
         """Return a figure of each run that has it."""
-        return np.array([value for row in self.rows if (value := of(row)) is not None], dtype=float)
+        return np.array([row[figure] for row in self.rows if row[figure] is not None], dtype=float)
 
-    def median(self, of: Callable[[Mapping[str, Any]], float | None]) -> float:
+    def median(self, figure: str) -> float:
         """Return the median of a figure, nan for none."""
-        values = self.values(of)
+        values = self.values(figure)
         return float(np.median(values)) if len(values) else float("nan")
 
     @property
     def gap(self) -> Interval:
-        """The median gap with its interval, drawn by maps."""
-        rows = [row for row in self.rows if row["gap"] is not None]
-        if not rows:
-            return Interval(*3 * [float("nan")])
-        return bootstrap([row["gap"] for row in rows], "median", [row["map"] for row in rows])
+        maps = [row["map"] for row in self.rows if row["gap"] is not None]
+        return bootstrap(self.values("gap"), "median", maps) if maps else Interval(*3 * [float("nan")])
 
     def at_rest(self) -> tuple[float, float | None]:
         """Return the share of runs at rest at the end, and the Kaplan-Meier median of the time to rest, s."""
-        rest = [row["settled_at_s"] for row in self.rows if row["settled_at_s"] is not None]
+        rest = self.values("settled_at_s").tolist()
         censored = [suite.TRACKS[self.track].duration] * (len(self.rows) - len(rest))
         median = median_time(rest, censored) if rest else np.inf
         return len(rest) / len(self.rows), median if np.isfinite(median) else None
 
-    @property
-    def robot_seconds(self) -> float:
-        """Robots times seconds of a run."""
+    def rate(self, figure: str) -> float:
+        """Return the median of a figure for a simulated second of one robot."""
         track = suite.TRACKS[self.track]
-        return track.robots * track.duration
-
-    @property
-    def computing(self) -> float:
-        """Median processor time of the law for a simulated second of one robot, s."""
-        return self.median(lambda row: row["deciding_s"]) / self.robot_seconds
-
-    @property
-    def told(self) -> float:
-        """Median bytes that a robot tells a second."""
-        return self.median(lambda row: row["told_bytes"]) / self.robot_seconds
-
-    @property
-    def path(self) -> float:
-        """Median way of a robot, m."""
-        return self.median(lambda row: row["path_length_m"])
+        return self.median(figure) / (track.robots * track.duration)
 
 
 def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
@@ -79,27 +59,18 @@ def ratings_of(results: Sequence[Mapping[str, Any]]) -> dict[str, list[Rating]]:
             {(row["map"], row["seed"]): row for row in each["rows"] if row["track"] == track}
             for each in results
         ]
-        shared = (
-            set[tuple[str, int]].intersection(*(set(rows) for rows in own if rows)) if any(own) else set()
-        )
-        ratings = []
         for result, label, rows in zip(results, labels, own, strict=True):
-            some = [row for key, row in rows.items() if key in shared]
+            some = [row for key, row in rows.items() if all(key in other for other in own if other)]
             if some:
-                fine = [row for row in some if "error" not in row]
-                ratings.append(
-                    Rating(label, result["entry"]["controller"], track, fine, len(some) - len(fine))
-                )
-        if ratings:
-            found[track] = ratings
+                name, fine = result["entry"]["controller"], [row for row in some if "error" not in row]
+                found.setdefault(track, []).append(Rating(label, name, track, fine, len(some) - len(fine)))
     return found
 
 
 def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return what each result is called: its controller, the gains that were set, a number for twins."""
     labels: list[str] = []
-    for result in results:
-        entry = result["entry"]
+    for entry in (result["entry"] for result in results):
         changed = ", ".join(f"{name} {value}" for name, value in entry["set"].items())
         label = f"{entry['label']} ({changed})" if changed else str(entry["label"])
         twins = sum(each == label or each.startswith(f"{label} #") for each in labels)
@@ -108,11 +79,7 @@ def labels_of(results: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def number(value: float | None, form: str = ".3g") -> str:
-    """Return a number as text, a dash for none.
-
-    >>> number(0.12345), number(None), number(float("nan"))
-    ('0.123', '–', '–')
-    """
+    """Return a number as text, a dash for None and nan."""
     return NOTHING if value is None or not np.isfinite(value) else f"{value:{form}}"
 
 
@@ -121,7 +88,6 @@ HEAD = (
     *("Path, m", "Work, J", "Contacts", "At rest", "Rest, s", "B/s", "µs/s"),
 )
 """The columns of a track's table; `NOTES` say what they are."""
-
 NOTES = (
     "Gap: J / J_ref − 1 at the end, the median over runs with its 95 % interval (bootstrap that draws whole "
     "maps), mean and worst; J_ref is the best placement known, no proven optimum, so gaps may be too small; "
@@ -138,44 +104,43 @@ NOTES = (
 
 def rating_row(rating: Rating, knows: str) -> tuple[str, ...]:
     """Return the cells of one entry's row under `HEAD`."""
-    gap, gaps = rating.gap, rating.values(lambda row: row["gap"])
+    gap, gaps = rating.gap, rating.values("gap")
     runs = str(len(rating.rows)) + (f" (+{rating.failed} failed)" if rating.failed else "")
     if len(gaps) < len(rating.rows):
         runs += f", {len(rating.rows) - len(gaps)} without gap"
-    bounds = rating.values(lambda row: row["gap_to_bound"])
+    bounds, (share, rest) = rating.values("gap_to_bound"), rating.at_rest()
     surely = f" (≤ {100.0 * float(np.median(bounds)):.1f})" if len(bounds) == len(gaps) > 0 else ""
-    share, rest = rating.at_rest()
-    best = [row["mean_distance_m"] / (1.0 + row["gap"]) for row in rating.rows if row["gap"] is not None]
-    over = [row["mean_distance_over_run_m"] for row in rating.rows if row["gap"] is not None]
+    integrals = [
+        row["mean_distance_over_run_m"] / (row["mean_distance_m"] / (1.0 + row["gap"]))
+        for row in rating.rows
+        if row["gap"] is not None
+    ]
     duration = suite.TRACKS[rating.track].duration
-    integral = float(np.median(np.array(over) / best)) * duration if best else None
+    integral = float(np.median(integrals)) * duration if integrals else None
     touched = sum(row["contacts"] > 0 for row in rating.rows)
     return (
         *(rating.label, knows, runs, number(100.0 * gap.estimate, ".1f") + surely),
         NOTHING if np.isnan(gap.low) else f"{100.0 * gap.low:.1f} to {100.0 * gap.high:.1f}",
-        *(number(100.0 * of(gaps) if len(gaps) else None, ".1f") for of in (np.mean, np.max)),
-        *(number(rating.median(lambda row: row["near_final_s"]), ".0f"), number(integral, ".0f")),
-        *(number(rating.path, ".1f"), number(rating.median(lambda row: row["work_J"]), ".0f")),
+        *(number(100.0 * float(of(gaps)) if len(gaps) else None, ".1f") for of in (np.mean, np.max)),
+        *(number(rating.median("near_final_s"), ".0f"), number(integral, ".0f")),
+        *(number(rating.median("path_length_m"), ".1f"), number(rating.median("work_J"), ".0f")),
         *(f"{touched} of {len(rating.rows)}", f"{share:.0%}", number(rest, ".0f")),
-        *(number(rating.told, ".0f"), number(1e6 * rating.computing, ".0f")),
+        *(number(rating.rate("told_bytes"), ".0f"), number(1e6 * rating.rate("deciding_s"), ".0f")),
     )
 
 
 def family_rows(ratings: Sequence[Rating]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return head and rows of the median gaps, in percent, of each entry by families of maps."""
-    families = list(dict.fromkeys(suite.family_of(row["map"]) for rating in ratings for row in rating.rows))
+    families = list(dict.fromkeys(suite.FAMILY_OF[row["map"]] for rating in ratings for row in rating.rows))
     rows = []
     for rating in ratings:
-        parts = [[row for row in rating.rows if suite.family_of(row["map"]) == family] for family in families]
-        gaps = [
-            Rating(rating.label, "", rating.track, part, 0).median(lambda row: row["gap"]) for part in parts
-        ]
+        parts = [[row for row in rating.rows if suite.FAMILY_OF[row["map"]] == family] for family in families]
+        gaps = (replace(rating, rows=part).median("gap") for part in parts)
         rows.append((rating.label, *(number(100.0 * gap, ".1f") for gap in gaps)))
     return ("Controller", *families), rows
 
 
 def summary_rows(result: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return head and rows of a small table of one result, a row for each track."""
     rows = []
     for track, ratings in ratings_of([result]).items():
         cells = dict(zip(HEAD, rating_row(ratings[0], ""), strict=True))

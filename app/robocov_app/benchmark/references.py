@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from robocov.environment import Environment
 from robocov.files.atomic import written
 from robocov.mapfile import from_json, to_json
 from robocov_app.benchmark import suite
-from robocov_app.replication.references import Question, Reference, searched
+from robocov_app.replication.references import Question, searched
 from robocov_app.terminal.interruption import Interruption
 from robocov_app.terminal.progress import progress
 from robocov_app.toolkit.worker import Line
@@ -25,14 +25,12 @@ _HEAD = {"format": "robocov-benchmark-suite", "version": suite.VERSION}
 
 
 def wanted_references() -> Iterator[tuple[str, int, float]]:
-    """Yield map, team size and moment (s) of every reference: with obstacles that move, those of the end."""
-    seen = set()
+    """Return map, team size and moment (s) of every reference: with obstacles that move, those of the end."""
+    moments: dict[tuple[str, int], float] = {}
     for track in suite.TRACKS.values():
-        for name in track.maps:
-            for robots in range(track.survivors, track.robots + 1):
-                if (name, robots) not in seen:
-                    seen.add((name, robots))
-                    yield name, robots, track.duration
+        for wanted in product(track.maps, range(track.survivors, track.robots + 1)):
+            moments.setdefault(wanted, track.duration)
+    return ((name, robots, time) for (name, robots), time in moments.items())
 
 
 def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption) -> tuple[int, int]:
@@ -41,42 +39,50 @@ def make_references(path: Path, *, workers: int, quiet: bool, stop: Interruption
     Whatever ends it, the same call goes on. A map whose hash is not that of the file loses its references.
     """
     maps: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))["maps"] if path.exists() else {}
-    for name in suite.every_map():
+    for name in suite.FAMILY_OF:
         own = suite.hash_of(suite.made_map(name))
         if maps.get(name, {}).get("sha256") != own:
-            maps[name] = {"sha256": own, "family": suite.family_of(name), "references": {}}
-    wanted = {f"{name} {robots}": (name, str(robots), time) for name, robots, time in wanted_references()}
+            maps[name] = {"sha256": own, "family": suite.FAMILY_OF[name], "references": {}}
+    wanted: dict[str, tuple[dict[str, Any], str, Environment]] = {
+        f"{name} {robots}": (maps[name]["references"], str(robots), suite.made_map(name).at(time))
+        for name, robots, time in wanted_references()
+    }
 
     def found(key: str) -> dict[str, Any]:
-        name, robots, _ = wanted[key]
-        return maps[name]["references"].get(robots, {})  # type: ignore[no-any-return]
-
-    def environment(key: str) -> Environment:
-        name, _, time = wanted[key]
-        return suite.made_map(name).at(time)
+        held, robots, _ = wanted[key]
+        return held.get(robots, {})  # type: ignore[no-any-return]
 
     searches = [key for key in wanted if not found(key)]
     bounds = [key for key in wanted if found(key).get("lower_bound_m") is None]
     left = total = len(searches) + len(bounds)
     _save(path, maps)
     with progress("references", total, quiet=quiet) as update:
-        questions = {key: _question(environment(key), int(wanted[key][1])) for key in searches}
+
+        def kept() -> None:
+            nonlocal left
+            left -= 1
+            _save(path, maps)
+            update(total - left)
+
+        how = (suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
+        questions = {key: Question(to_json(wanted[key][2]), int(wanted[key][1]), *how) for key in searches}
         for key, answer in searched(questions, workers, stop) if questions else ():
-            name, robots, _ = wanted[key]
-            maps[name]["references"][robots] = entry_of(environment(key), answer)
-            left -= 1
-            _save(path, maps)
-            update(total - left)
-        asked = {key: (to_json(environment(key)), found(key)["positions_m"]) for key in bounds if found(key)}
-        for key, bound in searched(asked, workers, stop, _BOUNDING) if asked else ():
+            held, robots, environment = wanted[key]
+            places = np.round(answer.positions, _DIGITS)  # the cost is that of the places as they stand there
+            result = CoverageCost(environment, suite.LATTICE)(places)
+            held[robots] = {
+                "mean_distance_m": result.mean_distance,
+                "uncovered_area_m2": result.uncovered_area,
+                "agreement": answer.agreement,
+                "lower_bound_m": None,
+                "positions_m": places.tolist(),
+            }
+            kept()
+        asked = {key: (to_json(wanted[key][2]), found(key)["positions_m"]) for key in bounds if found(key)}
+        for key, bound in searched(asked, workers, stop, f"{__name__}:Bounding") if asked else ():
             found(key)["lower_bound_m"] = bound
-            left -= 1
-            _save(path, maps)
-            update(total - left)
+            kept()
     return 2 * len(wanted) - left, left
-
-
-_BOUNDING = "robocov_app.benchmark.references:Bounding"
 
 
 class Bounding:
@@ -93,33 +99,11 @@ class Bounding:
         return lower_bound(from_json(document), np.array(positions), **how).mean_distance
 
 
-def _question(environment: Environment, robots: int) -> Question:
-    return Question(to_json(environment), robots, suite.RADIUS, suite.LATTICE, RESTARTS, SEED)
-
-
-def entry_of(environment: Environment, answer: Reference) -> dict[str, Any]:
-    """Return what the file holds of a reference: its cost is that of the places as they stand there."""
-    places = np.round(answer.positions, _DIGITS)
-    result = _cost(environment)(places)
-    return {
-        "mean_distance_m": result.mean_distance,
-        "uncovered_area_m2": result.uncovered_area,
-        "agreement": answer.agreement,
-        "lower_bound_m": None,
-        "positions_m": places.tolist(),
-    }
-
-
-@lru_cache(2)
-def _cost(environment: Environment) -> CoverageCost:
-    return CoverageCost(environment, suite.LATTICE)
-
-
 def _save(path: Path, maps: Mapping[str, Any]) -> None:
     how = {"lattice": suite.LATTICE, "restarts": RESTARTS, "seed": SEED, "radius_m": suite.RADIUS}
     how["precision"] = PRECISION
     lines = []
-    for name in suite.every_map():
+    for name in suite.FAMILY_OF:
         own = dict(sorted(maps[name]["references"].items(), key=lambda item: int(item[0])))
         lines.append(f"{json.dumps(name)}: {json.dumps({**maps[name], 'references': own})}")
     head = json.dumps({**_HEAD, "search": how})[:-1]

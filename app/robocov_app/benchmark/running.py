@@ -6,6 +6,7 @@ import json
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,7 +19,7 @@ from robocov.errors import InputError, OutputError, ParameterError, shown
 from robocov.files.atomic import written
 from robocov.files.strictjson import parse, read_bytes
 from robocov_app.benchmark import suite
-from robocov_app.sweep.executors import Executor, LocalPool
+from robocov_app.sweep.executors import LocalPool
 from robocov_app.sweep.ledger import RUNS, Entry, Ledger, difference_of
 from robocov_app.sweep.study import Study, StudyMap, Task, tasks_of
 from robocov_app.sweep.sweeping import Count, sweep, sweep_progress, worked_off
@@ -31,13 +32,11 @@ TRACKS = "tracks"  # folder of the tracks' sweeps
 ORACLE = "oracle"
 _FORMAT = {"format": "robocov-benchmark", "version": 1}
 _ALIKE = 1e-6  # m² by which uncovered areas of the same rooms differ at most
-
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "uncovered_area_m2", "near_final_s", "settled_at_s"),
     *("path_length_m", "work_J", "contacts", "min_clearance_m", "stuck_robots"),
 )
 """The figures of a run that a result holds, beside those of its effort and its gap."""
-
 Row: TypeAlias = dict[str, Any]
 
 
@@ -72,9 +71,8 @@ class Contender:
             make_controller(str(folder / name) if oracle else name, dict(self.gains))
         except ParameterError as error:
             raise ParameterError(f"--controller: {error}") from None
-        told = _told if oracle else lambda track, name: suite.suite_map(name)
         for track, maps, seeds in selection.parts():
-            given = [StudyMap(each, told(track, each)) for each in maps]
+            given = [StudyMap(each, _told(track, each) if oracle else suite.suite_map(each)) for each in maps]
             yield track, suite.study_of(track, given, name, seeds, folder, **gains)
 
     def facts(self, study: Study) -> dict[str, Any]:
@@ -98,7 +96,7 @@ def _told(track: str, name: str) -> Environment:
     environment, own = suite.suite_map(name), suite.TRACKS[track]
     working, stages, now = list(range(own.robots)), [], 0.0
     for robot, time in (*own.failures, (-1, np.inf)):
-        stages.append([now, list(working), reference(name, len(working))["positions_m"]])
+        stages.append([now, working, reference(name, len(working))["positions_m"]])
         working, now = [each for each in working if each != robot], time
     return replace(environment, extra={**environment.extra, "oracle": stages})
 
@@ -113,18 +111,11 @@ def reference(name: str, robots: int) -> Mapping[str, Any]:
 
 
 def run_benchmark(
-    contender: Contender,
-    selection: Selection,
-    out: Path,
-    *,
-    stop: Interruption,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    quiet: bool = False,
+    contender: Contender, selection: Selection, out: Path, *, stop: Interruption, **how: Any
 ) -> dict[str, Any] | None:
     """Do all runs that are not done yet, and write ``result.json``; return it, None where it was stopped.
 
-    Raises InputError where the folder holds something else.
+    `how`: as of `sweep`. Raises InputError where the folder holds something else.
     """
     foreign = {path.name for path in out.iterdir()} - {RESULT, TRACKS} if out.is_dir() else set()
     if foreign or (out.exists() and not out.is_dir()):
@@ -133,10 +124,7 @@ def run_benchmark(
     rows: list[Row] = []
     for track, study in studies.items():
         folder = out / TRACKS / track
-        totals = sweep(
-            study, folder, workers=workers, scheduler=scheduler, quiet=quiet, title=track, stop=stop
-        )
-        if totals.interrupted:
+        if sweep(study, folder, title=track, stop=stop, **how).interrupted:
             return None
         ledger = Ledger(folder)
         for task in tasks_of(study):
@@ -144,36 +132,33 @@ def run_benchmark(
             if entry is None:
                 raise OutputError(f"{folder}: {task.name} was removed by somebody else")
             effort = folder / RUNS / task.name / EFFORT
-            rows.append(
-                row_of(track, task, entry, json.loads(effort.read_bytes()) if effort.exists() else {})
-            )
+            rows.append(row_of(track, task, entry, effort.read_bytes() if effort.exists() else b"{}"))
     result = {
         **_FORMAT,
-        "suite": {"version": suite.VERSION, "sha256": suite_digest()},
+        "suite": _suite(),
         "selection": {"quick": selection.quick, "tracks": selection.tracks, "maps": selection.maps},
         "entry": contender.facts(next(iter(studies.values()))),
         "versions": made_with(),
         "method": method(),
-        "rows": rows,
     }
-    head = json.dumps({key: value for key, value in result.items() if key != "rows"}, indent=1)
+    head = json.dumps(result, indent=1)
     lines = ",\n".join(json.dumps(row, allow_nan=False) for row in rows)
     with written(out / RESULT) as part:
         part.write_text(f'{head[:-2]},\n "rows": [\n{lines}\n]}}\n', encoding="utf-8")
-    return result
+    return {**result, "rows": rows}
 
 
-def suite_digest() -> str:
-    """Return the SHA-256 of what results depend on in the suite's file: maps and best costs, no bounds."""
+def _suite() -> dict[str, str]:
+    """Return what results depend on in the suite's file, as a digest: maps and best costs, no bounds."""
     costs = {
         name: [own["sha256"], {size: each["mean_distance_m"] for size, each in own["references"].items()}]
         for name, own in suite.frozen().items()
     }
-    return hashlib.sha256(json.dumps(costs, sort_keys=True).encode()).hexdigest()
+    digest = hashlib.sha256(json.dumps(costs, sort_keys=True).encode()).hexdigest()
+    return {"version": suite.VERSION, "sha256": digest}
 
 
 def method() -> list[str]:
-    """Return how the figures were made, in sentences."""
     return [
         f"Maps, starts, seeds and tracks are those of suite {suite.VERSION}, whose maps have hashes.",
         f"J is the mean geodesic distance to the nearest robot on {suite.LATTICE} x {suite.LATTICE} sites, "
@@ -188,13 +173,13 @@ def method() -> list[str]:
     ]
 
 
-def row_of(track: str, task: Task, entry: Entry, effort: Mapping[str, Any]) -> Row:
-    """Return what a result holds of a run."""
+def row_of(track: str, task: Task, entry: Entry | Outcome, effort: bytes) -> Row:
+    """Return what a result holds of a run, whose ``effort.json`` is the last argument."""
     head: Row = {"track": track, "map": task.map, "seed": task.seed}
     if entry.error is not None:
         return {**head, "error": entry.error}
     figures = {name: entry.figures[name] for name in FIGURES}
-    return {**head, **figures, **effort, **rated(track, task.map, figures)}
+    return {**head, **figures, **json.loads(effort), **rated(track, task.map, figures)}
 
 
 def rated(track: str, name: str, figures: Mapping[str, Any]) -> dict[str, float | None]:
@@ -202,12 +187,9 @@ def rated(track: str, name: str, figures: Mapping[str, Any]) -> dict[str, float 
     best = reference(name, suite.TRACKS[track].survivors)
     if abs(figures["uncovered_area_m2"] - best["uncovered_area_m2"]) > _ALIKE:
         return {"gap": None, "gap_to_bound": None}
-    bound = best["lower_bound_m"]
-    cost = figures["mean_distance_m"]
-    return {
-        "gap": cost / best["mean_distance_m"] - 1.0,
-        "gap_to_bound": cost / bound - 1.0 if bound else None,
-    }
+    bound, cost = best["lower_bound_m"], figures["mean_distance_m"]
+    gap_to_bound = cost / bound - 1.0 if bound else None
+    return {"gap": cost / best["mean_distance_m"] - 1.0, "gap_to_bound": gap_to_bound}
 
 
 def read_result(path: Path) -> dict[str, Any]:
@@ -222,15 +204,10 @@ def read_result(path: Path) -> dict[str, Any]:
     result = parse(data, str(path))
     if not isinstance(result, dict) or {name: result.get(name) for name in _FORMAT} != _FORMAT:
         raise InputError(f"{path}: it is no result of robocov benchmark, which was wanted")
-    if result.get("suite") != {"version": suite.VERSION, "sha256": suite_digest()}:
-        raise InputError(
-            f"{path}: suite: {result.get('suite')}, but that of {suite.FILE.name} here was wanted"
-        )
-    _require(
-        result,
-        {**dict.fromkeys(("entry", "selection", "versions"), dict), "rows": list, "method": list},
-        path,
-    )
+    if (found := result.get("suite")) != _suite():
+        raise InputError(f"{path}: suite: {found}, but that of {suite.FILE.name} here was wanted")
+    parts = {**dict.fromkeys(("entry", "selection", "versions"), dict), "rows": list, "method": list}
+    _require(result, parts, path)
     words = {**dict.fromkeys(("controller", "label", "information"), str), "gains": dict, "set": dict}
     _require(result["entry"], {**words, "source_sha256": str | None}, f"{path}: entry")
     _require(result["selection"], {"quick": bool, "tracks": list, "maps": list}, f"{path}: selection")
@@ -239,25 +216,20 @@ def read_result(path: Path) -> dict[str, Any]:
     for k, row in enumerate(result["rows"]):
         failed = isinstance(row, dict) and "error" in row
         _require(row, {**place, "error": str} if failed else {**place, **figures}, f"{path}: rows[{k}]")
-        if row["track"] not in suite.TRACKS or row["map"] not in suite.every_map():
+        if row["track"] not in suite.TRACKS or row["map"] not in suite.FAMILY_OF:
             raise InputError(f"{path}: rows[{k}]: {row['track']} on {row['map']} is no run of the suite")
     return result
 
 
 def bundled_results(others: Sequence[Mapping[str, Any]] = ()) -> list[dict[str, Any]]:
     """Return the results of the built-in controllers that are none of the others."""
-    given = {_identity(each) for each in others}
+    identity = itemgetter("controller", "set", "source_sha256")
+    given = [identity(each["entry"]) for each in others]
     results = [read_result(path) for path in sorted(ENTRIES.glob("*.json.gz"))]
-    return [result for result in results if _identity(result) not in given]
-
-
-def _identity(result: Mapping[str, Any]) -> str:
-    entry = result["entry"]
-    return json.dumps([entry["controller"], entry["set"], entry["source_sha256"]], sort_keys=True)
+    return [result for result in results if identity(result["entry"]) not in given]
 
 
 def _require(given: Any, kinds: Mapping[str, Any], where: object) -> None:
-    """Raise InputError unless a JSON object has values of these kinds."""
     for name, kind in kinds.items():
         if not isinstance(given, dict) or name not in given:
             raise InputError(f"{where}: {name}: missing, but a whole result was wanted")
@@ -285,41 +257,34 @@ def verify(
     name = controller or entry["controller"]
     if entry["source_sha256"] and controller is None and name != "oracle":
         raise InputError(f"{path}: its controller {name} is a file; --controller FILE.py:CLASS was wanted")
-    selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     contender = Contender(name, entry["set"])
+    selection = Selection(chosen["quick"], tuple(chosen["tracks"]), tuple(chosen["maps"]))
     studies = dict(contender.studies(selection))
     digest = contender.facts(next(iter(studies.values())))["source_sha256"]
     if digest != entry["source_sha256"]:
         raise InputError(f"{path}: --controller: {name} is not the source that was rated: its digest differs")
     found = [f"made with {words}" for words in [difference_of(result["versions"])] if words]
     told = {(row["track"], row["map"], row["seed"]): row for row in result["rows"]}
-    tasks = {
-        (track, task.map, task.seed): task for track, study in studies.items() for task in tasks_of(study)
-    }
+    every = ((track, task) for track, study in studies.items() for task in tasks_of(study))
+    tasks = {(track, task.map, task.seed): task for track, task in every}
     found += [f"{_where(key)}: no row, but one was wanted" for key in tasks.keys() - told.keys()]
     found += [f"{_where(key)}: a row of a run that was not selected" for key in told.keys() - tasks.keys()]
     for key, row in told.items():
-        wrong = {} if "error" in row else rated(row["track"], row["map"], row)
-        found += _differences(key, row, wrong)
+        found += _differences(key, row, {} if "error" in row else rated(row["track"], row["map"], row))
     both = sorted(told.keys() & tasks.keys())
     picked = np.random.default_rng(seed).permutation(len(both))[:sample].tolist()
     again = {tasks[both[k]].name: both[k] for k in sorted(picked)}
 
     def compare(task: Task, outcome: Outcome) -> None:
         key = again[task.name]
-        entry = Entry(outcome.figures, outcome.error, outcome.versions)
-        effort = json.loads(outcome.files[EFFORT]) if EFFORT in outcome.files else {}
-        found.extend(_differences(key, told[key], row_of(key[0], task, entry, effort)))
+        row = row_of(key[0], task, outcome, outcome.files.get(EFFORT, b"{}"))
+        found.extend(_differences(key, told[key], row))
 
-    def open_executor() -> Executor:
-        return LocalPool(min(workers, len(again)))
-
-    count = Count(len(again))
+    count, runs = Count(len(again)), [tasks[key] for key in again.values()]
     with sweep_progress("verify", count, quiet=quiet) as tell:
-        runs: Sequence[Task] = [tasks[key] for key in again.values()]
-        for _ in worked_off(runs, open_executor, count, stop, compare):
+        for _ in worked_off(runs, lambda: LocalPool(min(workers, len(again))), count, stop, compare):
             tell(count)
-    return count.done + count.failed, list(dict.fromkeys(found))
+    return count.over, list(dict.fromkeys(found))
 
 
 def _where(key: tuple[str, str, int]) -> str:

@@ -22,11 +22,9 @@ from robocov_app.sweep.study import Study, StudyMap
 
 VERSION = "v1"
 FILE = Path(__file__).parent / f"suite-{VERSION}.json"
-
 LATTICE = 128  # sites along a side for all costs and references
 RADIUS = 0.1  # m, of the robots
 TEAM = 6
-
 _FIRST = 7001  # seed of the first map of a kind; those of tuning begin at 1
 _BUNDLED = (
     *("blocks-a", "blocks-b", "cave", "corridor", "courtyard", "gaps", "l-shape", "museum", "office"),
@@ -46,17 +44,16 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     **{kind: _numbered(kind, 6) for kind in KINDS if kind != "traffic"},
 }
 """The maps of the ideal track by their families."""
-
+_DRAWN = [kind for kind in FAMILIES if kind != "bundled"]
 _OTHERS: Mapping[str, tuple[str, ...]] = {
-    "density": tuple(
-        f"dense-{each}" for kind in FAMILIES if kind != "bundled" for each in _numbered(kind, 1)
-    ),
+    "density": tuple(f"dense-{each}" for kind in _DRAWN for each in _numbered(kind, 1)),
     "moving": ("forklifts", *_numbered("traffic", 5)),
     "large": tuple(f"large-{each}" for kind in _LARGE_KINDS for each in _numbered(kind, 2)),
-    "tuning": tuple(name for kind in FAMILIES if kind != "bundled" for name in _numbered(kind, 2, first=1)),
+    "tuning": tuple(name for kind in _DRAWN for name in _numbered(kind, 2, first=1)),
 }
 """The maps of other tracks. Those of tuning are for choosing gains, and for nothing else."""
-
+FAMILY_OF = {name: family for family, names in {**FAMILIES, **_OTHERS}.items() for name in names}
+"""All maps, in the order of the families."""
 _CORE = tuple(name for names in FAMILIES.values() for name in names[:3])
 
 
@@ -74,19 +71,15 @@ class Track:
 
     @property
     def survivors(self) -> int:
-        """Number of robots that work at the end."""
         return self.robots - len(self.failures)
 
 
 _FAILURES = ((0, 15.0), (3, 30.0))  # indices, and seconds
-
+_LOSSY = {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}
 TRACKS: Mapping[str, Track] = {
     "ideal": Track("nothing goes wrong", sum(FAMILIES.values(), ()), (0, 1)),
     "short-range": Track("robots hear each other up to 3 m", changes={"communication_range": 3.0}),
-    "lossy": Track(
-        "2 messages a second, 0.5 s late, 30 % lost",
-        changes={"conditions": {"loss": 0.3, "delay": 0.5, "message_rate": 2.0}},
-    ),
+    "lossy": Track("2 messages a second, 0.5 s late, 30 % lost", changes={"conditions": _LOSSY}),
     "noisy": Track("positions with noise of 0.1 m", changes={"conditions": {"position_noise": 0.1}}),
     "unicycle": Track("robots on two wheels turn before they drive", changes={"kinematics": "unicycle"}),
     "failures": Track("two of six robots fail, after 15 and 30 s", failures=_FAILURES),
@@ -97,36 +90,20 @@ TRACKS: Mapping[str, Track] = {
     "tuning": Track("as ideal, for choosing gains: no result", _OTHERS["tuning"]),
 }
 """The tracks by their names; `RATED` are those that count."""
-
 RATED = tuple(name for name in TRACKS if name != "tuning")
 QUICK = ("ideal", "short-range")
 """The tracks of ``--quick``, of which it takes the first map of each family, with the first seed."""
 
 
 def heading(track: str) -> str:
-    """Return the name of a track as a heading.
-
-    >>> heading("short-range")
-    'Short range'
-    """
     return track.capitalize().replace("-", " ")
-
-
-def family_of(name: str) -> str:
-    """Return the family of a map."""
-    return next(family for family, names in {**FAMILIES, **_OTHERS}.items() if name in names)
-
-
-def every_map() -> tuple[str, ...]:
-    """Return the names of all maps, in the order of the families."""
-    return tuple(name for names in (*FAMILIES.values(), *_OTHERS.values()) for name in names)
 
 
 @cache
 def made_map(name: str) -> Environment:
     """Return the map of a name as it is made here and now; raises ParameterError for an unknown one."""
-    if name not in every_map():
-        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, every_map())}")
+    if name not in FAMILY_OF:
+        raise ParameterError(f"--maps: {unknown_name('map of the benchmark', name, FAMILY_OF)}")
     kind, _, seed = name.removeprefix("dense-").removeprefix("large-").rpartition("-")
     if name.startswith("dense-"):
         return with_hot_spots(StudyMap(name, made_map(f"{kind}-{seed}")), int(seed)).environment
@@ -138,7 +115,6 @@ def made_map(name: str) -> Environment:
 
 
 def hash_of(environment: Environment) -> str:
-    """Return the SHA-256 of a map's content."""
     document = {**to_json(environment), "$schema": None}
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
 
@@ -153,26 +129,23 @@ def suite_map(name: str) -> Environment:
     """Return a map of the suite; raises InputError where it is not the one that was frozen."""
     environment = made_map(name)
     if name not in frozen() or hash_of(environment) != frozen()[name]["sha256"]:
-        raise InputError(
-            f"map {name}: it is not the one of suite {VERSION}: its file or its generator has changed; "
-            f"the map whose hash is in {FILE.name} was wanted"
-        )
+        changed = f"it is not the one of suite {VERSION}: its file or its generator has changed"
+        raise InputError(f"map {name}: {changed}; the map whose hash is in {FILE.name} was wanted")
     return environment
 
 
 def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[str, tuple[str, ...]]:
     """Return the maps of each track that are wanted, by default all; raises ParameterError."""
-    for name in tracks:
-        if name not in TRACKS:
-            raise ParameterError(f"--track: {unknown_name('track', name, TRACKS)}")
+    if unknown := [name for name in tracks if name not in TRACKS]:
+        raise ParameterError(f"--track: {unknown_name('track', unknown[0], TRACKS)}")
     for name in maps:
         made_map(name)
     found = {}
     for name in tracks or (QUICK if quick else RATED):
         own = TRACKS[name].maps
-        if quick and not maps:
-            own = tuple({family_of(each): each for each in reversed(own)}[family_of(each)] for each in own)
-        found[name] = tuple(each for each in dict.fromkeys(own) if not maps or each in maps)
+        if quick and not maps:  # the first of each family
+            own = tuple({FAMILY_OF[each]: each for each in reversed(own)}.values())[::-1]
+        found[name] = tuple(each for each in own if not maps or each in maps)
     if not any(found.values()):
         raise ParameterError(f"--maps: {', '.join(maps)}, but a map of {', '.join(found)} was wanted")
     return {name: own for name, own in found.items() if own}
@@ -181,23 +154,10 @@ def chosen(tracks: Sequence[str], maps: Sequence[str], *, quick: bool) -> dict[s
 def study_of(
     name: str, maps: Sequence[StudyMap], controller: str, seeds: Sequence[int], folder: Path, **more: Any
 ) -> Study:
-    """Return the runs of one controller on a track."""
     track = TRACKS[name]
-    changes = dict(track.changes)
+    changes: dict[str, Any] = {"robots": (track.robots,), "duration": track.duration, "radius": RADIUS}
+    changes |= {"lattice": LATTICE, "cost_hz": 2.0, "record_hz": 0.0, "metrics": True, **track.changes}
     if track.failures:
         words = " ".join(f"{robot + 1}@{time:g}" for robot, time in track.failures)
         changes["conditions"] = {"fail": words}
-    given: dict[str, Any] = {
-        "robots": (track.robots,),
-        "duration": track.duration,
-        "seeds": seeds,
-        "radius": RADIUS,
-    }
-    kept: dict[str, Any] = {
-        "lattice": LATTICE,
-        "cost_hz": 2.0,
-        "record_hz": 0.0,
-        "metrics": True,
-        "folder": folder,
-    }
-    return Study(tuple(maps), (controller,), **given, **kept, **changes, **more)
+    return Study(tuple(maps), (controller,), seeds=seeds, folder=folder, **changes, **more)

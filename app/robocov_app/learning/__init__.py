@@ -48,32 +48,16 @@ from robocov.extras import extra
 
 if TYPE_CHECKING:
     from robocov_app.learning.gym import CoverageEnv, CoverageVectorEnv
-    from robocov_app.learning.layout import ObservationLayout
     from robocov_app.learning.parallel import CoverageParallelEnv
     from robocov_app.learning.policy import ControllerPolicy, PolicyController
-    from robocov_app.learning.task import CoverageTask, GeneratedMaps
+    from robocov_app.learning.task import CoverageTask, GeneratedMaps, ObservationLayout
 
-__all__ = [
-    "ControllerPolicy",
-    "CoverageEnv",
-    "CoverageParallelEnv",
-    "CoverageTask",
-    "CoverageVectorEnv",
-    "GeneratedMaps",
-    "ObservationLayout",
-    "PolicyController",
-]
-
-_HOME = {
-    "ControllerPolicy": "policy",
-    "CoverageEnv": "gym",
-    "CoverageParallelEnv": "parallel",
-    "CoverageTask": "task",
-    "CoverageVectorEnv": "gym",
-    "GeneratedMaps": "task",
-    "ObservationLayout": "layout",
-    "PolicyController": "policy",
-}
+__all__ = ["ControllerPolicy", "CoverageEnv", "CoverageParallelEnv", "CoverageTask", "CoverageVectorEnv"]
+__all__ += ["GeneratedMaps", "ObservationLayout", "PolicyController"]
+_HOME = dict.fromkeys(("ControllerPolicy", "PolicyController"), "policy")
+_HOME |= dict.fromkeys(("CoverageEnv", "CoverageVectorEnv"), "gym")
+_HOME |= dict.fromkeys(("CoverageTask", "GeneratedMaps", "ObservationLayout"), "task")
+_HOME["CoverageParallelEnv"] = "parallel"
 _NEEDED = {"gym": ("gymnasium",), "parallel": ("gymnasium", "pettingzoo")}  # packages of the extra
 
 

@@ -9,9 +9,7 @@ from robocov_app.learning.parallel import CoverageParallelEnv
 __all__ = ["env", "parallel_env", "raw_env"]
 
 
-def parallel_env(**options: Any) -> CoverageParallelEnv:
-    """Return a `CoverageParallelEnv` with these options."""
-    return CoverageParallelEnv(**options)
+parallel_env = CoverageParallelEnv
 
 
 def env(**options: Any) -> Any:

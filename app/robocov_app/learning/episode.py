@@ -1,17 +1,17 @@
-"""One episode: a simulation that is driven by actions, and what came of each of them."""
+"""One episode: a simulation that is driven by actions, and what came of each; environments of episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array, BoolArray
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost
 from robocov.environment import Environment
-from robocov.errors import ParameterError, StartError, shown
+from robocov.errors import ParameterError, RobocovError, StartError, shown, unknown_name
 from robocov.metrics import TOUCHING
 from robocov.observation import Decision, Observations, Scanning, Snapshot
 from robocov.observation.neighbours import close_pairs
@@ -19,17 +19,13 @@ from robocov.observation.region import Region
 from robocov.record import Record
 from robocov.robots import Team
 from robocov.simulation import Simulation
-from robocov_app.learning.layout import Rows
-from robocov_app.learning.task import (
-    SEEDS,
-    CoverageTask,
-    Scenarios,
-    driving_forces,
-    map_of,
-    reference_distance,
-    shares,
-)
+from robocov_app.learning import task as tasks
+from robocov_app.learning.task import SEEDS, CoverageTask, Rows, Scenarios, changed_task, from_middle
 from robocov_app.runs.spec import RunSpec
+
+if TYPE_CHECKING:
+    from robocov_app.render.picture import Painter
+    from robocov_app.runs.recording import Frame
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,6 @@ class Learner:
 
     @classmethod
     def of(cls, task: CoverageTask) -> Learner:
-        """Return the learner of a task, with the scans that it is told of."""
         rays = task.observation.rays
         return cls(Scanning(rays, task.period) if rays else None)
 
@@ -80,31 +75,24 @@ def drawn_episode(
     options = options or {}
     environment = scenarios.draw(rng)
     if "map" in options:
-        environment = map_of(options["map"], int(rng.integers(SEEDS)))
+        environment = tasks.map_of(options["map"], int(rng.integers(SEEDS)))
     name = options.get("start", task.start)
     starts = list(environment.starts) or ["uniform"]
     any_start, seed = starts[int(rng.integers(len(starts)))], int(rng.integers(SEEDS))
-    start = environment.start(any_start if name == "*" else name)
-    seed = options.get("start_seed", seed)
+    start: dict[str, Any] = {"start": environment.start(any_start if name == "*" else name).name}
+    start["seed"] = options.get("start_seed", seed)
     conditions, chance = task.conditions, int(rng.integers(SEEDS))
     if conditions is not None:
         conditions = replace(conditions, seed=options.get("conditions_seed", chance))
     cost = scenarios.cost(environment)
-    spec = RunSpec(
-        environment,
-        team=task.whole_team,
-        start=start.name,
-        seed=seed,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=conditions,
-    )
     if "positions" in options:
         try:
             positions = np.asarray(options["positions"], dtype=float)
         except (TypeError, ValueError):
             raise StartError(f"positions: {shown(options['positions'])}, but (n, 2) were wanted") from None
-        spec = replace(spec, positions=positions, start=None, seed=None)
+        start = {"positions": positions, "start": None, "seed": None}
+    more: dict[str, Any] = {"duration": task.duration, "dt": task.dt, "conditions": conditions}
+    spec = RunSpec(environment, team=task.whole_team, **start, **more)
     return Episode(task, spec, cost, place)
 
 
@@ -117,14 +105,11 @@ class SharedSimulation:
         self._told: tuple[Observations | None, Rows] = None, np.empty((0, 0), dtype=np.float32)
 
     def begin(self, run: int, positions: Array) -> Simulation:
-        """Put the team of an episode to its start."""
         task, count = self._task, self._count
-        if self._simulation is None:
-            # the others follow
+        if self._simulation is None:  # the others follow
             starts, team = np.tile(positions, (count, 1)), Team.joined([task.whole_team] * count)
-            self._simulation = Simulation(
-                self.environment, Learner.of(task), starts, team, task.dt, runs=count
-            )
+            learner = Learner.of(task)
+            self._simulation = Simulation(self.environment, learner, starts, team, task.dt, runs=count)
         self._simulation.restart(run, positions)
         return self._simulation
 
@@ -138,12 +123,10 @@ class SharedSimulation:
             positions = self._simulation.positions.reshape(actions.shape)[due]
             results = dict(zip(due, episodes[due[0]].cost.of_teams(positions), strict=True))
         return {
-            run: episode.moved(contact[run], run in results, results.get(run))
-            for run, episode in episodes.items()
+            run: each.moved(contact[run], run in results, results.get(run)) for run, each in episodes.items()
         }
 
     def rows(self) -> Rows:
-        """Return what each robot of all episodes is told now."""
         assert self._simulation is not None
         seen = self._simulation.observe()
         if seen is not self._told[0]:
@@ -165,32 +148,27 @@ class Episode:
     def __init__(
         self, task: CoverageTask, spec: RunSpec, cost: CoverageCost, place: Place | None = None
     ) -> None:
-        environment, positions = spec.environment, spec.starts
+        environment, positions, n = spec.environment, spec.starts, len(spec.team)
         self.task, self.team, self.environment, self._spec = task, spec.team, environment, spec
-        if len(positions) != len(self.team):
-            raise StartError(
-                f"starts: {len(positions)}, but one for each of {len(self.team)} robots was wanted"
-            )
-        self.shared: SharedSimulation | None = None
-        run = 0
-        if place is not None and place[0].environment is environment:
-            self.shared, run = place
-        self._rows = slice(run * len(positions), (run + 1) * len(positions))
-        if self.shared is None:
-            self.simulation = spec.simulation(Learner.of(task))
+        if len(positions) != n:
+            raise StartError(f"starts: {len(positions)}, but one for each of {n} robots was wanted")
+        shared, run = place or (None, 0)
+        if shared is not None and shared.environment is environment:
+            self.shared: SharedSimulation | None = shared
+            self._rows, self.simulation = slice(run * n, (run + 1) * n), shared.begin(run, positions)
         else:
-            self.simulation = self.shared.begin(run, positions)
+            self.shared, self._rows = None, slice(n)
+            self.simulation = spec.simulation(Learner.of(task))
         self.working = self.simulation.working[self._rows]
         self.cost, self._cost = cost, MomentaryCost(cost)
         self._all_count = spec.conditions is None and not environment.moves
         self._counted = self._cost.counted(0.0, self.positions, self.working)
         result = self._cost(0.0, self.positions, self.working)
         if result is None or not result.mean_distance > 0.0:
-            raise ParameterError(
-                f"lattice: {task.lattice}, but a finer one was wanted for map {environment.name!r}"
-            )
+            wanted = f"a finer one was wanted for map {environment.name!r}"
+            raise ParameterError(f"lattice: {task.lattice}, but {wanted}")
         self.result = self.initial = result
-        self.reference = reference_distance(environment.free_area - result.uncovered_area, len(self.team))
+        self.reference = tasks.reference_distance(environment.free_area - result.uncovered_area, n)
         self.trail = [self.positions]
         self._rewarded = 0
         self._scans = self.simulation.observe().scans
@@ -203,12 +181,10 @@ class Episode:
 
     @property
     def time(self) -> float:
-        """Simulated time in seconds."""
         return self.cycle * self.task.repeat * self.task.dt
 
     @property
     def cycle(self) -> int:
-        """Number of actions so far."""
         return len(self.trail) - 1
 
     def observations(self) -> Rows:
@@ -219,15 +195,12 @@ class Episode:
 
     def state(self) -> Rows:
         """Return where all are, from the middle in diagonals, and how fast, (4 n,) from -1 to 1."""
-        low_x, low_y, high_x, high_y = self.environment.region.bounds
-        middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
-        where = (self.positions - middle) / self.environment.region.diameter
+        where = from_middle(self.positions, self.environment.region)
         speed = self.simulation.velocities[self._rows] / self.team.max_speed[:, None]
         rows: Rows = np.clip(np.column_stack([where, speed]), -1.0, 1.0).astype(np.float32)
         return rows.ravel()
 
     def facts(self) -> dict[str, float]:
-        """Return what is told beside observations: time and cost of the team, units in the names."""
         return {
             "time_s": self.time,
             "mean_distance_m": self.result.mean_distance,
@@ -243,7 +216,6 @@ class Episode:
         return self.moved(contact, last or self.due())
 
     def due(self) -> bool:
-        """Return whether the cost is rewarded after the next action."""
         since = self.cycle + 1 - self._rewarded
         return since >= self.task.reward_every or self.cycle + 1 >= self.task.cycles
 
@@ -277,7 +249,7 @@ class Episode:
         if changed:
             before = self._cost.at(now - since * task.period)(earlier[stayed])
             after = self._cost.at(now)(positions[stayed])
-        gained[stayed] = shares(task.reward, before, after, since / task.cycles)
+        gained[stayed] = tasks.shares(task.reward, before, after, since / task.cycles)
         return gained
 
     def record(self) -> Record:
@@ -296,7 +268,7 @@ def held(
     """Hold actions, (n, 2) N or m/s, for the time of one decision; return the time in contact, (n,) s."""
     contact = np.zeros(len(actions))
     for _ in range(task.repeat):
-        forces = driving_forces(task.action, actions, simulation.velocities, simulation.team)
+        forces = tasks.driving_forces(task.action, actions, simulation.velocities, simulation.team)
         forces = np.where(simulation.working[:, None], forces, 0.0)
         if moments is not None:
             moments.append(replace(simulation.snapshot, decision=Decision(forces)))
@@ -327,7 +299,99 @@ def checked_actions(actions: Any, count: int) -> Array:
         raise ParameterError(f"actions of shape {array.shape}, but {(count, 2)} was wanted")
     if not np.isfinite(array).all():
         robot = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise ParameterError(
-            f"action of robot_{robot + 1}: {shown(array[robot].tolist())}, but finite numbers were wanted"
-        )
+        told = f"{shown(array[robot].tolist())}, but finite numbers were wanted"
+        raise ParameterError(f"action of robot_{robot + 1}: {told}")
     return array
+
+
+RENDER_MODES = ("rgb_array", "human")
+
+
+class EpisodeEnv:
+    """An environment with `changes` of a task, whose `episode` is drawn as runs are drawn everywhere.
+
+    `render_mode` is ``rgb_array``, ``human``, which opens a window and needs a display, or None; `size` is
+    width and height in pixels, `theme` light or dark. Several may share the `scenarios` of their task. Raises
+    InputError when the task makes no sense or a map cannot be read.
+    """
+
+    # of films of the usual task, one picture for each action
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 10}
+
+    def __init__(
+        self,
+        task: CoverageTask | None = None,
+        *,
+        render_mode: str | None = None,
+        size: tuple[int, int] = (640, 480),
+        theme: str = "light",
+        scenarios: Scenarios | None = None,
+        **changes: Any,
+    ) -> None:
+        self.task = changed_task(task, changes)
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ParameterError(f"render_mode: {unknown_name('mode', str(render_mode), RENDER_MODES)}")
+        if len(size) != 2 or not all(64 <= side <= 8192 for side in size):
+            raise ParameterError(f"size: {size}, but width and height from 64 to 8192 pixels were wanted")
+        if theme not in ("light", "dark"):
+            raise ParameterError(f"theme: {unknown_name('theme', str(theme), ('light', 'dark'))}")
+        self.render_mode, self._theme, self._size = render_mode, theme, (int(size[0]), int(size[1]))
+        self._scenarios = Scenarios(self.task.maps, self.task.lattice) if scenarios is None else scenarios
+        self.episode: Episode | None = None
+        self._painter: Painter | None = None
+        self._window: Any = None
+        self._clock: Any = None
+
+    def _present(self) -> Episode:
+        if self.episode is None:
+            raise RobocovError("environment: reset() was wanted before anything else")
+        return self.episode
+
+    def render(self) -> Frame | None:
+        """Return a picture, (height, width, 3) of 0 to 255, with ``rgb_array``; else None."""
+        episode = self._present()
+        if self.render_mode != "rgb_array":
+            return None
+        painter, scene = self._drawn(episode)
+        return painter.frame(scene).copy()
+
+    def close(self) -> None:
+        if self._window is not None:
+            import pygame
+
+            pygame.display.quit()
+            self._window = self._clock = None
+
+    def _drawn(self, episode: Episode) -> tuple[Painter, Any]:
+        from robocov_app.render.picture import Painter
+        from robocov_app.render.scene import Scene
+        from robocov_app.render.theme import theme_named
+
+        if self._painter is None or self._painter.environment is not episode.environment:
+            self._painter = Painter(episode.environment, self._size, theme_named(self._theme))
+        drawn, trail = (episode.environment, episode.team), np.array(episode.trail)
+        ways = {"starts": trail[0], "trail": trail}
+        ways["trail_time"] = np.arange(float(len(trail))) * episode.task.period
+        label = f"action {episode.cycle} of {episode.task.cycles}"
+        cost = f"mean distance {episode.result.mean_distance:.3f} m"
+        scene = Scene.of(*drawn, episode.simulation.snapshot, **ways, label=label, cost=cost)
+        return self._painter, scene
+
+    def _show(self) -> None:
+        if self.render_mode != "human":
+            return
+        import pygame
+
+        if self._window is None:
+            try:
+                pygame.display.init()
+                self._window = pygame.display.set_mode(self._size)
+            except pygame.error as error:
+                raise RobocovError(f"render_mode: 'human', but there is no display ({error})") from error
+            pygame.display.set_caption("robocov")
+            self._clock = pygame.time.Clock()
+        pygame.event.pump()
+        painter, scene = self._drawn(self._present())
+        painter.draw(self._window, scene)
+        pygame.display.flip()
+        self._clock.tick(1.0 / self.task.period)

@@ -5,7 +5,7 @@ both. (gymnasium knows no entry points of packages any more.)
 """
 
 from functools import partial
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -14,10 +14,9 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 
 from robocov.arrays import Array
-from robocov_app.learning.episode import Outcome, Place, SharedSimulation, checked_actions, drawn_episode
-from robocov_app.learning.layout import Rows
-from robocov_app.learning.pictures import METADATA, EpisodeEnv
-from robocov_app.learning.task import CoverageTask, Scenarios, action_limit, changed_task
+from robocov_app.learning import episode as episodes
+from robocov_app.learning.episode import EpisodeEnv, Outcome, Place, SharedSimulation
+from robocov_app.learning.task import CoverageTask, Rows, Scenarios, action_limit, changed_task
 
 ID = "robocov/Coverage-v0"
 
@@ -31,28 +30,18 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
     of what `CoverageParallelEnv` gives each robot.
 
     An episode is truncated after `CoverageTask.duration`, and ends when no robot is left. The same seed and
-    actions give the same episode, bit for bit. The `changes` are of the task, as in
-    ``gymnasium.make(..., maps="museum", robots=4)``; several environments may share the `scenarios` of their
-    task. For `render_mode`, `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
+    actions give the same episode, bit for bit. The `options` are those of
+    `robocov_app.learning.episode.EpisodeEnv`, with changes of the task, as in
+    ``gymnasium.make(..., maps="museum", robots=4)``.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
-    metadata: ClassVar[dict[str, Any]] = dict(METADATA)  # type: ignore[misc]
+    place: "Place | None" = None
+    outcome: Outcome | None = None
 
-    def __init__(
-        self,
-        task: CoverageTask | None = None,
-        *,
-        render_mode: str | None = None,
-        size: tuple[int, int] = (640, 480),
-        theme: str = "light",
-        scenarios: Scenarios | None = None,
-        **changes: Any,
-    ) -> None:
-        super().__init__(task, changes, render_mode, size, theme, scenarios)
-        self.place: Place | None = None
-        self.outcome: Outcome | None = None
+    def __init__(self, task: CoverageTask | None = None, **options: Any) -> None:
+        super().__init__(task, **options)
         n = self.task.robots
         low, high = (np.tile(row, (n, 1)) for row in self.task.observation.bounds)
         self.observation_space = Box(low, high, dtype=np.float32)
@@ -65,7 +54,7 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         """Begin an episode; without a seed the random numbers go on. The options are `drawn_episode`'s."""
         gymnasium.Env.reset(self, seed=seed)
         self.outcome = None
-        self.episode = drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
+        self.episode = episodes.drawn_episode(self.task, self._scenarios, self.np_random, options, self.place)
         self._show()
         info = self._info(np.zeros(self.task.robots))
         return self._rows(), {**info, "map": self.episode.environment.name}
@@ -80,10 +69,8 @@ class CoverageEnv(EpisodeEnv, gymnasium.Env[NDArray[np.float32], NDArray[np.floa
         return self._rows(), reward, ended, over, self._info(outcome.contact)
 
     def _rows(self) -> Rows:
-        episode = self._present()
-        rows = episode.observations()
-        if episode.shared is None:
-            rows[~episode.working] = 0.0
+        rows = self._present().observations()
+        rows[~self._present().working] = 0.0
         return rows
 
     def _info(self, contact: Array) -> dict[str, Any]:
@@ -127,7 +114,7 @@ class CoverageVectorEnv(SyncVectorEnv):
         values, together = np.zeros((self.num_envs, self.task.robots, 2)), {}
         for run, (env, action) in enumerate(zip(self._teams, actions, strict=True)):
             if not begun_now[run]:
-                values[run] = checked_actions(action, self.task.robots)
+                values[run] = episodes.checked_actions(action, self.task.robots)
                 if env.episode is not None and env.episode.shared is not None:
                     together[run] = env.episode
         if self._shared is not None and together:

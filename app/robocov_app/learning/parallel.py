@@ -1,20 +1,20 @@
 """One learner for each robot: a parallel environment of PettingZoo."""
 
-from collections.abc import Mapping
-from typing import Any, ClassVar, TypeAlias
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from itertools import compress
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from gymnasium.spaces import Box
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from robocov.arrays import Array
 from robocov.errors import ParameterError, shown
-from robocov_app.learning.episode import drawn_episode
-from robocov_app.learning.layout import Rows
-from robocov_app.learning.pictures import METADATA, EpisodeEnv
-from robocov_app.learning.task import CoverageTask, action_limit
+from robocov_app.learning.episode import EpisodeEnv, drawn_episode
+from robocov_app.learning.task import CoverageTask, Rows, action_limit
 
+_T = TypeVar("_T")
 Flags: TypeAlias = dict[str, bool]
 Step: TypeAlias = tuple[dict[str, Rows], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]
 
@@ -27,25 +27,18 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
     `CoverageTask.repeat` control periods. An episode is truncated after `CoverageTask.duration`, or after
     `max_cycles` actions. The same seed and actions give the same episode, bit for bit.
 
-    The `changes` are of the task, as in ``CoverageParallelEnv(maps="museum", robots=4)``. For `render_mode`,
-    `size` and `theme` see `robocov_app.learning.pictures.EpisodeEnv`.
+    The `options` are those of `robocov_app.learning.episode.EpisodeEnv`, with changes of the task, as in
+    ``CoverageParallelEnv(maps="museum", robots=4)``.
 
     Raises InputError when the task makes no sense or a map cannot be read.
     """
 
-    metadata: ClassVar[dict[str, Any]] = METADATA | {"name": "robocov_coverage_v0", "is_parallelizable": True}
+    metadata = EpisodeEnv.metadata | {"name": "robocov_coverage_v0", "is_parallelizable": True}
 
     def __init__(
-        self,
-        task: CoverageTask | None = None,
-        *,
-        render_mode: str | None = None,
-        size: tuple[int, int] = (640, 480),
-        theme: str = "light",
-        max_cycles: int | None = None,
-        **changes: Any,
+        self, task: CoverageTask | None = None, *, max_cycles: int | None = None, **options: Any
     ) -> None:
-        super().__init__(task, changes, render_mode, size, theme)
+        super().__init__(task, **options)
         self.max_cycles = self.task.cycles if max_cycles is None else max_cycles
         if self.max_cycles < 1:
             raise ParameterError(f"max_cycles: {max_cycles}, but a whole number of at least 1 was wanted")
@@ -55,10 +48,8 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         low, high = self.task.observation.bounds
         limits = action_limit(self.task.action, self.task.whole_team).tolist()
         self.observation_spaces = {agent: Box(low, high, dtype=np.float32) for agent in self.possible_agents}
-        self.action_spaces = {
-            agent: Box(-limit, limit, (2,), np.float32)
-            for agent, limit in zip(self.possible_agents, limits, strict=True)
-        }
+        boxes = (Box(-limit, limit, (2,), np.float32) for limit in limits)
+        self.action_spaces = dict(zip(self.possible_agents, boxes, strict=True))
         self.state_space = Box(-1.0, 1.0, (4 * self.task.robots,), np.float32)
 
     def observation_space(self, agent: str) -> Box:
@@ -78,62 +69,49 @@ class CoverageParallelEnv(EpisodeEnv, ParallelEnv):
         self.episode = drawn_episode(self.task, self._scenarios, self._rng, options)
         self.agents = self._working()
         self._show()
-        infos = self._infos(np.zeros(self.task.robots))
-        for info in infos.values():
-            info["map"] = self.episode.environment.name
-        return self._observations(self.agents), infos
+        told = {**self.episode.facts(), "contact_s": 0.0, "map": self.episode.environment.name}
+        infos = {agent: dict(told) for agent in self.possible_agents}
+        return self._of(self.agents, self.episode.observations()), infos
 
     def step(self, actions: Mapping[str, Any]) -> Step:
         """Let every robot act, and return observations, rewards, terminations, truncations and infos."""
         episode = self._present()
         values = np.zeros((self.task.robots, 2))
         for robot, agent in enumerate(self.possible_agents):
-            if agent in self.agents:
-                values[robot] = _action(actions, agent)
-        acting = list(self.agents)
-        over = episode.cycle + 1 >= self.max_cycles
+            if agent not in self.agents:
+                continue
+            if agent not in actions:
+                raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
+            action = np.empty(0)
+            with suppress(TypeError, ValueError):
+                action = np.asarray(actions[agent], dtype=np.float64)
+            if action.shape != (2,) or not np.isfinite(action).all():
+                found = shown(actions[agent])
+                raise ParameterError(f"action of {agent}: {found}, but two finite numbers were wanted")
+            values[robot] = action
+        acting, over = self.agents, episode.cycle + 1 >= self.max_cycles
         outcome = episode.advance(values, last=over)
         self.agents = self._working()
         told = [agent for agent in self.possible_agents if agent in acting or agent in self.agents]
-        rewards = dict(zip(self.possible_agents, outcome.rewards.tolist(), strict=True))
         # who has failed will not come back: for it the episode has ended
         ended = {agent: agent not in self.agents for agent in told}
         truncated = {agent: over and not ended[agent] for agent in told}
-        observations, infos = self._observations(told), self._infos(outcome.contact)
+        observations, rewards = self._of(told, episode.observations()), outcome.rewards.tolist()
+        touched, common = self._of(told, outcome.contact.tolist()), episode.facts()
+        infos = {agent: {**common, "contact_s": seconds} for agent, seconds in touched.items()}
         if over:
             self.agents = []
         self._show()
-        rewards, infos = ({agent: each[agent] for agent in told} for each in (rewards, infos))
-        return observations, rewards, ended, truncated, infos
+        return observations, self._of(told, rewards), ended, truncated, infos
 
     def state(self) -> Rows:
         """Return where all robots are and how fast, for critics: see `Episode.state`."""
         return self._present().state()
 
     def _working(self) -> list[str]:
-        working = self._present().working.tolist()
-        return [agent for agent, works in zip(self.possible_agents, working, strict=True) if works]
+        return list(compress(self.possible_agents, self._present().working))
 
-    def _observations(self, agents: list[str]) -> dict[str, Rows]:
-        rows = dict(zip(self.possible_agents, self._present().observations(), strict=True))
-        return {agent: rows[agent] for agent in agents}
-
-    def _infos(self, contact: Array) -> dict[str, dict[str, Any]]:
-        common = self._present().facts()
-        told = zip(self.possible_agents, contact.tolist(), strict=True)
-        return {agent: {**common, "contact_s": touched} for agent, touched in told}
-
-
-def _action(actions: Mapping[str, Any], agent: str) -> Array:
-    """Return the action of one agent, (2,)."""
-    if agent not in actions:
-        raise ParameterError(f"actions: none of {agent}, but one of each agent was wanted")
-    try:
-        values = np.asarray(actions[agent], dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape != (2,) or not np.isfinite(values).all():
-        raise ParameterError(
-            f"action of {agent}: {shown(actions[agent])}, but two finite numbers were wanted"
-        )
-    return values
+    def _of(self, agents: list[str], values: Iterable[_T]) -> dict[str, _T]:
+        """Return the values of some of the agents, of one for each robot."""
+        every = dict(zip(self.possible_agents, values, strict=True))
+        return {agent: every[agent] for agent in agents}

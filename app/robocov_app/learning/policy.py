@@ -11,17 +11,16 @@ from robocov.arrays import Array
 from robocov.controllers import informed
 from robocov.controllers.base import Controller
 from robocov.controllers.gains import gain, validate_gains
-from robocov.errors import ParameterError, shown
+from robocov.errors import ParameterError, required
 from robocov.observation import Decision, Observations, Scanning, Scans
 from robocov.observation.region import Region
 from robocov.robots import Team
+from robocov_app.learning import task as tasks
 from robocov_app.learning.episode import Episode
-from robocov_app.learning.layout import ObservationLayout
-from robocov_app.learning.task import ACTIONS, Action, actions_of, checked_kind, driving_forces
+from robocov_app.learning.task import Action, ObservationLayout, actions_of, driving_forces
 
 Policy: TypeAlias = Callable[[NDArray[np.float32]], Any]
 """From an observation, (size,), to an action, (2,)."""
-
 _SOON = 5e-7  # seconds that sums of control periods may miss
 
 
@@ -75,9 +74,8 @@ class PolicyController:
     period: float = gain(0.1, "s", "for which an action is held")
 
     def __post_init__(self) -> None:
-        checked_kind("action", self.action, ACTIONS)
-        if not isinstance(self.layout, ObservationLayout):
-            raise ParameterError(f"layout: {shown(self.layout)}, but an ObservationLayout was wanted")
+        tasks.checked_kind("action", self.action, tasks.ACTIONS)
+        required("layout", self.layout, ObservationLayout, "an ObservationLayout")
         validate_gains(self)
 
     def __init_subclass__(cls) -> None:
@@ -87,7 +85,6 @@ class PolicyController:
 
     @property
     def scanning(self) -> Scanning | None:
-        """The scans that the observations need."""
         return Scanning(self.layout.rays, self.period) if self.layout.rays else None
 
     def act(self, observation: NDArray[np.float32]) -> Any:
@@ -97,7 +94,6 @@ class PolicyController:
         return self.policy(observation)
 
     def begin(self, region: Region, team: Team) -> Held:
-        """Return what is remembered before the first action."""
         return Held(team)
 
     def decide(self, seen: Observations, memory: Held) -> Decision:
@@ -105,17 +101,13 @@ class PolicyController:
         due = seen.time >= memory.due - _SOON if not self.layout.rays else seen.scans is not None
         if memory.actions is None or due:
             rows = self.layout.rows(seen, memory.team)
-            actions = np.array([self._checked(self.act(row)) for row in rows])
-            memory = Held(memory.team, actions, seen.time + self.period)
+            given = [np.asarray(self.act(row), dtype=np.float64) for row in rows]
+            if wrong := [action.shape for action in given if action.shape != (2,)]:
+                raise ParameterError(f"{self.name}: an action of shape {wrong[0]}, but (2,) was wanted")
+            memory = Held(memory.team, np.array(given), seen.time + self.period)
         assert memory.actions is not None
         forces = driving_forces(self.action, memory.actions, seen.velocities, memory.team)
         return Decision(forces, memory=memory)
-
-    def _checked(self, given: Any) -> Array:
-        action = np.asarray(given, dtype=np.float64)
-        if action.shape != (2,):
-            raise ParameterError(f"{self.name}: an action of shape {action.shape}, but (2,) was wanted")
-        return action
 
 
 class ControllerPolicy:
@@ -137,8 +129,7 @@ class ControllerPolicy:
         self._episode: Episode | None = None
         self._law: Any = None
         self._memory: Any = None
-        self._asked_at = self._scanned_at = -1
-        self._actions: Array | None = None
+        self._actions = np.empty((0, 2))
 
     def __call__(self, env: Any) -> Any:
         """Return the actions of a team: by agent for a parallel environment, else (n, 2) N or m/s.
@@ -147,19 +138,18 @@ class ControllerPolicy:
         says the same. The environment, `CoverageParallelEnv` or `CoverageEnv`, may be wrapped.
         """
         bare = env.unwrapped
-        actions = self._decided(bare.episode)
-        agents = getattr(bare, "agents", None)
-        if agents is None:
-            return actions.copy()
-        rows = dict(zip(bare.possible_agents, actions.copy(), strict=True))
-        return {agent: rows[agent] for agent in agents}
+        actions = self._decided(bare.episode).copy()
+        if not hasattr(bare, "agents"):
+            return actions
+        rows = dict(zip(bare.possible_agents, actions, strict=True))
+        return {agent: rows[agent] for agent in bare.agents}
 
     def _decided(self, episode: Episode) -> Array:
         if self._episode is not episode:
-            self._episode, self._asked_at, self._scanned_at = episode, -1, -1
+            self._episode, self._asked_at, self._scan_number = episode, -1, -1
             self._law = informed(self.controller, episode.environment)
             self._memory = self._law.begin(episode.environment.region, episode.team)
-        if self._asked_at != episode.cycle or self._actions is None:
+        if self._asked_at != episode.cycle:
             seen = replace(episode.simulation.snapshot.seen, scans=self._scanned(episode))
             decision = self._law.decide(seen, self._memory)
             self._memory, self._asked_at = decision.memory, episode.cycle
@@ -171,10 +161,9 @@ class ControllerPolicy:
         scanning: Scanning | None = getattr(self._law, "scanning", None)
         if scanning is None:
             return None
-        step, every = episode.cycle * episode.task.repeat, scanning.every(episode.task.dt)
-        if self._scanned_at >= 0 and step // every == self._scanned_at // every:
+        number = episode.cycle * episode.task.repeat // scanning.every(episode.task.dt)
+        if number == self._scan_number:
             return None
-        self._scanned_at = step
-        simulation = episode.simulation
+        self._scan_number, simulation = number, episode.simulation
         scans = simulation.sensor.scans(simulation.positions, scanning.rays, episode.team.sensing_range)
         return Scans(*scans)

@@ -1,32 +1,35 @@
-"""The task that is to be learned: maps, team, time, actions and reward."""
+"""The task that is to be learned: maps, team, time, observations, actions and reward."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, lru_cache, partial
+from itertools import accumulate
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robocov.arrays import Array
+from robocov.arrays import Array, IntArray
+from robocov.compiled import kernel
 from robocov.conditions import Conditions
+from robocov.controllers.base import cells_seen
 from robocov.cost import CoverageCost, CoverageResult
 from robocov.environment import Environment
-from robocov.errors import ParameterError, checked, counted, shown, unknown_name
+from robocov.errors import ParameterError, checked, counted, required, shown, unknown_name
 from robocov.mapfile import load_map
+from robocov.observation import MOST_RAYS, Observations, Scans
+from robocov.observation.region import Region
 from robocov.robots import Team
 from robocov.simulation import DEFAULT_DT, check_dt
-from robocov_app.learning.layout import ObservationLayout
 
 Action: TypeAlias = Literal["force", "velocity"]
 """A force in N, or a velocity in m/s."""
-
-ACTIONS: tuple[Action, ...] = ("force", "velocity")
-
+ACTIONS: tuple[Action, ...] = get_args(Action)
 FOLLOWING = 0.1  # time constant in seconds with which a robot follows a velocity that it is told
 
 
 def checked_kind(what: str, given: str, known: Sequence[str]) -> None:
-    """Raise ParameterError when there is no kind of `what` that is called so."""
     if given not in known:
         raise ParameterError(f"{what}: {unknown_name(f'kind of {what}', str(given), known)}")
 
@@ -37,10 +40,6 @@ def action_limit(action: Action, team: Team) -> Array:
     A force of m a + nu v is what it takes to go at the largest speed v and be accelerated by the largest
     acceleration a all the same; what is more has no effect. Larger actions are no mistake: the world limits
     speed and acceleration, for learners as for all controllers.
-
-    >>> from robocov.robots import Team
-    >>> action_limit("force", Team.homogeneous(2))
-    array([4., 4.])
     """
     if action == "velocity":
         return team.max_speed
@@ -69,8 +68,7 @@ def actions_of(action: Action, forces: Array, velocities: Array, team: Team) -> 
 
 Reward: TypeAlias = Literal["shared", "own", "level"]
 """Sharing of rewards among robots; see `shares`."""
-
-REWARDS: tuple[Reward, ...] = ("shared", "own", "level")
+REWARDS: tuple[Reward, ...] = get_args(Reward)
 
 
 def reference_distance(area: float, robots: int) -> float:
@@ -79,9 +77,6 @@ def reference_distance(area: float, robots: int) -> float:
     The mean distance to the middle of a disc, 2/3 of its radius, is the least among all shapes of its
     area; with n equal parts of the area A it is ``2/3 sqrt(A / (pi n))``. It makes costs of maps and teams of
     different sizes comparable.
-
-    >>> round(reference_distance(100.0, 6), 3)
-    1.536
     """
     return 2.0 / 3.0 * float(np.sqrt(area / (np.pi * robots)))
 
@@ -99,24 +94,17 @@ def shares(reward: Reward, before: CoverageResult, after: CoverageResult, part: 
     decrease = before.mean_distance - after.mean_distance
     if reward == "shared":
         return np.full(n, decrease)
-    moved = after.positions - before.positions
-    slope = _slope(before) + _slope(after)
-    own = -0.5 * (slope * moved).sum(axis=1)
+    slope = np.zeros_like(after.positions)  # of the mean distance, before and after together
+    for result in (before, after):
+        if result.value:
+            slope += result.gradient * (result.mean_distance / result.value)
+    own = -0.5 * (slope * (after.positions - before.positions)).sum(axis=1)
     return np.asarray(own + (decrease - own.sum()) / n)
-
-
-def _slope(result: CoverageResult) -> Array:
-    """Return the derivative of the mean distance by every robot's position, (n, 2)."""
-    if not result.value:
-        return np.zeros_like(result.positions)
-    return result.gradient * (result.mean_distance / result.value)
 
 
 MapSource: TypeAlias = str | Path | Environment | Callable[[int], Environment]
 """A map, its name or path, or what makes one of a seed."""
-
 SEEDS = 2**31  # a maker of maps is given a seed below this
-
 _KEPT = 64  # maps with their costs that are kept at most
 
 
@@ -158,41 +146,26 @@ class Scenarios:
 
     def __init__(self, maps: MapSource | Sequence[MapSource], lattice: int) -> None:
         several = isinstance(maps, Sequence) and not isinstance(maps, str)
-        given: Sequence[Any] = maps if several else (maps,)  # type: ignore[assignment]
+        given: Any = maps if several else (maps,)
         if not given:
             raise ParameterError("maps: none, but at least one was wanted")
         self._sources = [_source(each, f"maps[{k}]" if several else "maps") for k, each in enumerate(given)]
-        self._lattice = lattice
-        self._costs: dict[Environment, CoverageCost] = {}
+        self.cost = lru_cache(_KEPT)(partial(CoverageCost, lattice=lattice))
 
     @property
     def only(self) -> Environment | None:
-        """The map, where there is but one."""
         source = self._sources[0]
         return source if len(self._sources) == 1 and isinstance(source, Environment) else None
 
     def draw(self, rng: np.random.Generator) -> Environment:
-        """Return one of the maps, each as likely, or a new one of its maker."""
         source = self._sources[int(rng.integers(len(self._sources)))]
         return map_of(source, int(rng.integers(SEEDS)))
-
-    def cost(self, environment: Environment) -> CoverageCost:
-        """Return the coverage cost of a map."""
-        cost = self._costs.pop(environment, None)
-        if cost is None:
-            cost = CoverageCost(environment, self._lattice)
-        self._costs[environment] = cost  # the last one is the last that was asked for
-        if len(self._costs) > _KEPT:
-            del self._costs[next(iter(self._costs))]
-        return cost
 
 
 def map_of(given: object, seed: int) -> Environment:
     """Return a map: itself, that of a name or path, or what somebody's function makes of the seed."""
     source = _source(given, "map")
-    if isinstance(source, Environment):
-        return source
-    environment = source(seed)
+    environment = source if isinstance(source, Environment) else source(seed)
     if not isinstance(environment, Environment):
         raise ParameterError(f"maps: for seed {seed} {shown(environment)}, but an Environment was wanted")
     return environment
@@ -203,9 +176,136 @@ def _source(given: object, where: str) -> Environment | Callable[[int], Environm
         return load_map(given)
     if isinstance(given, Environment) or callable(given):
         return given
-    raise ParameterError(
-        f"{where}: {shown(given)}, but a map, its name or path, or a function from a seed to one was wanted"
-    )
+    wanted = "a map, its name or path, or a function from a seed to one"
+    raise ParameterError(f"{where}: {shown(given)}, but {wanted} was wanted")
+
+
+Rows: TypeAlias = NDArray[np.float32]
+"""(n, size): one row for each robot."""
+MOST_NEIGHBOURS = 1000  # most neighbours that a row has room for
+
+
+@dataclass(frozen=True)
+class ObservationLayout:
+    """Layout of an observation: its numbers and their order.
+
+    Row i holds only what robot i knows (see `robocov.observation`); all are from -1 to 1. The unit of
+    ``D`` is the diagonal of the known region's bounding box, that of ``S`` the robot's sensing range, or
+    ``D`` where that is shorter.
+
+    =============  ==================  =====================================================================
+    block          numbers             content
+    =============  ==================  =====================================================================
+    ``position``   2                   from the middle of the region's bounding box, D
+    ``velocity``   2                   in the robot's largest speed
+    ``obstacle``   3                   offset of the nearest sensed obstacle point, S; then 1; all 0 for none
+    ``neighbour``  3 x `neighbours`    the nearest robots that are heard, nearest first: offset, D; then 1;
+                                       all 0 where there is none
+    ``rays``       `rays`              distance along each ray, evenly round from +x, S; 1 where it is free
+    ``centroid``   2, if `centroid`    offset of the centroid (2) of the robot's Voronoi cell, by φ, D
+    =============  ==================  =====================================================================
+
+    Each ray costs a query of the physics. The centroid is the one number that a robot has to compute of the
+    others: what Lloyd's algorithm steers to. Raises ParameterError when a number is out of range.
+
+    Examples
+    --------
+    >>> layout = ObservationLayout(neighbours=2)
+    >>> layout.size, layout.blocks["neighbour"]
+    (13, slice(7, 13, None))
+    """
+
+    neighbours: int = 4
+    rays: int = 0
+    centroid: bool = False
+
+    def __post_init__(self) -> None:
+        for name, most in (("neighbours", MOST_NEIGHBOURS), ("rays", MOST_RAYS)):
+            checked(f"observation.{name}", getattr(self, name), 0, most, whole=True)
+        required("observation.centroid", self.centroid, bool, "true or false")
+
+    @cached_property
+    def blocks(self) -> dict[str, slice]:
+        """Slices of the blocks of a row, in their order; only those that it has."""
+        counts = {"position": 2, "velocity": 2, "obstacle": 3, "neighbour": 3 * self.neighbours}
+        counts |= {"rays": self.rays, "centroid": 2 * self.centroid}
+        ends = accumulate(counts.values())
+        return {
+            name: slice(end - count, end)
+            for (name, count), end in zip(counts.items(), ends, strict=True)
+            if count
+        }
+
+    @property
+    def size(self) -> int:
+        return 7 + 3 * self.neighbours + self.rays + 2 * self.centroid
+
+    @property
+    def bounds(self) -> tuple[Rows, Rows]:
+        """Least and largest values of a row, (size,) each."""
+        low = np.full(self.size, -1.0, dtype=np.float32)
+        rays = 7 + 3 * self.neighbours
+        low[6:rays:3] = low[rays : rays + self.rays] = (
+            0.0  # whether there is a point, who is heard, distances
+        )
+        return low, np.ones(self.size, dtype=np.float32)
+
+    def rows(self, seen: Observations, team: Team, scans: Scans | None = None) -> Rows:
+        """Return what each robot is told, (n, size), with the latest scans, by default those of `seen`."""
+        n, unit = len(seen.positions), seen.region.diameter
+        reach = np.clip(team.sensing_range, 1e-9, unit)[:, None]
+        places, rows = self.blocks, np.zeros((n, self.size))
+        rows[:, places["position"]] = from_middle(seen.positions, seen.region)
+        rows[:, places["velocity"]] = seen.velocities / team.max_speed[:, None]
+        sensed = ~np.isnan(seen.obstacle_points[:, 0])
+        obstacle = rows[:, places["obstacle"]]
+        obstacle[sensed, :2] = ((seen.obstacle_points - seen.positions) / reach)[sensed]
+        obstacle[:, 2] = sensed
+        if self.neighbours:
+            robot, _, offset, distance = seen.neighbours_within(4.0 * unit)
+            nearest = np.zeros((n, self.neighbours, 3))
+            farthest = np.full((n, self.neighbours), np.inf)
+            _place_nearest(robot, offset, distance, unit, farthest, nearest)
+            rows[:, places["neighbour"]] = nearest.reshape(n, -1)
+        if self.rays:
+            scans = seen.scans if scans is None else scans
+            if scans is None or scans.rays != self.rays:
+                found, wanted = "none" if scans is None else scans.rays, f"{self.rays} in a scan were wanted"
+                raise ParameterError(f"observation.rays: {wanted}, but {found} are there")
+            rows[:, places["rays"]] = np.where(scans.hit, scans.distances / reach, 1.0)
+        if self.centroid:
+            centroid = cells_seen(seen, "distance", None).centroid
+            rows[:, places["centroid"]] = (centroid - seen.positions) / unit
+        # what is believed of places may be off by more than there is
+        return np.minimum(np.maximum(rows, -1.0), 1.0).astype(np.float32)
+
+
+def from_middle(positions: Array, region: Region) -> Array:
+    """Return positions from the middle of a region's bounding box, in its diagonals, (n, 2)."""
+    low_x, low_y, high_x, high_y = region.bounds
+    middle = np.array([(low_x + high_x) / 2.0, (low_y + high_y) / 2.0])
+    return np.asarray((positions - middle) / region.diameter)
+
+
+@kernel
+def _place_nearest(
+    robot: IntArray, offset: Array, distance: Array, unit: float, best: Array, blocks: Array
+) -> None:
+    """Put the nearest neighbours of robots into `blocks`, (n, count, 3), their distances into `best`."""
+    for k in range(len(robot)):
+        i, place = robot[k], best.shape[1]
+        # what is equally far stays in the order of the numbers
+        while place > 0 and distance[k] < best[i, place - 1]:
+            place -= 1
+        for later in range(best.shape[1] - 1, place, -1):
+            best[i, later] = best[i, later - 1]
+            for c in range(3):
+                blocks[i, later, c] = blocks[i, later - 1, c]
+        if place < best.shape[1]:
+            best[i, place], blocks[i, place, 2] = distance[k], 1.0
+            for c in range(2):
+                # from the robot to its neighbour
+                blocks[i, place, c] = -offset[k, c] / unit
 
 
 MOST_ROBOTS = 10_000
@@ -248,24 +348,19 @@ class CoverageTask:
         for name, most in (("robots", MOST_ROBOTS), ("repeat", 100_000), ("reward_every", 100_000)):
             checked(name, getattr(self, name), 1, most, whole=True)
         if not np.isfinite(self.duration) or self.duration < self.period - 5e-7:
-            raise ParameterError(
-                f"duration: {shown(self.duration)} s, but at least the time of one action, "
-                f"{self.period:g} s, was wanted"
-            )
+            wanted = f"at least the time of one action, {self.period:g} s, was wanted"
+            raise ParameterError(f"duration: {shown(self.duration)} s, but {wanted}")
         if not 0.0 <= self.contact_penalty < np.inf:
-            raise ParameterError(
-                f"contact_penalty: {shown(self.contact_penalty)}, but a finite number from 0 was wanted"
-            )
+            found = shown(self.contact_penalty)
+            raise ParameterError(f"contact_penalty: {found}, but a finite number from 0 was wanted")
         checked_kind("reward", self.reward, REWARDS)
         checked_kind("action", self.action, ACTIONS)
         if self.action == "velocity" and self.dt > FOLLOWING:
-            raise ParameterError(
-                f"dt: {self.dt:g} s, but at most {FOLLOWING:g} s was wanted for robots to follow velocities"
-            )
+            wanted = f"at most {FOLLOWING:g} s was wanted for robots to follow velocities"
+            raise ParameterError(f"dt: {self.dt:g} s, but {wanted}")
         for name, kind in (("team", Team), ("observation", ObservationLayout), ("conditions", Conditions)):
-            value = getattr(self, name)
-            if not isinstance(value, kind) and not (value is None and name != "observation"):
-                raise ParameterError(f"{name}: {shown(value)}, but a {kind.__name__} was wanted")
+            if getattr(self, name) is not None or name == "observation":
+                required(name, getattr(self, name), kind, f"a {kind.__name__}")
         if self.conditions is not None:
             self.conditions.check_team(len(self.whole_team))
         object.__setattr__(self, "team", self.whole_team)
@@ -273,7 +368,6 @@ class CoverageTask:
 
     @property
     def whole_team(self) -> Team:
-        """The team, whether it was given or not."""
         return Team.homogeneous(self.robots) if self.team is None else self.team
 
     @property
@@ -283,19 +377,15 @@ class CoverageTask:
 
     @property
     def cycles(self) -> int:
-        """Number of actions of an episode."""
         return max(1, round(self.duration / self.period))
 
     @property
     def agents(self) -> list[str]:
-        """Names of the robots: ``robot_1``, ``robot_2``, ..."""
         return [f"robot_{number}" for number in range(1, self.robots + 1)]
 
     def __repr__(self) -> str:
-        return (
-            f"<CoverageTask {counted(self.robots, 'robot')}, {self.duration:g} s, "
-            f"{counted(self.cycles, 'action')}, {self.action}, reward {self.reward}>"
-        )
+        size = f"{counted(self.robots, 'robot')}, {self.duration:g} s, {counted(self.cycles, 'action')}"
+        return f"<CoverageTask {size}, {self.action}, reward {self.reward}>"
 
 
 def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> CoverageTask:
@@ -304,8 +394,6 @@ def changed_task(task: CoverageTask | None, changes: Mapping[str, Any]) -> Cover
     for name in changes:
         if name not in known:
             raise ParameterError(unknown_name("part of a task", name, known))
-    if task is None:
-        return CoverageTask(**changes)
     # the number of robots goes with the team, and would else be that of the old one
     team: dict[str, Any] = {"team": None} if "robots" in changes else {}
-    return replace(task, **(team | dict(changes)))
+    return replace(task or CoverageTask(), **(team | dict(changes)))

@@ -27,8 +27,10 @@ from robocov_app.terminal.output import finite, write_csv, write_json
 from robocov_app.terminal.progress import counting, progress
 
 _HEAD = {"format": "robocov-comparison", "version": 1}
-_FIGURES = ("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m")
-_TIMED = ("mean_time_s",)  # where robots are not equally fast
+_FIGURES = (
+    *("mean_distance_m", "cost_m3", "uncovered_area_m2", "settled_at_s", "contacts", "min_clearance_m"),
+    "mean_time_s",  # where robots are not equally fast
+)
 
 
 def performed(
@@ -38,8 +40,7 @@ def performed(
     compile_kernels()
     cost = built_cost(next(iter(specs.values())).environment, options.lattice, quiet=options.json)
     kind: Kind = "comparison" if comparison else "run"
-    parts = specs if comparison else ()
-    runs: dict[str, Run] = {}
+    parts, runs = specs if comparison else (), dict[str, Run]()
     with results(out, kind, overwrite=options.overwrite, parts=parts) as result, Interruption() as stop:
         if comparison:
             begin_comparison(result.new, list(specs))
@@ -82,8 +83,7 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
             "controller": name,
             "label": run.record.label,
             "gains": dict(run.record.gains),
-            **{figure: run.summary[figure] for figure in _FIGURES},
-            **{figure: run.summary[figure] for figure in _TIMED if figure in run.summary},
+            **{figure: run.summary[figure] for figure in _FIGURES if figure in run.summary},
             "mean_path_length_m": sum(run.summary["path_length_m"]) / len(run.record.team),
             "above_best": run.summary["mean_distance_m"] / best - 1.0,
         }
@@ -92,7 +92,6 @@ def rows_of(runs: Mapping[str, Run]) -> list[dict[str, Any]]:
 
 
 def begin_comparison(folder: Path, folders: Sequence[str]) -> None:
-    """Write which folders belong to the comparison, so that also one that is killed can be read."""
     write_json(folder / "comparison.json", {**_HEAD, "folders": list(folders), "runs": []})
 
 
@@ -118,10 +117,10 @@ def save_pictures(
     theme, size = film.colour_theme, film.picture_size()
 
     def curves(kind: str) -> list[Curve]:
-        values = [getattr(run.history, kind) for run in runs]
+        values = [(run, getattr(run.history, kind)) for run in runs]
         return [
             (run.record.label, run.record.controller, run.history.time, value)
-            for run, value in zip(runs, values, strict=True)
+            for run, value in values
             if value is not None and (kind == "mean_distance" or np.isfinite(value).any())
         ]
 
@@ -155,11 +154,9 @@ def last_moments(runs: Sequence[Run], cost: CoverageCost) -> list[Moment]:
             cost = built_cost(drawn, cost.lattice, quiet=True)
         momentary, time = MomentaryCost(cost), float(record.time[-1])
         working = momentary.counted(time, record.positions[-1], record.working[-1])
-        if not working.any():
-            continue
-        now, rows = momentary.at(time), np.flatnonzero(working)
-        field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
-        some = None if working.all() else rows
-        mean = float(run.history.mean_distance[-1])
-        moments.append(Moment.last_of(record, field, mean, some, run.final_time))
+        if working.any():
+            now, rows = momentary.at(time), np.flatnonzero(working)
+            field = Field(FieldLattice(now.sites), now(record.positions[-1][rows]))
+            mean = float(run.history.mean_distance[-1])
+            moments.append(Moment.last_of(record, field, mean, rows, run.final_time))
     return moments

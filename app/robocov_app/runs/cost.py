@@ -48,7 +48,6 @@ def draw_distances(
     from robocov_app.render.distance_field import Field, FieldLattice
 
     team = Team.homogeneous(len(positions), radius=radius)
-    field = Field(FieldLattice(cost.sites), cost(positions, speeds))
-    facts = f"{counted(len(team), 'robot')}, {mean}"
-    moment = Moment(cost.environment, team, field, cost.environment.name, facts)
+    field, facts = Field(FieldLattice(cost.sites), cost(positions, speeds)), counted(len(team), "robot")
+    moment = Moment(cost.environment, team, field, cost.environment.name, f"{facts}, {mean}")
     save_figure(plot_coverage([], [moment], theme, title=title), path)

@@ -1,9 +1,9 @@
 """Films of runs: one by itself, or several side by side under a legend that they share."""
 
 from collections.abc import Iterator, Sequence
-from itertools import zip_longest
+from itertools import groupby, zip_longest
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,22 +29,14 @@ from robocov_app.terminal.progress import progress
 
 USUAL_SIZE = (1920, 1080)  # pixels that a film of several panes has at most, where no size is asked for
 GAP = 2  # pixels of the line between two panes
-
 _NARROWEST = 360  # least width in pixels of a pane at scale 1: its caption fits
-
-FILM_SCALE = 1.3
-"""Upper end of a film's colour scale, as a multiple of the largest distance at its end."""
-
+FILM_SCALE = 1.3  # upper end of a film's colour scale, as a multiple of the largest distance at its end
 FILMS = "run.mp4", "comparison.mp4"  # of one run, of several side by side
 FILM_HOLD = 1.0  # seconds for which a film stays on its last moment
 
 
 def frame_rows(time: Array, fps: float, speed: float = 1.0, hold: float = 0.0) -> IntArray:
-    """Return which row of a record of ascending times, (T,) s, each frame shows, the last one for `hold`, s.
-
-    >>> frame_rows(np.arange(5) * 0.5, fps=2, speed=2.0).tolist()
-    [0, 2, 4]
-    """
+    """Return which row of ascending times, (T,) s, each frame of a film shows, the last one for `hold`, s."""
     count = int(np.ceil(float(time[-1] - time[0]) / speed * fps - 1e-9)) + 1
     at = time[0] + np.arange(count + round(hold * fps)) * (speed / fps)
     # half a microsecond forgives the rounding of sums of steps
@@ -65,15 +57,15 @@ def iter_frames(
 ) -> Iterator[Frame]:
     """Draw the frames of a saved run, by default of `frame_rows`; each tells the latest known `cost`."""
     painter = _painter(record, film, size, layers or standard_layers(film.colours), scale)
-    if rows is None:
-        rows = frame_rows(record.time, film.fps, film.film_speed)
-    last, frame = -1, None
-    for row in rows.tolist():
-        if frame is None or row != last:
-            text = _cost_text(mean_label(record.environment), float(record.time[row]), cost)
-            field = fields if painter.needs_field else None
-            last, frame = row, painter.frame(record_scene(record, row, cost=text, fields=field))
-        yield frame
+    rows = frame_rows(record.time, film.fps, film.film_speed) if rows is None else rows
+    for row, shown in groupby(rows.tolist()):
+        text = ""
+        if cost is not None and (known := np.searchsorted(cost.time, record.time[row] + 5e-7, side="right")):
+            mean_time = None if cost.mean_time is None else cost.mean_time[known - 1]
+            text = cost_label(mean_label(record.environment), cost.mean_distance[known - 1], mean_time)
+        field = fields if painter.needs_field else None
+        frame = painter.frame(record_scene(record, row, cost=text, fields=field))
+        yield from (frame for _ in shown)
 
 
 def _painter(
@@ -82,14 +74,6 @@ def _painter(
     painter = Painter(record.environment, size, film.colour_theme, layers, scale)
     painter.change(*film.layers())
     return painter
-
-
-def _cost_text(what: str, time: float, cost: CostHistory | None) -> str:
-    if cost is None:
-        return ""
-    known = int(np.searchsorted(cost.time, time + 5e-7, side="right")) - 1
-    mean_time = None if cost.mean_time is None else cost.mean_time[known]
-    return cost_label(what, cost.mean_distance[known], mean_time) if known >= 0 else ""
 
 
 class PaneLayout(NamedTuple):
@@ -102,7 +86,6 @@ class PaneLayout(NamedTuple):
     size: tuple[int, int]
 
     def page(self, panes: Sequence[Frame], theme: Theme) -> Frame:
-        """Put the frames of panes together below the legend."""
         page = np.full((self.size[1], self.size[0], 3), theme.background, dtype=np.uint8)
         page[: len(self.header), : self.header.shape[1]] = self.header
         body = tiled(panes, self.columns, GAP, theme.grid, theme.background)
@@ -142,10 +125,10 @@ def pane_layout(
     painter = _painter(records[0], film, (64, 64), pane_layers(film.colours), scale)
     if legend_of is None:
         shown = fields if painter.needs_field else None
-        moments = [(record, row) for record in records for row in (0, len(record) - 1)]
-        legend_of = [
-            record_scene(record, row, fields=shown) for record, row in moments if not row or record.conditions
+        moments = [
+            (each, row) for each in records for row in (0, len(each) - 1) if not row or each.conditions
         ]
+        legend_of = [record_scene(record, row, fields=shown) for record, row in moments]
     # the longest first: its order is kept, and mostly nothing is missing
     found = sorted((painter.legend_entries(scene) for scene in legend_of), key=len)[::-1]
     entries = united(found, LegendEntry.key)
@@ -167,20 +150,12 @@ def comparison_frames(
     hold: float = 0.0,
     fields: Fields | None = None,
 ) -> Iterator[Frame]:
-    """Draw the frames of several saved runs side by side; those that end before others stay as they are."""
-    films = [
-        iter_frames(
-            record,
-            film,
-            size=layout.pane,
-            scale=layout.scale,
-            layers=pane_layers(film.colours),  # layers keep what they have drawn: each film has its own
-            cost=cost,
-            rows=frame_rows(record.time, film.fps, film.film_speed, hold),
-            fields=fields,
-        )
-        for record, cost in zip(records, costs, strict=True)
-    ]
+    look: dict[str, Any] = {"size": layout.pane, "scale": layout.scale, "fields": fields}
+    films = []
+    for record, cost in zip(records, costs, strict=True):
+        rows = frame_rows(record.time, film.fps, film.film_speed, hold)
+        layers = pane_layers(film.colours)  # they keep what they have drawn: each film has its own
+        films.append(iter_frames(record, film, layers=layers, cost=cost, rows=rows, **look))
     panes: list[Frame] = []
     for fresh in zip_longest(*films):
         panes = [old if new is None else new for new, old in zip_longest(fresh, panes)]
@@ -206,9 +181,8 @@ def film_fields(
     if not film.layers()[0] & {"distances", "geodesic_cells"}:
         return None
     environment = runs[0].record.environment
-    cost = cost_for_pictures(
-        environment, cost or built_cost(environment, FILM_LATTICE, quiet=quiet), FILM_LATTICE
-    )
+    cost = cost or built_cost(environment, FILM_LATTICE, quiet=quiet)
+    cost = cost_for_pictures(environment, cost, FILM_LATTICE)
     momentary, farthest = MomentaryCost(cost), 0.0
     for record in (run.record for run in runs):
         result = momentary(float(record.time[-1]), record.positions[-1], record.working[-1])

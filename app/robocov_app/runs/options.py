@@ -135,15 +135,14 @@ class ConditionOptions:
             return None
         from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 
-        option = "--fail"
-        try:
-            failures = tuple(parsed_entry(Failure, text) for text in self.fail)
-            option = "--join"
-            joins = tuple(parsed_entry(Join, text) for text in self.join)
-        except ParameterError as error:
-            raise ParameterError(f"{option}: {error}") from None
+        events: dict[str, Any] = {}
+        for option, kind, texts in (("fail", Failure, self.fail), ("join", Join, self.join)):
+            try:
+                events[option] = tuple(parsed_entry(kind, text) for text in texts)
+            except ParameterError as error:
+                raise ParameterError(f"--{option}: {error}") from None
         limits = {name: getattr(self, name) for name in LIMITS}
-        conditions = Conditions(**limits, failures=failures, joins=joins, seed=seed)
+        conditions = Conditions(**limits, failures=events["fail"], joins=events["join"], seed=seed)
         conditions.check_team(robots)
         return None if conditions.ideal else conditions
 
@@ -181,12 +180,10 @@ class FilmOptions(LayerOptions):
         return None if self.size is None else parsed_size("--size", self.size, (320, 240), (7680, 4320))
 
     def film_size(self) -> tuple[int, int]:
-        """Return the size of film frames (width, height)."""
         return self.picture_size() or (1280, 720)
 
     @property
     def colour_theme(self) -> Theme:
-        """The theme of pictures and films."""
         from robocov_app.render.theme import theme_named
 
         return theme_named(self.theme or "light")
@@ -265,10 +262,9 @@ class RunOptions(ScenarioOptions, JsonOption):
             checked("--record-hz", self.record_hz, 0.001, 1e4, "Hz")
         rows = self.duration / self.dt * self.robots / self.record_every
         if rows > MOST_ROWS:
-            raise ParameterError(
-                f"--record-hz: {self.record_hz:g} Hz for {self.duration:g} s of {self.robots} robots are "
-                f"{rows:.3g} rows of the record, but at most {MOST_ROWS:.0e} were wanted"
-            )
+            size = f"{self.duration:g} s of {self.robots} robots are {rows:.3g} rows of the record"
+            wanted = f"at most {MOST_ROWS:.0e} were wanted"
+            raise ParameterError(f"--record-hz: {self.record_hz:g} Hz for {size}, but {wanted}")
 
     @property
     def record_every(self) -> int:
@@ -279,12 +275,10 @@ class RunOptions(ScenarioOptions, JsonOption):
 
     @property
     def record_words(self) -> str:
-        """Note on a thinned record, for the command's last line."""
         every = self.record_every
         return f"; the record, and what is counted in it, is of one step in {every}" if every > 1 else ""
 
     def made_team(self) -> Team:
-        """Return the team that the options describe, or raise InputError."""
         from robocov.robots import LIMITS, Team, read_team
 
         said = {name: getattr(self, name) for name in LIMITS if name != "mass"}
@@ -298,17 +292,9 @@ class RunOptions(ScenarioOptions, JsonOption):
         """Return what is to be run; raises InputError when it cannot be."""
         from robocov_app.runs.spec import RunSpec
 
-        spec = RunSpec(
-            environment,
-            controller,
-            gains,
-            team=self.made_team(),
-            start=self.start,
-            seed=self.seed,
-            duration=self.duration,
-            dt=self.dt,
-            conditions=self.conditions.conditions(self.seed, self.robots),
-        )
+        said: dict[str, Any] = {name: getattr(self, name) for name in ("start", "seed", "duration", "dt")}
+        conditions = self.conditions.conditions(self.seed, self.robots)
+        spec = RunSpec(environment, controller, gains, team=self.made_team(), conditions=conditions, **said)
         spec.check()
         return spec
 

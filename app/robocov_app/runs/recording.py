@@ -35,8 +35,7 @@ def save_moving_picture(
     frames: Iterable[Frame], folder: Path | None, film: Path | None, fps: float = 30.0
 ) -> None:
     """Write frames as ``000000.png``, ``000001.png``, ... into a folder, as a film, or both."""
-    if folder is not None:
-        frames = _kept(folder, frames)
+    frames = frames if folder is None else _kept(folder, frames)
     if film is not None:
         save_film(film, frames, fps=fps)
     else:
@@ -54,9 +53,8 @@ def _kept(folder: Path, frames: Iterable[Frame]) -> Iterator[Frame]:
         yield frame
 
 
-def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -> int:
-    """Write frames of one size as an MP4 film, whole or not at all; return how many."""
-    path = Path(path)
+def save_film(path: Path, frames: Iterable[Frame], *, fps: float = 30.0) -> None:
+    """Write frames of one size as an MP4 film, whole or not at all."""
     source = iter(frames)
     first = next(source, None)
     if first is None:
@@ -66,15 +64,11 @@ def save_film(path: Path | str, frames: Iterable[Frame], *, fps: float = 30.0) -
     except OSError as error:
         raise OutputError(f"{path.parent}: cannot be made ({reason(error)})") from error
     with written(path) as part, _encoder(part, path, _even(first), fps) as pipe:
-        done = 0
         for frame in chain([first], source):
             if frame.shape != first.shape:
-                raise ParameterError(
-                    f"frames: {shown(frame.shape)} after {shown(first.shape)}, but one size was wanted"
-                )
+                sizes = f"{shown(frame.shape)} after {shown(first.shape)}"
+                raise ParameterError(f"frames: {sizes}, but one size was wanted")
             pipe.write(np.ascontiguousarray(_even(frame)).data)
-            done += 1
-    return done
 
 
 def _even(frame: Frame) -> Frame:
@@ -87,7 +81,6 @@ def _even(frame: Frame) -> Frame:
 
 @contextlib.contextmanager
 def _encoder(part: Path, path: Path, frame: Frame, fps: float) -> Iterator[BinaryIO]:
-    """Run ffmpeg and give the pipe into it; when it ends badly, raise what it said."""
     height, width, _ = frame.shape
     command = film_command(part, (width, height), fps)
     with tempfile.TemporaryFile() as said:

@@ -34,23 +34,8 @@ class Run:
 
     @property
     def final_time(self) -> float | None:
-        """The mean time until the first robot is there at the end, s; None where all are equally fast."""
+        """Mean time until the first robot is there at the end, s; None where all are equally fast."""
         return None if self.history.mean_time is None else float(self.history.mean_time[-1])
-
-
-def simulated(spec: RunSpec, every: int, stop: Interruption, *, quiet: bool) -> Record:
-    """Simulate, and return the record, of one step in `every`, up to the end or to Ctrl-C."""
-    simulation = spec.simulation()
-    # what a user's controller prints must not get among the answer
-    chatter = redirect_stdout(sys.stderr) if quiet else nullcontext()
-    with chatter, progress(f"simulating {simulation.controller.label}", spec.steps, quiet=quiet) as update:
-
-        def watch(step: int) -> bool:
-            if step % 10 == 0 or step == spec.steps or stop.requested:
-                update(step)
-            return stop.requested
-
-        return spec.record(simulation, every=every, watch=watch)
 
 
 def evaluated(record: Record, cost: CoverageCost, stop: Interruption, *, quiet: bool) -> Run:
@@ -72,11 +57,21 @@ def saved_run(
     options: RunOptions,
     stop: Interruption,
 ) -> Run:
-    """Simulate and evaluate a run, and save its numbers in a part of a folder."""
-    record = simulated(spec, options.record_every, stop, quiet=options.json)
+    """Simulate and evaluate up to the end or to Ctrl-C, and save the numbers in a part of a folder."""
+    simulation, quiet = spec.simulation(), options.json
+    # what a user's controller prints must not get among the answer
+    chatter = redirect_stdout(sys.stderr) if quiet else nullcontext()
+    with chatter, progress(f"simulating {simulation.controller.label}", spec.steps, quiet=quiet) as update:
+
+        def watch(step: int) -> bool:
+            if step % 10 == 0 or step == spec.steps or stop.requested:
+                update(step)
+            return stop.requested
+
+        record = spec.record(simulation, every=options.record_every, watch=watch)
     record.save(result.new / part)
     result.keep()  # what took long is safe, whatever happens to the evaluation
-    run = evaluated(record, cost, stop, quiet=options.json)
+    run = evaluated(record, cost, stop, quiet=quiet)
     save_numbers(run, result.new / part, options.lattice)
     result.keep()
     return run

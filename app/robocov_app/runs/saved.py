@@ -52,34 +52,28 @@ def load_saved(path: Path) -> list[Saved]:
                 raise InputError(f"{each.folder / 'run.json'}: another map than in {saved[0].folder}")
         return saved
     if not (folder / "run.json").is_file():
-        raise InputError(
-            f"{folder}: not the folder of a run or a comparison (there is no run.json and no comparison.json)"
-        )
+        none = "(there is no run.json and no comparison.json)"
+        raise InputError(f"{folder}: not the folder of a run or a comparison {none}")
     return [_load_run(folder)]
 
 
 def roster_of(record: Record) -> Roster:
     """Return who is who in a record of a session in the window; in others, robots are numbered from 1."""
-    environment, session = record.environment, record.session
-    numbers = tuple(session.get("robots", range(1, len(record.team) + 1)))
+    environment, session, usual = record.environment, record.session, tuple(range(1, len(record.team) + 1))
+    numbers = tuple(session.get("robots", usual))
     failed = {int(number): (x, y) for number, (x, y) in session.get("failed", {}).items()}
     wrecks = {wreck_name(number) for number in failed}
     shapes = environment.obstacles
     standing = tuple(
-        each for each in shapes if not (isinstance(each, CircleObstacle) and each.name in wrecks)
+        each for each in shapes if not isinstance(each, CircleObstacle) or each.name not in wrecks
     )
-    known = {*numbers, *failed}
-    if (
-        len(numbers) != len(record.team)
-        or len(known) != len(numbers) + len(failed)
-        or len(shapes) - len(standing) != len(failed)
-    ):
-        return Roster(environment, tuple(range(1, len(record.team) + 1)), {})
+    told = len(numbers), len({*numbers, *failed}), len(shapes) - len(standing)
+    if told != (len(usual), len(numbers) + len(failed), len(failed)):
+        return Roster(environment, usual, {})
     return Roster(replace(environment, obstacles=standing), numbers, failed)
 
 
 def wreck_name(number: int) -> str:
-    """Return what the obstacle is called that a robot has become by failing."""
     return f"failed robot {number}"
 
 
@@ -103,8 +97,7 @@ def _parts(folder: Path) -> list[Path]:
     path = folder / "comparison.json"
     content = read_document(path, ComparisonDocument, "robocov-comparison", 1)
     parts = [folder / name for name in content.folders]
-    linked = next((part for part in parts if part.is_symlink()), None)
-    if linked is not None:
+    if linked := next((part for part in parts if part.is_symlink()), None):
         raise InputError(f"{linked}: is a link, but a folder in the comparison's own was wanted")
     if not content.runs:
         parts = [part for part in parts if (part / "run.json").is_file()]

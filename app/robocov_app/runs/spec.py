@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from robocov.arrays import Array
 from robocov.conditions import Conditions
@@ -51,11 +52,9 @@ class RunSpec:
 
     @property
     def steps(self) -> int:
-        """Control periods of the whole run."""
         return round(self.duration / self.dt)
 
     def made_controller(self) -> Controller:
-        """Return the controller; raises ParameterError as `make_controller`."""
         return make_controller(self.controller, self.gains, source=self.source)
 
     def check(self) -> None:
@@ -67,31 +66,17 @@ class RunSpec:
         self, controller: Controller | None = None, *, steps: int = 0, resumed: bool = False
     ) -> Simulation:
         """Return the run at its beginning, or `resumed` after some steps; by default under its controller."""
-        return Simulation(
-            self.environment,
-            controller or self.made_controller(),
-            self.starts,
-            self.team,
-            self.dt,
-            velocities=self.velocities,
-            steering=self.steering,
-            steps=steps,
-            resumed=resumed,
-            conditions=self.conditions,
-        )
+        names = ("velocities", "steering", "conditions")
+        state: dict[str, Any] = {name: getattr(self, name) for name in names}
+        team = self.starts, self.team, self.dt
+        law = controller or self.made_controller()
+        return Simulation(self.environment, law, *team, steps=steps, resumed=resumed, **state)
 
     def recorder(self, controller: Controller, name: str | None = None) -> Recorder:
         """Return what makes a record of the run; `name` is that of a controller that goes by another one."""
-        return Recorder(
-            self.environment,
-            self.team,
-            controller,
-            self.dt,
-            name=name,
-            start=self.start if self.positions is not None else self.environment.start(self.start).name,
-            seed=self.seed,
-            conditions=self.conditions,
-        )
+        start = self.start if self.positions is not None else self.environment.start(self.start).name
+        origin: dict[str, Any] = {"start": start, "seed": self.seed, "conditions": self.conditions}
+        return Recorder(self.environment, self.team, controller, self.dt, name=name, **origin)
 
     def record(
         self,

@@ -16,7 +16,6 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from itertools import count
 from typing import Any, NamedTuple, Self, TypeAlias
 
 from robocov.errors import InputError, OutputError
@@ -74,33 +73,24 @@ class Executor(ABC):
 
     def _returned(self, timeout: float) -> Returned | None:
         """Return a task that was handed out, and what came of it; None where none is for so many seconds."""
-        try:
+        with suppress(queue.Empty):
             task, future = self._back.get(timeout=timeout)
-        except queue.Empty:
-            return None
-        return task, self._result(future)
+            return task, self._result(future)
+        return None
 
     def _result(self, future: Any) -> Outcome | Lost:
-        came: Outcome | Lost = future.result()
-        return came
+        return future.result()  # type: ignore[no-any-return]
 
     @property
     def waiting(self) -> str:
-        """Reason why no worker is at work, in words; empty where one is."""
+        """Why no worker is at work, in words; empty where one is."""
         return ""
 
     @property
     def busy(self) -> int:
-        """Number of submitted tasks that have not come back."""
         return self._out + len(self._backlog) + len(self._alone)
 
-    @property
-    def full(self) -> bool:
-        """Whether more tasks would only wait."""
-        return self.busy >= self.most
-
     def submit(self, task: Task) -> None:
-        """Take a task on."""
         self._backlog.append(task)
         self._feed()
 
@@ -113,31 +103,26 @@ class Executor(ABC):
         task, came = back
         together, self._lonely = self._out > 1, False
         self._out -= 1
-        self._in_a_row = self._in_a_row + 1 if isinstance(came, Lost) else 0
         outcome = self._considered(task, came, together) if isinstance(came, Lost) else came
+        if outcome is came:
+            self._in_a_row = 0
         self._feed()
         return None if outcome is None else (task, outcome)
 
     def _feed(self) -> None:
-        if self._lonely:
-            return
-        if self._alone:
-            if self._out == 0:
-                self._lonely, self._out = True, 1
-                self._hand_out(self._alone.popleft())
-            return
-        while self._backlog and self._out < self.most:
+        while self._backlog and not (self._lonely or self._alone) and self._out < self.most:
             self._hand_out(self._backlog.popleft())
             self._out += 1
+        if self._alone and not self._out:
+            self._lonely, self._out = True, 1
+            self._hand_out(self._alone.popleft())
 
     def _considered(self, task: Task, lost: Lost, together: bool) -> Outcome | None:
-        """Return that a task has failed, None where it is to be done again."""
         self.lost += 1
+        self._in_a_row += 1
         if self._in_a_row > max(_IN_A_ROW, 4 * self.most):
-            raise OutputError(
-                f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}; "
-                f"what is done is kept, and the same command goes on"
-            )
+            ends = f"{self._in_a_row} workers have ended one after the other, the last one as {lost.cause}"
+            raise OutputError(f"{ends}; what is done is kept, and the same command goes on")
         if together and not lost.blamed:
             self._alone.append(task)
             return None
@@ -145,13 +130,11 @@ class Executor(ABC):
         if self._ends[task.name] < _ENDS:
             (self._backlog if lost.blamed else self._alone).appendleft(task)
             return None
-        del self._ends[task.name]
         return failed(lost.cause, lost.details)
 
 
 _STARTS = 3  # how often a process may end before it has begun
 _LAST_WORDS = 4000  # characters of the complaints of a process that ended that are kept
-
 _OUTSIDE = -getattr(signal, "SIGKILL", 9)
 """The status of a process that was ended from outside: by a user, or because memory ran out."""
 
@@ -162,9 +145,7 @@ class LocalPool(Executor):
     def __init__(self, workers: int) -> None:
         super().__init__()
         self._hands = [_Hand() for _ in range(workers)]
-        self._idle: queue.LifoQueue[_Hand] = queue.LifoQueue()
-        for hand in self._hands:
-            self._idle.put(hand)
+        self._idle = list(self._hands)  # the last one that came back is the next to go
         self._threads = ThreadPoolExecutor(max(1, workers))
 
     def __exit__(self, *exception: object) -> None:
@@ -172,22 +153,22 @@ class LocalPool(Executor):
             hand.stop()
         self._threads.shutdown(cancel_futures=True)
         for hand in self._hands:
-            hand.close()
+            hand.end()
+            hand.complaints.close()
 
     @property
     def most(self) -> int:
-        """As many as there are processes, and one that is ready for the first that comes back."""
-        return len(self._hands) + 1
+        return len(self._hands) + 1  # one is ready for the first that comes back
 
     def _hand_out(self, task: Task) -> None:
         self._awaited(task, self._threads.submit(self._done, task))
 
     def _done(self, task: Task) -> Outcome | Lost:
-        hand = self._idle.get()
+        hand = self._idle.pop()
         try:
             return hand.done(task)
         finally:
-            self._idle.put(hand)
+            self._idle.append(hand)
 
 
 class _Hand:
@@ -196,67 +177,58 @@ class _Hand:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         # appended to, so that it can be emptied
-        self._complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - see `close`
+        self.complaints = tempfile.TemporaryFile("a+b", buffering=0)  # noqa: SIM115 - the pool closes it
         self._stopped = False
         self._starting = threading.Lock()
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
         with self._starting:
             self._stopped = True
             if self._process is not None:
                 self._process.kill()
-
-    def close(self) -> None:
-        """Let the process end."""
-        self._end()
-        self._complaints.close()
 
     def done(self, task: Task) -> Outcome | Lost:
         """Do a task; raises OutputError where no process can be started."""
         process = self._process
         if process is None or process.poll() is not None:
             process = self._begun()
-        self._complaints.truncate(0)  # what it says of this task, and does not grow for ever
+        self.complaints.truncate(0)  # what it says of this task, and does not grow for ever
         reply = asked(process, task)
         if reply is not None and isinstance(reply.answer, Outcome):
             return reply.answer
-        status, said = self._end()
+        status, said = self.end()
         cause = f"signal {-status}" if status < 0 else f"exit status {status}"
         return Lost(f"its process ended ({cause})", said, blamed=status != _OUTSIDE)
 
     def _begun(self) -> subprocess.Popen[bytes]:
         for _ in range(_STARTS):
-            self._end()
-            self._complaints.truncate(0)
+            self.end()
+            self.complaints.truncate(0)
             with self._starting:
                 if self._stopped:
                     break
-                process = started("robocov_app.sweep.worker:Performing", stderr=self._complaints)
+                process = started("robocov_app.sweep.worker:Performing", stderr=self.complaints)
                 self._process = process
             assert process.stdout
             if receive(process.stdout) == READY:
                 return process
-        said = self._end()[1].strip().splitlines() or ["it says nothing"]
+        said = self.end()[1].strip().splitlines() or ["it says nothing"]
         raise OutputError(f"no process for the runs can be started: {said[-1]}")
 
-    def _end(self) -> tuple[int, str]:
+    def end(self) -> tuple[int, str]:
         """Make sure that the process has ended; return its status and its last words."""
         status = 0 if self._process is None else ended(self._process)
         self._process = None
-        self._complaints.seek(0)
-        return status, self._complaints.read()[-_LAST_WORDS:].decode(errors="replace")
+        self.complaints.seek(0)
+        return status, self.complaints.read()[-_LAST_WORDS:].decode(errors="replace")
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else ()
+    return len(allowed) or os.cpu_count() or 1
 
 
 PATIENCE = 10.0  # seconds that a scheduler has for an answer
-
 _LEAST = 4  # tasks that are handed out to a cluster which has no workers yet
 _LOOK = 2.0  # seconds between two looks at how many workers there are; they may come and go
 
@@ -268,17 +240,21 @@ class Cluster(Executor):
         super().__init__()
         if importlib.util.find_spec("distributed") is None:
             raise InputError('--scheduler: Dask is not installed; pip install "robocov[dask]" was wanted')
-        import distributed
-
-        client: Any = distributed.Client  # it has no types
-        self._address = address
+        dask: Any = importlib.import_module("distributed")  # it has no types
+        self._address, self._killed = address, dask.KilledWorker
         self._futures: set[Any] = set()
-        # a result is that of this sweep alone, whatever else the cluster does
-        self._prefix = f"robocov-{uuid.uuid4().hex[:8]}"
-        self._numbers = count(1)
+
+        async def greet() -> None:
+            """Do as Dask's own client, which would wait for an answer for ever."""
+            arguments = dask.Security().get_connection_args("client")
+            line = await asyncio.wait_for(dask.comm.connect(address, timeout=PATIENCE, **arguments), PATIENCE)
+            await line.close()
+
         try:
-            _require_answer(address)
-            self._client = client(address, timeout=PATIENCE, set_as_default=False)
+            if not address.startswith("inproc://"):  # that is in this process
+                with ThreadPoolExecutor(1) as thread:  # this one may have a loop of events: in a notebook
+                    thread.submit(lambda: asyncio.run(greet())).result()
+            self._client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError, TypeError, TimeoutError) as error:
             reason = " ".join(str(error).split()) or f"no answer in {PATIENCE:g} s"
             raise InputError(f"--scheduler: {address}: cannot be reached: {reason}") from error
@@ -302,7 +278,6 @@ class Cluster(Executor):
 
     @property
     def threads(self) -> int:
-        """Number of tasks that the cluster does at once."""
         if time.monotonic() - self._asked > _LOOK:
             self._threads = 0
             with suppress(Exception):  # the scheduler may be gone
@@ -312,45 +287,22 @@ class Cluster(Executor):
 
     @property
     def waiting(self) -> str:
-        """That there is nobody, where there is nobody."""
         return "" if self.threads else f"no workers are connected to {self._address}; waiting"
 
     def _hand_out(self, task: Task) -> None:
-        key = f"{self._prefix}-{next(self._numbers)}"
+        # a result is that of this sweep alone, whatever else the cluster does
+        key = f"robocov-{uuid.uuid4().hex}"
         future: Any = self._client.submit(perform, task, key=key, pure=False)
         self._futures.add(future)
         self._awaited(task, future)
 
     def _result(self, future: Any) -> Outcome | Lost:
-        from distributed import KilledWorker
-
         self._futures.remove(future)
         try:
             return super()._result(future)
-        except KilledWorker as error:
-            # so has every task that waited for the same worker
-            return Lost("the process of its worker ended", str(error), blamed=False)
         except Exception as error:
+            if isinstance(error, self._killed):  # so has every task that waited for the same worker
+                return Lost("the process of its worker ended", str(error), blamed=False)
             reason = getattr(error, "reason", None) or f"{type(error).__name__}: {error}"
             reason = " ".join(str(reason).split())
             raise OutputError(f"--scheduler: {self._address}: the runs cannot go on: {reason}") from error
-
-
-def _require_answer(address: str) -> None:
-    """Greet a scheduler as Dask's own client does, which would wait for an answer for ever."""
-    import distributed
-    from distributed import comm
-
-    if address.startswith("inproc://"):  # it is in this process
-        return
-    security: Any = distributed.Security  # they have no types
-    talk: Any = comm
-
-    async def greet() -> None:
-        arguments = security().get_connection_args("client")
-        line = await asyncio.wait_for(talk.connect(address, timeout=PATIENCE, **arguments), PATIENCE)
-        await line.close()
-
-    # in a notebook, this thread has a loop of events that runs already
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(lambda: asyncio.run(greet())).result()

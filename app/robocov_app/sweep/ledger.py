@@ -14,25 +14,19 @@ from typing import Any, NamedTuple
 
 from robocov.errors import InputError, OutputError, counted
 from robocov.files.atomic import locked, on_disk
+from robocov.files.result_folder import for_results
 from robocov_app.sweep.study import Task
 from robocov_app.sweep.worker import FIGURES, Outcome, made_with
 from robocov_app.terminal.output import write_json
 
 RUNS = "runs"  # name of the folder of the runs' folders
-
 STUDY = "study.json"
-
 _ROW = "row.json"  # what the table holds of a run, in its folder
-
 _HEAD = {"format": "robocov-row", "version": 2}
-
-_STUDY_FORMAT = "robocov-study"
-
 _LEFT_OVER = re.compile(
     r"\..*-[0-9a-f]{10}\.part|\.robocov-[0-9a-f]{12}\.part\.json|\.(results|study)\..*part\.(csv|parquet|json)"
 )
 """Names of what a sweep that was killed has left half-written."""
-
 _NAMED = 5  # damaged runs that are named
 
 
@@ -45,7 +39,7 @@ class Entry(NamedTuple):
     checked: bool = True
 
 
-class Damaged(Exception):  # noqa: N818 - it is handled
+class Damaged(ValueError):  # noqa: N818 - it is handled
     """A run is there, but is not as it was written."""
 
 
@@ -60,7 +54,6 @@ class Survey:
     failed: int = 0
 
     def words(self, *, keep_versions: bool) -> list[str]:
-        """Return what people should know before the runs begin, line by line."""
         lines = []
         if self.damaged:
             count, rest = len(self.damaged), len(self.damaged) - _NAMED
@@ -72,10 +65,9 @@ class Survey:
         if self.outdated and not keep_versions:
             lines.append("--keep-versions uses them as they are")
         if self.unchecked:
-            lines.append(
-                f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums will "
-                f"be used; damage to their cost curves and trajectories would not be noticed"
-            )
+            runs = f"{counted(self.unchecked, 'run')} of an earlier version of robocov without check sums"
+            damage = "damage to their cost curves and trajectories would not be noticed"
+            lines.append(f"{runs} will be used; {damage}")
         return lines
 
 
@@ -95,18 +87,16 @@ class Ledger:
     def survey(
         self, tasks: Iterable[Task], *, retry_failed: bool = False, keep_versions: bool = False
     ) -> Survey:
-        """Check all files of all runs; return which are to be done, and why again."""
         found = Survey()
         for task in tasks:
+            entry = None
             try:
                 entry = self._entry(task, files=True)
             except Damaged:
                 found.damaged.append(task.name)
-                entry = None
             todo = entry is None or (retry_failed and entry.error is not None)
             if entry is not None and not todo:
-                difference = difference_of(entry.versions)
-                if difference:
+                if difference := difference_of(entry.versions):
                     found.outdated[difference] += 1
                     todo = not keep_versions
                 found.unchecked += not todo and not entry.checked
@@ -121,28 +111,22 @@ class Ledger:
             return None
         try:
             row = json.loads(_content(folder / _ROW))
-            if row["format"] != _HEAD["format"] or row["digest"] != task.digest:
-                raise Damaged
             figures, error = row["figures"], row["error"]
-            if not all(value is None or type(value) in (int, float) for value in figures.values()):
-                raise Damaged
-            if not isinstance(error, str | None):
-                raise Damaged
+            _require(row["format"] == _HEAD["format"] and row["digest"] == task.digest)
+            _require(all(value is None or type(value) in (int, float) for value in figures.values()))
+            _require(isinstance(error, str | None))
             if row["version"] == 1 and "check_sum" not in row:
                 run = _content(folder / ("run.json" if error is None else "error.json"))
                 return Entry(figures, error, _versions_1(json.loads(run), figures, error), checked=False)
-            if row.pop("check_sum") != _check_sum(row):
-                raise Damaged
-            if files:
-                for name, (size, digest) in row["files"].items():
-                    content = _content(folder / name)
-                    if len(content) != size or _digest(content) != digest:
-                        raise Damaged
+            _require(row.pop("check_sum") == _check_sum(row))
+            for name, (size, digest) in row["files"].items() if files else ():
+                content = _content(folder / name)
+                _require(len(content) == size and _digest(content) == digest)
             return Entry(figures, error, row["versions"])
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
             raise Damaged from fault
 
-    def keep(self, task: Task, outcome: Outcome) -> Entry:
+    def keep(self, task: Task, outcome: Outcome) -> None:
         """Write the folder of a run, in the place of an earlier one: all of it, or nothing."""
         target = self._runs / task.name
         part = self._runs / f".{task.name}.part"
@@ -163,30 +147,23 @@ class Ledger:
             with suppress(OSError):
                 _remove(part)
             raise OutputError(f"{target}: cannot be written: {error.strerror or error}") from error
-        return Entry(outcome.figures, outcome.error, outcome.versions)
 
 
 def difference_of(versions: Mapping[str, str]) -> str:
     """Return how known versions differ from those here, as in ``numpy 2.0.1 instead of 2.1.0``."""
-    return ", ".join(
-        f"{name} {versions[name]} instead of {version}"
-        for name, version in made_with().items()
-        if versions.get(name, version) != version
-    )
+    differing = {name: here for name, here in made_with().items() if versions.get(name, here) != here}
+    return ", ".join(f"{name} {versions[name]} instead of {here}" for name, here in differing.items())
 
 
 @contextmanager
 def opened(folder: Path, study: Mapping[str, Any]) -> Iterator[Ledger]:
     """Give the ledger of a sweep, for one process at a time; `study` is the content of ``study.json``."""
-    try:
+    with for_results(folder):
         folder.mkdir(parents=True, exist_ok=True)
         used = any(not path.name.startswith(".") for path in folder.iterdir())
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be used for results: {error.strerror or error}") from error
     if used and not is_sweep(folder):
-        raise InputError(
-            f"{folder}: the folder is not empty, and what is in it is no sweep; another --out was wanted"
-        )
+        foreign = "the folder is not empty, and what is in it is no sweep"
+        raise InputError(f"{folder}: {foreign}; another --out was wanted")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(f"{folder}: cannot be used for results: Permission denied")
     with locked(folder):
@@ -213,20 +190,23 @@ def is_sweep(folder: Path) -> bool:
         return False
     except (ValueError, RecursionError):
         return (folder / RUNS).is_dir() and (folder / ".lock").is_file()
-    return isinstance(content, dict) and content.get("format") == _STUDY_FORMAT
+    return isinstance(content, dict) and content.get("format") == "robocov-study"
 
 
 def _versions_1(run: Mapping[str, Any], figures: Mapping[str, Any], error: str | None) -> Mapping[str, str]:
     """Return what a run of version 1 was made with, if its row agrees with its other file."""
     if error is not None:
-        if run["error"] != error:
-            raise Damaged
+        _require(run["error"] == error)
         return {}
     for name in FIGURES:
         value = run["summary"][name]
-        if figures[name] != (sum(value) / len(value) if isinstance(value, list) else value):
-            raise Damaged
+        _require(figures[name] == (sum(value) / len(value) if isinstance(value, list) else value))
     return dict(run["versions"])
+
+
+def _require(sound: bool) -> None:
+    if not sound:
+        raise Damaged
 
 
 def _content(path: Path) -> bytes:
@@ -244,7 +224,7 @@ def _check_sum(row: Mapping[str, Any]) -> str:
 
 
 def _remove(path: Path) -> None:
-    if path.is_symlink() or path.is_file():
-        path.unlink()
-    elif path.exists():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

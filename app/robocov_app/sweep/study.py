@@ -1,52 +1,230 @@
-"""A study, what a sweep runs, and its tasks: one run each."""
+"""A study, what a sweep runs, with every combination of the gains that it tries; its tasks: one run each."""
+
+from __future__ import annotations
 
 import hashlib
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias, TypeVar, cast, get_args
 
+import numpy as np
+
+from robocov.arrays import Array
 from robocov.conditions import LIMITS, Conditions, Failure, Join, parsed_entry
 from robocov.conditions import UNITS as CONDITION_UNITS
-from robocov.controllers import controller_kind
-from robocov.controllers.gains import Value
+from robocov.controllers import controller_kind, gain_values, gains_of
+from robocov.controllers.gains import Gain, Option, Value, with_gains
 from robocov.controllers.user_modules import Source, own_modules
 from robocov.environment import Environment
-from robocov.errors import InputError, ParameterError, checked, place, shown, unknown_name
+from robocov.errors import InputError, ParameterError, checked, place, required, shown, unknown_name
 from robocov.mapfile import to_json
 from robocov.robots import DEFAULT_RADIUS, KINEMATICS, TURNING_RATE, Team, team_of_groups
 from robocov.robots import UNITS as TEAM_UNITS
 from robocov.simulation import DEFAULT_DT, check_dt
 from robocov_app.runs.spec import MOST_ROWS
-from robocov_app.sweep.gains import NO_LIMIT, Gains, Sampling, Wanted, axis, once, placed
+
+T = TypeVar("T")
+Scale: TypeAlias = Literal["linear", "log"]
+Method: TypeAlias = Literal["sobol", "latin-hypercube", "halton"]
+NO_LIMIT = "null"  # what stands for None where a file has no word for it
+MOST_SAMPLES = 100_000
+_SAMPLE_DIGITS = 6
+"""Digits of a sampled gain: more say nothing, and the last ones differ from one processor to the next."""
+Place: TypeAlias = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Range:
+    """Range of a gain, both ends included, sampled evenly by value or by its logarithm."""
+
+    low: float
+    high: float
+    scale: Scale = "linear"
+
+    def values(self, parts: Array) -> list[float]:
+        """Return the values at (m,) parts of the range, from 0 to 1, rounded to six digits."""
+        log = self.scale == "log"
+        low, high = (math.log(self.low), math.log(self.high)) if log else (self.low, self.high)
+        exact = low + (high - low) * parts
+        exact = np.exp(exact) if log else exact
+        return [min(max(float(f"{x:.{_SAMPLE_DIGITS}g}"), self.low), self.high) for x in exact.tolist()]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Joint sampling of a controller's ranges by `scipy.stats.qmc`, scrambled."""
+
+    method: Method = "sobol"
+    samples: int = 16
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ParameterError(f"sampling.method: {unknown_name('method', self.method, get_args(Method))}")
+        checked("sampling.samples", self.samples, 1, MOST_SAMPLES, whole=True)
+        checked("sampling.seed", self.seed, 0, 2**63 - 1, whole=True)
+
+    def points(self, dimensions: int) -> Array:
+        """Return as many points of the unit cube as there are samples, (samples, dimensions)."""
+        from scipy.stats import qmc
+
+        rng = np.random.default_rng(self.seed)
+        if self.method == "sobol":  # the beginning of a longer, balanced sequence
+            points = qmc.Sobol(dimensions, seed=rng).random_base2((self.samples - 1).bit_length())
+            return np.asarray(points[: self.samples])
+        kind = qmc.Halton if self.method == "halton" else qmc.LatinHypercube
+        return np.asarray(kind(dimensions, seed=rng).random(self.samples))
+
+
+Choice: TypeAlias = Mapping[str, Value]
+"""A value for every gain of a controller."""
+Wanted: TypeAlias = "Gains | Mapping[str, Any] | Sequence[Mapping[str, Any]]"
+"""Accepted forms of a controller's gains in a study; see `Gains.of`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The gains of one controller in a study: choices of all gains, and what was sampled."""
+
+    choices: tuple[Choice, ...]
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, kind: type[Any], wanted: Wanted, sampling: Sampling | None, path: Place = ()) -> Gains:
+        """Return what is tried of a controller of a class; other gains have their defaults.
+
+        `wanted`: sets of gains, as dicts; or one dict of name to a value, a list of which every combination
+        is tried, or a `Range`. Raises ParameterError, which begins with the place.
+        """
+        if isinstance(wanted, Gains):
+            return cls(cls.of(kind, wanted.choices, None, path).choices, wanted.ranges)
+        if isinstance(wanted, Mapping):
+            return _of_axes(kind, wanted, sampling, path)
+        if not wanted:
+            raise ParameterError(f"{place(path)}: none, but at least one set of gains was wanted")
+        known = gains_of(kind)
+        choices = []
+        for k, given in enumerate(wanted):
+            values = {name: _value(known, name, value, (*path, k, name)) for name, value in given.items()}
+            choices.append(gain_values(with_gains(kind, values)))
+        once(choices, path)
+        return cls(tuple(choices))
+
+
+def _of_axes(kind: type[Any], axes: Mapping[str, Any], sampling: Sampling | None, path: Place) -> Gains:
+    """Return every combination of the lists with every sample of the ranges, the samples innermost."""
+    known = gains_of(kind)
+    lists: dict[str, list[Value]] = {}
+    ranges: dict[str, Range] = {}
+    for name, given in axes.items():
+        at = (*path, name)
+        if isinstance(given, Range):
+            ranges[name] = _checked_range(known, name, given, at)
+        else:
+            lists[name] = axis(given, at, partial(_value, known, name))
+    samples: list[tuple[float, ...]] = [()]
+    if ranges:
+        if sampling is None:
+            at = (*path, next(iter(ranges)))
+            raise ParameterError(f"{place(at)}: a range, but sampling says neither a method nor how many")
+        points = sampling.points(len(ranges))
+        columns = [each.values(points[:, k]) for k, each in enumerate(ranges.values())]
+        samples = list(zip(*columns, strict=True))
+    choices: list[Choice] = [
+        gain_values(with_gains(kind, dict(zip([*lists, *ranges], (*row, *sample), strict=True))))
+        for row, sample in product(product(*lists.values()), samples)
+    ]
+    once(choices, (*path, "samples"))  # as of a range that is narrower than the digits of a sample
+    return Gains(tuple(choices), ranges)
+
+
+def _value(known: Mapping[str, Gain | Option], name: str, value: object, path: Place) -> Value:
+    """Return a value of a gain; both ``inf`` and ``"null"`` stand for no limit where there may be none."""
+    gain = _known(known, name, path)
+    if gain.optional and value in (NO_LIMIT, math.inf):
+        return None
+    return placed(path, lambda: gain.validated(value, ""))
+
+
+def _known(known: Mapping[str, Gain | Option], name: str, path: Place) -> Gain | Option:
+    if name not in known:
+        above = place(path[: len(path) - 1 - isinstance(path[-1], int)])
+        if not known:
+            raise ParameterError(f"{above}: {shown(name)}, but the controller has no gains")
+        raise ParameterError(f"{above}: {unknown_name('gain', name, known)}")
+    return known[name]
+
+
+def _checked_range(known: Mapping[str, Gain | Option], name: str, given: Range, path: Place) -> Range:
+    gain = _known(known, name, path)
+    if isinstance(gain, Option):
+        wanted = f"one of {', '.join(gain.words)}, or a list of them,"
+        raise ParameterError(f"{place(path)}: a range, but {wanted} was wanted")
+    ends = []
+    for end, value in (("low", given.low), ("high", given.high)):
+        if value is None:
+            raise ParameterError(f"{place((*path, end))}: {shown(None)}, but a number was wanted")
+        ends.append(placed((*path, end), partial(gain.validated, value, "")) or 0.0)
+    low, high = ends
+    if given.scale not in get_args(Scale):
+        unknown = unknown_name("scale", given.scale, get_args(Scale))
+        raise ParameterError(f"{place((*path, 'scale'))}: {unknown}")
+    if not low < high:
+        raise ParameterError(f"{place((*path, 'high'))}: {high:g}, but a number above {low:g} was wanted")
+    if given.scale == "log" and low <= 0.0:
+        wanted = "a number above 0, as the scale is that of logarithms,"
+        raise ParameterError(f"{place((*path, 'low'))}: {low:g}, but {wanted} was wanted")
+    return Range(low, high, given.scale)
+
+
+def placed(path: Place, check: Callable[[], T]) -> T:
+    """Return what `check` returns; its complaint is told of `path`, in place of what it names."""
+    try:
+        return check()
+    except ParameterError as error:
+        raise ParameterError(f"{place(path)}: {str(error).partition(': ')[2]}") from None
+
+
+def axis(given: Any, path: Place, check: Callable[[Any, Place], T]) -> list[T]:
+    """Return what `check` makes of a value, or of each of a list of values, which differ."""
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return [check(given, path)]
+    values = [check(value, (*path, k)) for k, value in enumerate(given)]
+    if not values:
+        raise ParameterError(f"{place(path)}: none, but at least one value was wanted")
+    once(values, path)
+    return values
+
+
+def once(values: Sequence[object], path: Place) -> None:
+    seen: dict[object, int] = {}
+    for k, value in enumerate(values):
+        first = seen.setdefault(tuple(value.items()) if isinstance(value, Mapping) else value, k)
+        if first < k:
+            told = f"{place((*path, k))}: {shown(value)} is given already at {place((*path, first))}"
+            raise ParameterError(f"{told}; each once was wanted")
+
 
 TeamValue: TypeAlias = float | str | None
 """A value of what is varied of team and conditions."""
-
-WORDS = ("fail", "join", "kinematics")  # those that are texts: ``3@20 5@40`` are two failures, in one run
-CONDITIONS = (*LIMITS, *WORDS[:2])  # the conditions that a study may sweep
+EVENTS = {"fail": Failure, "join": Join}  # conditions that are texts: ``3@20 5@40`` are two in one run
+CONDITIONS = (*LIMITS, *EVENTS)  # the conditions that a study may sweep
+WORDS = (*EVENTS, "kinematics")
 GROUPS = "groups"  # robots that differ, as JSON: the groups of a team file
-
 UNITS = {**TEAM_UNITS, **CONDITION_UNITS, **dict.fromkeys((*WORDS, GROUPS), "")}
 """Units of all that may be varied."""
 
-_KEY_UNITS = {"m": "_m", "kg": "_kg", "m/s": "_m_s", "m/s²": "_m_s2", "N s/m": "_n_s_m", "rad/s": "_rad_s"}
-_KEY_UNITS |= {"": "", "s": "_s", "Hz": "_hz", "1/s": "_per_s"}
-"""Units in the names of columns."""
-
 
 def parameter_column(name: str) -> str:
-    """Return the name of the column of a parameter of the team, or of a condition.
-
-    >>> parameter_column("max_speed"), parameter_column("delay"), parameter_column("loss")
-    ('max_speed_m_s', 'delay_s', 'loss')
-    """
-    return f"{name}{_KEY_UNITS[UNITS[name]]}"
+    """Return the name of the column of a parameter of the team, or of a condition, as ``max_speed_m_s``."""
+    unit = UNITS[name].lower().replace("1/", "per ").replace("²", "2")
+    return "_".join([name, *re.findall(r"\w+", unit)])
 
 
 def parameter_text(name: str, value: TeamValue) -> str:
@@ -59,18 +237,16 @@ def parameter_text(name: str, value: TeamValue) -> str:
     """
     if name in WORDS:
         return str(value) or "none"
-    if name == GROUPS:
-        return "; ".join(map(_group_text, json.loads(str(value))))
-    return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
-
-
-def _group_text(group: Mapping[str, Any]) -> str:
-    own = [
-        f"{name.replace('_', ' ')} {value if isinstance(value, str) else f'{value:g}'} {UNITS[name]}"
-        for name, value in group.items()
-        if name != "count"
-    ]
-    return f"{group['count']} {'with ' + ', '.join(own) if own else 'as the rest'}"
+    if name != GROUPS:
+        return "no limit" if value is None else f"{value:g} {UNITS[name]}".rstrip()
+    groups = []
+    for group in json.loads(str(value)):
+        count, own = group.pop("count"), []
+        for key, each in group.items():
+            text = each if isinstance(each, str) else f"{each:g}"
+            own.append(f"{key.replace('_', ' ')} {text} {UNITS[key]}")
+        groups.append(f"{count} {'with ' + ', '.join(own) if own else 'as the rest'}")
+    return "; ".join(groups)
 
 
 def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
@@ -79,63 +255,52 @@ def condition_axes(given: Mapping[str, Any]) -> dict[str, list[TeamValue]]:
     for name, values in given.items():
         if name not in CONDITIONS:
             raise ParameterError(f"conditions: {unknown_name('condition', name, CONDITIONS)}")
-        axes[name] = axis(values, ("conditions", name), partial(_value, name))
+        axes[name] = axis(values, ("conditions", name), partial(_condition, name))
     return axes
 
 
 def conditions_of(parameters: Mapping[str, TeamValue], seed: int, robots: int) -> Conditions | None:
     """Return the conditions among what a study varies; None where they are ideal."""
     values: dict[str, Any] = {name: parameters[name] for name in LIMITS if name in parameters}
-    conditions = Conditions(
-        **values,
-        failures=tuple(parsed_entry(Failure, word) for word in str(parameters.get("fail", "")).split()),
-        joins=tuple(parsed_entry(Join, word) for word in str(parameters.get("join", "")).split()),
-        seed=seed,
-    )
+    fail, join = (str(parameters.get(name, "")).split() for name in EVENTS)
+    values["failures"] = tuple(parsed_entry(Failure, word) for word in fail)
+    values["joins"] = tuple(parsed_entry(Join, word) for word in join)
+    conditions = Conditions(**values, seed=seed)
     conditions.check_team(robots)
     return None if conditions.ideal else conditions
 
 
-def _value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
-    if name in WORDS:
-        if not isinstance(value, str):
-            raise ParameterError(f'{place(path)}: {shown(value)}, but a text, as in "3@20", was wanted')
-        kind: type[Failure | Join] = Failure if name == "fail" else Join
+def _condition(name: str, value: object, path: Place) -> TeamValue:
+    if name in EVENTS:
+        required(place(path), value, str, 'a text, as in "3@20",')
         try:
-            return " ".join(str(parsed_entry(kind, word)) for word in value.split())
+            return " ".join(str(parsed_entry(EVENTS[name], word)) for word in str(value).split())
         except ParameterError as error:
             raise ParameterError(f"{place(path)}: {error}") from None
     if name == "message_rate" and value in (None, NO_LIMIT):
         return None
     given: dict[str, Any] = {"forget_after": 1e6, name: value}
-    number: float = getattr(placed(path, lambda: Conditions(**given)), name)
-    return number
+    return getattr(placed(path, lambda: Conditions(**given)), name)  # type: ignore[no-any-return]
 
 
 MOST_RUNS = 1_000_000
-
 ALL = "*"  # stands for all starts of a map
-
 TEAM = ("radius", "max_speed", "max_acceleration", "viscosity", "sensing_range", "communication_range")
 """Parameters of a team that a study may sweep."""
 UNICYCLES = {"kinematics": "point", "track_width": 0.0, "turning_rate": TURNING_RATE}
 """More of them, with defaults: what is as by default a study does not tell."""
-
 _RANGES = ("sensing_range", "communication_range")  # those that may be without limit
-
 _LONGEST_NAME = 100
-
 _HUGE = 1e300  # what a float can hold, with some to spare
-
 Swept: TypeAlias = float | Sequence[float | None] | None
 """One value, or several, each of which is tried."""
 
 
 @dataclass(frozen=True)
 class StudyMap:
-    """A map of a study. `name`: what the table calls it."""
+    """A map of a study."""
 
-    name: str
+    name: str  # what the table calls it
     environment: Environment
 
 
@@ -183,7 +348,13 @@ class Study:
             if self.robots not in (Study.robots, (size,)):
                 raise ParameterError(f"robots: {list(self.robots)}, but the groups of the team have {size}")
             object.__setattr__(self, "robots", (size,))
-        self._check_names()
+        for k, controller in enumerate(self.controllers):
+            required(f"controllers[{k}]", controller, str, "a text")
+        for k, each in enumerate(self.maps):
+            name = each.name
+            if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
+                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
+                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
         for name, low, high in (("robots", 1, 10_000), ("seeds", 0, 2**63 - 1)):
             for k, value in enumerate(getattr(self, name)):
                 checked(place((name, k)), value, low, high, whole=True)
@@ -191,24 +362,29 @@ class Study:
         for name, most in (("duration", 1e6), ("dt", 1.0), ("cost_hz", 1e4), ("record_hz", 1e4)):
             object.__setattr__(self, name, checked(name, getattr(self, name), 0.0, most))
         check_dt(self.dt)
-        if not isinstance(self.metrics, bool):
-            raise ParameterError(f"metrics: {shown(self.metrics)}, but true or false was wanted")
+        required("metrics", self.metrics, bool, "true or false")
         for name in ("maps", "controllers", "robots", "seeds"):
             if not getattr(self, name):
                 raise ParameterError(f"{name}: none, but at least one was wanted")
             once([item.name for item in self.maps] if name == "maps" else getattr(self, name), (name,))
-        self._check_starts()
+        once(self.starts, ("starts",))
+        for (k, name), each in product(enumerate(self.starts if self.starts != (ALL,) else ()), self.maps):
+            if name == ALL:
+                beside = "is all of them, so nothing beside it was wanted"
+                raise ParameterError(f"starts[{k}]: {shown(ALL)} {beside}")
+            try:
+                each.environment.start(name)
+            except InputError as error:
+                raise type(error)(f"starts[{k}]: {error}") from None
         object.__setattr__(self, "teams", self._every_team())
-        object.__setattr__(self, "sources", self._read_sources())
-        object.__setattr__(self, "gains", self._every_gain())
+        for name, value in zip(("sources", "gains"), self._controllers(), strict=True):
+            object.__setattr__(self, name, value)
         if len(self) > MOST_RUNS:
             raise ParameterError(f"runs: {len(self):.3g}, but at most {MOST_RUNS:.0e} were wanted")
         rows = self.duration / self.dt * max(self.robots)
         if rows > MOST_ROWS:
-            raise ParameterError(
-                f"duration: {self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} "
-                f"rows of a record, but at most {MOST_ROWS:.0e} were wanted"
-            )
+            rows_of = f"{self.duration:g} s of {max(self.robots)} robots at {self.dt:g} s are {rows:.3g} rows"
+            raise ParameterError(f"duration: {rows_of} of a record, but at most {MOST_ROWS:.0e} were wanted")
 
     def __len__(self) -> int:
         """Number of runs."""
@@ -218,51 +394,32 @@ class Study:
 
     @property
     def swept(self) -> tuple[str, ...]:
-        """The parameters of a team, and the conditions, of which there is more than one value."""
         return tuple(name for name in self.teams[0] if len({team[name] for team in self.teams}) > 1)
 
     @property
     def mixed_speeds(self) -> bool:
-        """Whether some robots of a team are faster than others."""
         return bool(self.group) and any(team_of(self.robots[0], team).mixed_speeds for team in self.teams)
 
     def gains_of(self, controller: str) -> Gains:
-        """Return what is tried of a controller of the study."""
-        gains = self.gains[controller]
-        assert isinstance(gains, Gains)
-        return gains
+        return cast("Gains", self.gains[controller])
 
     def starts_on(self, each: StudyMap) -> tuple[str, ...]:
-        """Return the names of the starts that are taken on a map."""
-        environment = each.environment
-        if not self.starts:
-            return (environment.start().name,)
-        if self.starts == (ALL,):
-            return tuple(environment.starts) or (environment.start().name,)
-        return tuple(self.starts)
+        known = tuple(each.environment.starts) if self.starts == (ALL,) else tuple(self.starts)
+        return known or (each.environment.start().name,)
 
     def kind(self, controller: str) -> type[Any]:
-        """Return the class of a controller of the study."""
         return controller_kind(controller, source=self.sources.get(controller))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the content of ``study.json``: the whole study, with maps, sources and all gains."""
         return {
             "format": "robocov-study",
             "version": 1,
             "runs": len(self),
             "maps": [{"name": each.name, "map": to_json(each.environment)} for each in self.maps],
             "controllers": [
-                {"name": name, **(source_json(self.sources[name]) if name in self.sources else {})}
-                for name in self.controllers
+                {"name": each, **source_json(self.sources.get(each))} for each in self.controllers
             ],
-            "gains": {
-                name: {
-                    "choices": [dict(choice) for choice in self.gains_of(name).choices],
-                    "ranges": {gain: asdict(each) for gain, each in self.gains_of(name).ranges.items()},
-                }
-                for name in self.controllers
-            },
+            "gains": {name: asdict(self.gains_of(name)) for name in self.controllers},
             "sampling": None if self.sampling is None else asdict(self.sampling),
             "robots": list(self.robots),
             "teams": [dict(team) for team in self.teams],
@@ -270,96 +427,57 @@ class Study:
             "seeds": list(self.seeds),
             "duration_s": self.duration,
             "dt_s": self.dt,
-            "lattice": self.lattice,
-            "cost_hz": self.cost_hz,
-            "record_hz": self.record_hz,
-            "metrics": self.metrics,
+            **{name: getattr(self, name) for name in ("lattice", "cost_hz", "record_hz", "metrics")},
         }
-
-    def _check_names(self) -> None:
-        for k, name in enumerate(self.controllers):
-            if not isinstance(name, str):
-                raise ParameterError(f"controllers[{k}]: {shown(name)}, but a text was wanted")
-        for k, each in enumerate(self.maps):
-            name = each.name
-            if not isinstance(name, str) or not 1 <= len(name) <= _LONGEST_NAME or not name.isprintable():
-                wanted = f"a text of 1 to {_LONGEST_NAME} characters on one line"
-                raise ParameterError(f"maps[{k}]: name {shown(name)}, but {wanted} was wanted")
-
-    def _check_starts(self) -> None:
-        once(self.starts, ("starts",))
-        if self.starts == (ALL,):
-            return
-        for k, name in enumerate(self.starts):
-            if name == ALL:
-                raise ParameterError(
-                    f"starts[{k}]: {shown(ALL)} is all of them, so nothing beside it was wanted"
-                )
-            for each in self.maps:
-                try:
-                    each.environment.start(name)
-                except InputError as error:
-                    raise type(error)(f"starts[{k}]: {error}") from None
 
     def _every_team(self) -> tuple[Mapping[str, TeamValue], ...]:
         names = (*TEAM, *(name for name, usual in UNICYCLES.items() if getattr(self, name) != usual))
         axes: list[Sequence[TeamValue]] = [
             axis(getattr(self, name), ("team", name), partial(_team_value, name)) for name in names
         ]
-        conditions = condition_axes(self.conditions)
-        if self.group:
-            conditions = {GROUPS: [json.dumps([dict(each) for each in self.group])], **conditions}
-        names = (*names, *conditions)
-        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *conditions.values()))
-        for team in teams:
-            for robots in self.robots:
-                conditions_of(team, 0, robots)
+        groups = {GROUPS: [json.dumps([dict(each) for each in self.group])]} if self.group else {}
+        more = groups | condition_axes(self.conditions)
+        names = (*names, *more)
+        teams = tuple(dict(zip(names, row, strict=True)) for row in product(*axes, *more.values()))
+        for team, robots in product(teams, self.robots):
+            conditions_of(team, 0, robots)
         return teams
 
-    def _read_sources(self) -> dict[str, Source]:
-        sources = {}
-        for k, name in enumerate(self.controllers):
-            file, _, class_name = name.rpartition(":")
-            if ".py:" not in name and not name.endswith(".py"):
-                continue
-            path = (self.folder / file).resolve()
-            try:
-                if class_name and file.endswith(".py"):
-                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
-                raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
-        return sources
-
-    def _every_gain(self) -> dict[str, Gains]:
+    def _controllers(self) -> tuple[dict[str, Source], dict[str, Gains]]:
+        """Return the sources of the users' controllers, and what is tried of each controller."""
         for name in self.gains:
             if name not in self.controllers:
                 known = unknown_name("controller of the study", name, self.controllers)
                 raise ParameterError(f"{place(('gains', name))}: {known}")
-        found = {}
+        sources, gains = {}, {}
         for k, name in enumerate(self.controllers):
+            file, _, class_name = name.rpartition(":")
+            if class_name and file.endswith(".py"):
+                path = (self.folder / file).resolve()
+                try:
+                    sources[name] = Source(str(path), path.read_text(encoding="utf-8"))
+                except (OSError, ValueError) as error:
+                    reason = error.strerror if isinstance(error, OSError) else "not UTF-8"
+                    raise ParameterError(f"controllers[{k}]: {shown(name)}: {path}: {reason}") from None
             try:
-                kind = self.kind(name)
+                kind = controller_kind(name, source=sources.get(name))
             except ParameterError as error:
                 raise ParameterError(f"controllers[{k}]: {error}") from error
-            if name in self.sources:
-                # now: it may have added folders to sys.path
-                source = self.sources[name]
-                sources = {**self.sources, name: source._replace(modules=own_modules(source.text))}
-                object.__setattr__(self, "sources", sources)
-            found[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
-        if self.sampling is not None and not any(gains.ranges for gains in found.values()):
+            if source := sources.get(name):  # now: it may have added folders to sys.path
+                sources[name] = source._replace(modules=own_modules(source.text))
+            gains[name] = Gains.of(kind, self.gains.get(name, {}), self.sampling, ("gains", name))
+        if self.sampling is not None and not any(each.ranges for each in gains.values()):
             raise ParameterError("sampling: no gain has a range {low, high}, but at least one was wanted")
-        return found
+        return sources, gains
 
 
-def source_json(source: Source) -> dict[str, Any]:
+def source_json(source: Source | None) -> dict[str, Any]:
     """Return what files say of a controller's source: its text, and those of the modules that it imports."""
-    modules = {name: module.text for name, module in source.modules.items()}
-    return {"source": source.text, **({"modules": modules} if modules else {})}
+    modules = {name: module.text for name, module in source.modules.items()} if source else {}
+    return ({"source": source.text} if source else {}) | ({"modules": modules} if modules else {})
 
 
-def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> TeamValue:
+def _team_value(name: str, value: object, path: Place) -> TeamValue:
     if name == "kinematics":
         if value not in KINEMATICS:
             raise ParameterError(f"{place(path)}: {shown(value)}, but {' or '.join(KINEMATICS)} was wanted")
@@ -368,10 +486,9 @@ def _team_value(name: str, value: object, path: tuple[str | int, ...]) -> TeamVa
         return None
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > _HUGE:
         raise ParameterError(f"{place(path)}: {shown(value)}, but a number was wanted")
-    number = float(value)
-    one: dict[str, Any] = {name: number}
+    one: dict[str, Any] = {name: float(value)}
     placed(path, lambda: Team.homogeneous(1, **one))
-    return number
+    return float(value)
 
 
 def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
@@ -383,9 +500,7 @@ def team_of(robots: int, team: Mapping[str, TeamValue]) -> Team:
     return Team.homogeneous(robots, **values)
 
 
-_FORMAT = "robocov-task 1"
-"""Version of the digest; that the same inputs give other results is told by `made_with`."""
-
+_FORMAT = "robocov-task 1"  # of the digest; that the same inputs give other results is told by `made_with`
 _SHORT = 24  # characters of each name in the name of a folder
 _DIGITS = 10  # hexadecimal digits of the digest in the name of a folder
 
@@ -416,17 +531,16 @@ class Task:
 
     @property
     def name(self) -> str:
-        """The name of the run's folder."""
         words = (self.map, self.controller.rpartition(":")[2], self.robots, self.start, self.seed)
-        return "-".join([*(_fit(str(word)) for word in words), self.digest[:_DIGITS]])
+        # what can be a part of a folder's name on any system
+        parts = (re.sub(r"[^A-Za-z0-9_.]+", "-", str(word)).strip(".-")[:_SHORT] or "x" for word in words)
+        return "-".join([*parts, self.digest[:_DIGITS]])
 
 
 def tasks_of(study: Study) -> Iterator[Task]:
     """Yield the runs in the order of the table: maps outermost, controllers and their gains innermost."""
-    once = {"duration": study.duration, "dt": study.dt, "lattice": study.lattice}
-    once |= {"cost_hz": study.cost_hz, "record_hz": study.record_hz}
-    if study.metrics:
-        once["metrics"] = True
+    names = ("duration", "dt", "lattice", "cost_hz", "record_hz", *(["metrics"] if study.metrics else []))
+    once = {name: getattr(study, name) for name in names}
     laws: list[tuple[dict[str, Any], dict[str, Any]]] = []  # what tasks hold of them, what their digests say
     for name in study.controllers:
         source = study.sources.get(name)
@@ -441,25 +555,13 @@ def tasks_of(study: Study) -> Iterator[Task]:
     for each in study.maps:
         document = json.dumps(to_json(each.environment), ensure_ascii=False, allow_nan=False)
         short = {"document": _digest(document)}
-        for robots in study.robots:
-            for team in study.teams:
-                for start in study.starts_on(each):
-                    for seed in study.seeds:
-                        place = {"map": each.name, "robots": robots, "start": start, "seed": seed}
-                        for law, words in laws:
-                            inputs: dict[str, Any] = {**once, **place, "team": dict(team)}
-                            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
-                            yield Task(**inputs, **law, document=document, digest=digest)
+        axes = (study.robots, study.teams, study.starts_on(each), study.seeds, laws)
+        for robots, team, start, seed, (law, words) in product(*axes):
+            own = {"map": each.name, "robots": robots, "team": dict(team), "start": start, "seed": seed}
+            inputs: dict[str, Any] = once | own
+            digest = _digest(_FORMAT + json.dumps(inputs | words | short, sort_keys=True))
+            yield Task(**inputs, **law, document=document, digest=digest)
 
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-
-
-def _fit(word: str) -> str:
-    """Return a word as it can be a part of a folder's name on any system.
-
-    >>> _fit("Two rooms: a/b")
-    'Two-rooms-a-b'
-    """
-    return re.sub(r"[^A-Za-z0-9_.]+", "-", word).strip(".-")[:_SHORT] or "x"

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, get_args
 
-from robocov.environment import Environment
 from robocov.errors import InputError, one_line, place, shown, unknown_name
 from robocov.files.strictjson import parse_toml, read_bytes
 from robocov.mapfile import bundled_maps, load_map
-from robocov_app.sweep.gains import NO_LIMIT, Method, Range, Sampling, Scale, once
-from robocov_app.sweep.study import ALL, CONDITIONS, MOST_RUNS, TEAM, UNICYCLES, Study, StudyMap
+from robocov_app.sweep import study
+from robocov_app.sweep.study import NO_LIMIT, Method, Place, Range, Sampling, Scale, Study, StudyMap, once
 
 Check: TypeAlias = Callable[[Any], Any]
 """Returns a value as it is meant; raises ValueError when it is of another kind."""
 
 
 class _Value(NamedTuple):
-    """Accepted values of a key: one value, a list, or a table, and these in words."""
+    """Accepted values of a key in words: one value, lists of an `item`, or a table."""
 
-    one: Check | None
     wanted: str
-    item: Check | None = None
-    item_wanted: str = ""
+    one: Check | None = None
+    item: _Value | None = None
     table: _Table | None = None
 
 
@@ -46,47 +45,47 @@ def _of(*kinds: type, words: tuple[str, ...] = ()) -> Check:
     return check
 
 
-_TEXT, _WHOLE, _NUMBER = _of(str), _of(int), _of(int, float)
-_LIMIT, _WORD = _of(int, float, words=(NO_LIMIT,)), _of(int, float, str)
+_TEXT, _WHOLE = _Value("a text", _of(str)), _Value("a whole number", _of(int))
+_NUMBER, _WORD = _Value("a number", _of(int, float)), _Value("a number or a text", _of(int, float, str))
+_LIMIT = _Value(f'a number, or "{NO_LIMIT}" for no limit,', _of(int, float, words=(NO_LIMIT,)))
+_SCALE = _Value('"linear" or "log"', _of(words=get_args(Scale)))
+_METHOD = _Value('"sobol", "latin-hypercube" or "halton"', _of(words=get_args(Method)))
 
-_TEXTS = "a text, or a list of texts,"
-_WHOLES = "a whole number, or a list of whole numbers,"
-_ONE = _Value(_NUMBER, "a number")
-_COUNT = _Value(_WHOLE, "a whole number")
-_RANGE = _Table(
-    "",
-    {"low": _ONE, "high": _ONE, "scale": _Value(_of(words=get_args(Scale)), '"linear" or "log"')},
-    ("low", "high"),
+
+def _several(wanted: str, item: _Value) -> _Value:
+    return _Value(wanted, item.one, item)
+
+
+_TEXTS = _several("a text, or a list of texts,", _TEXT)
+_TEAM = _several("a number, or a list of numbers,", _LIMIT)
+_CONDITION = _several("a number or a text, or a list of them,", _WORD)
+_GAIN = _Value(
+    "a number or a word, a list of them, or a range {low, high},",
+    _WORD.one,
+    _WORD._replace(wanted=f'a number, "{NO_LIMIT}" for no limit, or a word,'),
+    _Table("", {"low": _NUMBER, "high": _NUMBER, "scale": _SCALE}, ("low", "high")),
 )
-_LIMIT_WORDS = f'a number, or "{NO_LIMIT}" for no limit,'
-_TEAM = _Value(_LIMIT, "a number, or a list of numbers,", _LIMIT, _LIMIT_WORDS)
-_KINDS = _Value(_TEXT, _TEXTS, _TEXT, "a text")
-_CONDITION = _Value(_WORD, "a number or a text, or a list of them,", _WORD, "a number or a text")
-_GAIN_WORDS = "a number or a word, a list of them, or a range {low, high},"
-_GAIN = _Value(_WORD, _GAIN_WORDS, _WORD, f'a number, "{NO_LIMIT}" for no limit, or a word,', _RANGE)
-_METHOD = _Value(_of(words=get_args(Method)), '"sobol", "latin-hypercube" or "halton"')
-_GROUPS = _Value(None, "tables [[team.group]]", _of(dict), "a table")
-_MAPS = "a list of names of maps, or of paths beside this file,"
+_GROUPS = _Value("tables [[team.group]]", item=_Value("a table", _of(dict)))
 _STUDY = _Table(
     "a table",
     {
-        "maps": _Value(_TEXT, _MAPS, _TEXT, "a text"),
-        "controllers": _Value(_TEXT, "a list of controllers", _TEXT, "a text"),
-        "robots": _Value(_WHOLE, _WHOLES, _WHOLE, "a whole number"),
-        "starts": _Value(_TEXT, _TEXTS, _TEXT, "a text"),
-        "seeds": _Value(_WHOLE, "how many seeds, or a list of seeds,", _WHOLE, "a whole number"),
-        **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _ONE),
-        "lattice": _COUNT,
-        "metrics": _Value(_of(bool), "true or false"),
+        "maps": _several("a list of names of maps, or of paths beside this file,", _TEXT),
+        "controllers": _several("a list of controllers", _TEXT),
+        "robots": _several("a whole number, or a list of whole numbers,", _WHOLE),
+        "starts": _TEXTS,
+        "seeds": _several("how many seeds, or a list of seeds,", _WHOLE),
+        **dict.fromkeys(("duration", "dt", "cost_hz", "record_hz"), _NUMBER),
+        "lattice": _WHOLE,
+        "metrics": _Value("true or false", _of(bool)),
         "team": _Table(
             "a table [team]",
-            {**dict.fromkeys((*TEAM, *UNICYCLES), _TEAM), "kinematics": _KINDS, "group": _GROUPS},
+            {**dict.fromkeys((*study.TEAM, *study.UNICYCLES), _TEAM), "kinematics": _TEXTS, "group": _GROUPS},
         ),
-        "conditions": _Table("a table [conditions]", dict.fromkeys(CONDITIONS, _CONDITION)),
+        "conditions": _Table("a table [conditions]", dict.fromkeys(study.CONDITIONS, _CONDITION)),
         "gains": _Table("tables [gains.NAME]", {"*": _Table("a table of gains", {"*": _GAIN})}),
         "sampling": _Table(
             "a table [sampling]",
-            {"method": _METHOD, "samples": _COUNT, "seed": _COUNT},
+            {"method": _METHOD, "samples": _WHOLE, "seed": _WHOLE},
             ("method", "samples"),
         ),
     },
@@ -95,36 +94,24 @@ _STUDY = _Table(
 """Schema of a study file. What is not given is as `Study` has it."""
 
 
-class _Reading:
-    """Takes a document apart; `unknown` keys are told first: a misspelt one is also a missing one."""
-
-    def __init__(self) -> None:
-        self.unknown: list[str] = []
-        self.mistakes: list[str] = []
-
-    def table(self, given: dict[str, Any], table: _Table, path: tuple[str | int, ...] = ()) -> dict[str, Any]:
+def _read(given: Any, wanted: _Value | _Table, path: Place, unknown: list[str], mistakes: list[str]) -> Any:
+    """Return what is given as it is meant; `unknown` keys are told first: a misspelt one is also missing."""
+    one, item, table = wanted[1:] if isinstance(wanted, _Value) else (None, None, wanted)
+    if table is not None and isinstance(given, dict):
         keys = table.keys if "*" not in table.keys else dict.fromkeys(given, table.keys["*"])
         above = f"{place(path)}: " if path else ""
-        self.unknown += [above + unknown_name("key", key, keys) for key in given if key not in keys]
-        for key in table.required:
-            if key not in given:
-                self.mistakes.append(f"{place((*path, key))}: missing, but {keys[key].wanted} was wanted")
-        return {key: self.value(given[key], keys[key], (*path, key)) for key in keys if key in given}
-
-    def value(self, given: Any, wanted: _Value | _Table, path: tuple[str | int, ...]) -> Any:
-        table = wanted if isinstance(wanted, _Table) else wanted.table
-        if table is not None and isinstance(given, dict):
-            return self.table(given, table, path)
-        if isinstance(wanted, _Value) and wanted.item and isinstance(given, list):
-            item = _Value(wanted.item, wanted.item_wanted)
-            return [self.value(value, item, (*path, k)) for k, value in enumerate(given)]
-        try:
-            if isinstance(wanted, _Value) and wanted.one:
-                return wanted.one(given)
-        except (ValueError, OverflowError):
-            pass
-        self.mistakes.append(f"{place(path)}: {shown(given)}, but {wanted.wanted} was wanted")
-        return None
+        unknown += [above + unknown_name("key", key, keys) for key in given if key not in keys]
+        missing = {place((*path, key)): keys[key].wanted for key in table.required if key not in given}
+        mistakes += [f"{at}: missing, but {what} was wanted" for at, what in missing.items()]
+        there = [key for key in keys if key in given]
+        return {key: _read(given[key], keys[key], (*path, key), unknown, mistakes) for key in there}
+    if item is not None and isinstance(given, list):
+        return [_read(value, item, (*path, k), unknown, mistakes) for k, value in enumerate(given)]
+    with suppress(ValueError, OverflowError):
+        if one is not None:
+            return one(given)
+    mistakes.append(f"{place(path)}: {shown(given)}, but {wanted.wanted} was wanted")
+    return None
 
 
 def read_study(path: Path | str) -> Study:
@@ -136,17 +123,17 @@ def read_study(path: Path | str) -> Study:
 
 def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
     """Return the study that a parsed file describes; relative paths begin at `folder`."""
-    reading = _Reading()
-    given = reading.table(document, _STUDY)
-    mistakes = reading.unknown + reading.mistakes
-    if mistakes:
+    unknown: list[str] = []
+    mistakes: list[str] = []
+    given = _read(document, _STUDY, (), unknown, mistakes)
+    if mistakes := unknown + mistakes:
         more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
         raise InputError(f"{where}: {mistakes[0]}{more}")
     try:
         if isinstance(given.get("seeds"), int):
             count = given["seeds"]
-            if not 1 <= count <= MOST_RUNS:
-                wanted = f"a whole number from 1 to {MOST_RUNS}"
+            if not 1 <= count <= study.MOST_RUNS:
+                wanted = f"a whole number from 1 to {study.MOST_RUNS}"
                 raise InputError(f"seeds: {shown(count)}, but {wanted} was wanted")
             given["seeds"] = range(count)
         for name in ("maps", "controllers", "robots", "starts"):
@@ -164,13 +151,16 @@ def study_of(document: dict[str, Any], folder: Path, where: str) -> Study:
 
 def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
     known = bundled_maps()
-    if entries == [ALL]:
+    if entries == [study.ALL]:
         entries = list(known)
     once(entries, ("maps",))
     maps: dict[str, StudyMap] = {}
     for k, entry in enumerate(entries):
         try:
-            name, environment = _named_map(entry, folder)
+            if entry not in known and not entry.endswith(".json"):
+                raise InputError(unknown_name("map", entry, known))
+            name = entry if entry in known else (folder / entry).stem
+            environment = load_map(known.get(entry, folder / entry))
         except InputError as error:
             raise InputError(f"maps[{k}]: {error}") from error
         if name in maps:
@@ -178,13 +168,3 @@ def _maps(entries: list[str], folder: Path) -> list[StudyMap]:
             raise InputError(f"maps[{k}]: {shown(entry)}, but {wanted} were wanted")
         maps[name] = StudyMap(name, environment)
     return list(maps.values())
-
-
-def _named_map(entry: str, folder: Path) -> tuple[str, Environment]:
-    known = bundled_maps()
-    if entry in known:
-        return entry, load_map(known[entry])
-    if not entry.endswith(".json"):
-        raise InputError(unknown_name("map", entry, known))
-    path = folder / entry
-    return path.stem, load_map(path)

@@ -10,12 +10,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from itertools import compress, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robocov.compiled import compile_kernels
 from robocov.errors import OutputError, RobocovError, checked, counted
-from robocov_app.sweep.executors import Executor, LocalPool, processors
-from robocov_app.sweep.ledger import Entry, Ledger, Survey, difference_of, opened
+from robocov_app.sweep.executors import Cluster, Executor, LocalPool, processors
+from robocov_app.sweep.ledger import Ledger, difference_of, opened
 from robocov_app.sweep.study import Study, Task, tasks_of
 from robocov_app.sweep.table import Table, columns_of, row_of
 from robocov_app.sweep.worker import Outcome, perform, prepared
@@ -31,7 +31,7 @@ PERIOD = 10.0  # seconds between two lines where there is no terminal
 
 @dataclass
 class Count:
-    """Number of runs, done and left."""
+    """Number of runs, done and left, and of workers `lost`; `waiting`: why nobody does any, in words."""
 
     total: int
     done: int = 0
@@ -42,6 +42,10 @@ class Count:
     began: float = field(default_factory=time.perf_counter)
 
     @property
+    def over(self) -> int:
+        return self.done + self.failed + self.reused
+
+    @property
     def rate(self) -> float:
         """Runs a second; 0 before the first one."""
         seconds = time.perf_counter() - self.began
@@ -50,16 +54,19 @@ class Count:
     @property
     def left(self) -> float | None:
         """Seconds to the end, None before the first run."""
-        rest = self.total - self.done - self.failed - self.reused
-        return rest / self.rate if self.rate else None
+        return (self.total - self.over) / self.rate if self.rate else None
 
     @property
     def ahead(self) -> str:
         """Estimated time left, or the reason why everything waits."""
         return self.waiting or (f"{duration(self.left)} left" if self.left else "")
 
+    @property
+    def line(self) -> str:
+        return ", ".join(filter(None, (str(self), self.ahead)))
+
     def __str__(self) -> str:
-        words = [f"{self.done + self.failed + self.reused} of {self.total} runs"]
+        words = [f"{self.over} of {self.total} runs"]
         words += [f"{self.failed} failed"] * (self.failed > 0)
         words += [f"{self.reused} were there"] * (self.reused > 0)
         words += [f"{counted(self.lost, 'worker')} lost"] * (self.lost > 0)
@@ -71,39 +78,33 @@ class Count:
 class Teller:
     """Tells how far a sweep is: by a bar of rich, in lines now and then, or if `quiet` not at all."""
 
-    def __init__(self, title: str, count: Count, *, quiet: bool = False, bar: Progress | None = None) -> None:
+    def __init__(self, title: str, *, quiet: bool = False, bar: Progress | None = None) -> None:
         self._title, self._quiet, self._bar = title, quiet, bar
         self._said, self._waiting = time.perf_counter(), ""
-        self._task = None if bar is None else bar.add_task(title, total=count.total, said="", left="")
 
-    def __call__(self, count: Count, *, at_once: bool = False) -> None:
-        """Take the count, whenever it has changed or some time has passed."""
-        if self._bar is not None and self._task is not None:
-            done = count.done + count.failed + count.reused
-            self._bar.update(self._task, completed=done, said=str(count), left=count.ahead)
-            return
+    def __call__(self, count: Count) -> None:
         now = time.perf_counter()
         due = now - self._said >= PERIOD and not count.waiting  # that is told once
-        if at_once or due or count.waiting != self._waiting:
+        if (bar := self._bar) is not None:
+            bar.update(bar.task_ids[0], completed=count.over, said=str(count), left=count.ahead)
+        elif due or count.waiting != self._waiting:
             self._said, self._waiting = now, count.waiting
-            self.say(", ".join(filter(None, (str(count), count.ahead))))
+            self.say(count.line)
 
     def say(self, line: str) -> None:
-        """Say something else."""
         if self._bar is not None:
             self._bar.console.print(line, markup=False, highlight=False)
         elif not self._quiet:
             sys.stderr.write(f"{self._title}: {line}\n")
-            sys.stderr.flush()
 
 
 @contextmanager
 def sweep_progress(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]:
     """Give what tells of the count: a bar in a terminal, a line now and then elsewhere."""
     if quiet or not sys.stderr.isatty():
-        teller = Teller(title, count, quiet=quiet)
+        teller = Teller(title, quiet=quiet)
         yield teller
-        teller(count, at_once=True)
+        teller.say(count.line)
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -111,7 +112,8 @@ def sweep_progress(title: str, count: Count, *, quiet: bool) -> Iterator[Teller]
     words = ("{task.description}", "{task.fields[said]}", "{task.fields[left]}")
     name, said, left = (TextColumn(each, markup=False) for each in words)
     with Progress(name, BarColumn(), said, left, console=Console(stderr=True)) as bar:
-        yield Teller(title, count, bar=bar)
+        bar.add_task(title, total=count.total, said="", left="")
+        yield Teller(title, bar=bar)
 
 
 def duration(seconds: float) -> str:
@@ -121,16 +123,11 @@ def duration(seconds: float) -> str:
     ('8 s', '1 min 35 s', '1 h 6 min', '2 d 7 h')
     """
     whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    if whole < 86400:
-        return f"{whole // 3600} h {whole % 3600 // 60} min"
-    return f"{whole // 86400} d {whole % 86400 // 3600} h"
+    for unit, name, part, part_name in ((86400, "d", 3600, "h"), (3600, "h", 60, "min"), (60, "min", 1, "s")):
+        if whole >= unit:
+            return f"{whole // unit} {name} {whole % unit // part} {part_name}"
+    return f"{whole} s"
 
-
-MOST_WORKERS = 1024
 
 _PATIENCE = 0.2  # seconds between two looks at what else there is to do
 _ERRORS = 3  # different errors of runs that are told
@@ -138,20 +135,16 @@ _ERRORS = 3  # different errors of runs that are told
 
 @dataclass
 class Totals:
-    """Totals of the runs of a study.
-
-    `failed` counts earlier ones too. `errors`: the first different ones, by run. `versions`: how many runs
-    were made with which. `table_replaced`: false where the table would have become shorter.
-    """
+    """Totals of the runs of a study."""
 
     done: int
-    failed: int
+    failed: int  # earlier ones too
     reused: int
     interrupted: bool
-    errors: dict[str, str] = field(default_factory=dict, compare=False)
+    errors: dict[str, str] = field(default_factory=dict, compare=False)  # the first different ones, by run
     damaged: list[str] = field(default_factory=list, compare=False)
-    versions: dict[str, int] = field(default_factory=dict, compare=False)
-    table_replaced: bool = field(default=True, compare=False)
+    versions: dict[str, int] = field(default_factory=dict, compare=False)  # how many were made with which
+    table_replaced: bool = field(default=True, compare=False)  # not where it would have become shorter
 
 
 def sweep(
@@ -175,7 +168,7 @@ def sweep(
     cannot be written; what is done is kept.
     """
     if workers is not None:
-        checked("workers", workers, 1, MOST_WORKERS, whole=True)
+        checked("workers", workers, 1, 1024, whole=True)
     folder = Path(folder)
     with ExitStack() as stack:
         stopped = stack.enter_context(Interruption()) if stop is None else stop
@@ -192,21 +185,18 @@ def sweep(
         rows = _Rows(ledger, table, zip(survey.todo, tasks_of(study), strict=False))
 
         def open_executor() -> Executor:
-            if scheduler is None:
-                compile_kernels()
-                return LocalPool(min(workers or processors(), sum(survey.todo)))
-            from robocov_app.sweep.executors import Cluster
-
-            return Cluster(scheduler)
+            if scheduler is not None:
+                return Cluster(scheduler)
+            compile_kernels()
+            return LocalPool(min(workers or processors(), sum(survey.todo)))
 
         def keep(task: Task, outcome: Outcome) -> None:
-            difference = difference_of(outcome.versions)
-            if difference and not keep_versions:
-                raise OutputError(
-                    f"a worker has {difference}; the same versions everywhere, or --keep-versions, was wanted"
-                )
+            if (difference := difference_of(outcome.versions)) and not keep_versions:
+                wanted = "the same versions everywhere, or --keep-versions, was wanted"
+                raise OutputError(f"a worker has {difference}; {wanted}")
             ledger.keep(task, outcome)
-            rows.finished(task)
+            rows.finished.add(task.name)
+            rows.write()
 
         failure: RobocovError | None = None
         try:
@@ -220,16 +210,10 @@ def sweep(
             rows.write(whatever=True)
     if failure is not None:
         raise failure
-    return Totals(
-        done=count.done,
-        failed=count.failed + survey.failed,
-        reused=count.reused - survey.failed,
-        interrupted=count.done + count.failed + count.reused < count.total,
-        errors={run: error for error, run in rows.errors.items()},
-        damaged=survey.damaged,
-        versions=dict(rows.versions),
-        table_replaced=table.replaced,
-    )
+    failed, reused = count.failed + survey.failed, count.reused - survey.failed
+    errors = {run: error for error, run in rows.errors.items()}
+    details = errors, survey.damaged, dict(rows.versions), table.replaced
+    return Totals(count.done, failed, reused, count.over < count.total, *details)
 
 
 def worked_off(
@@ -240,14 +224,13 @@ def worked_off(
     keep: Callable[[Task, Outcome], object],
 ) -> Iterator[None]:
     """Have tasks done, and keep what comes back; yield whenever the count may have changed."""
-    with ExitStack() as stack:
-        executor: Executor | None = None
-        left = iter(tasks)
-        task = next(left, None)
-        while (task is not None or (executor is not None and executor.busy)) and not stop.requested:
-            if executor is None:
-                executor = stack.enter_context(open_executor())
-            while task is not None and not executor.full:
+    left = iter(tasks)
+    task = next(left, None)
+    if task is None or stop.requested:
+        return
+    with open_executor() as executor:
+        while (task is not None or executor.busy) and not stop.requested:
+            while task is not None and executor.busy < executor.most:
                 executor.submit(task)
                 task = next(left, None)
             back = executor.next(_PATIENCE)
@@ -256,48 +239,38 @@ def worked_off(
                 count.began = time.perf_counter()
             if back is not None:
                 keep(*back)
-                if back[1].error is None:
-                    count.done += 1
-                else:
-                    count.failed += 1
+                count.done += back[1].error is None
+                count.failed += back[1].error is not None
             yield
 
 
 class _Rows:
     """Writes the rows of a table in the order of the tasks, whatever the order in which they are finished."""
 
-    def __init__(self, ledger: Ledger, table: Table, tasks: Iterable[tuple[int, Task]]) -> None:
-        self._ledger, self._table, self._tasks = ledger, table, iter(tasks)
-        self._head = next(self._tasks, None)
-        self._finished: set[str] = set()
+    def __init__(self, ledger: Ledger, table: Table, tasks: Iterator[tuple[int, Task]]) -> None:
+        self._ledger, self._table, self._tasks = ledger, table, tasks
+        self._head = next(tasks, None)
+        self.finished: set[str] = set()
         self.errors: dict[str, str] = {}
         self.versions: Counter[str] = Counter()
-
-    def finished(self, task: Task) -> None:
-        """Write the row of a task, and of those behind it that were finished before, when it is its turn."""
-        self._finished.add(task.name)
-        self.write()
 
     def write(self, *, whatever: bool = False) -> None:
         """Write the next rows, up to the first run that is still to be done; or `whatever` is there."""
         while self._head is not None:
             todo, task = self._head
-            if todo and task.name not in self._finished and not whatever:
+            if todo and task.name not in self.finished and not whatever:
                 return
             entry = self._ledger.entry(task)
             if entry is not None:
-                self._add(task, entry)
+                self._table.add(row_of(task, entry))
+                if entry.versions:
+                    self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
+                if entry.error is not None and len(self.errors) < _ERRORS:
+                    self.errors.setdefault(entry.error, task.name)
             elif not whatever:
                 raise OutputError(f"{self._ledger.folder}: {task.name} was removed by somebody else")
-            self._finished.discard(task.name)
+            self.finished.discard(task.name)
             self._head = next(self._tasks, None)
-
-    def _add(self, task: Task, entry: Entry) -> None:
-        self._table.add(row_of(task, entry))
-        if entry.versions:
-            self.versions[", ".join(map(" ".join, entry.versions.items()))] += 1
-        if entry.error is not None and (entry.error in self.errors or len(self.errors) < _ERRORS):
-            self.errors.setdefault(entry.error, task.name)
 
 
 @dataclass(frozen=True)
@@ -318,42 +291,28 @@ class Rehearsal:
 
 def rehearsed(
     study: Study,
-    folder: Path | None,
+    folder: Path,
     *,
     workers: int,
     retry_failed: bool = False,
     keep_versions: bool = False,
 ) -> Rehearsal:
     """Do the first run that is left, or else the first, and write nothing."""
-    survey = Survey(bytearray(b"\x01") * len(study))
-    if folder is not None:
-        ledger = Ledger(folder)
-        survey = ledger.survey(tasks_of(study), retry_failed=retry_failed, keep_versions=keep_versions)
+    again = {"retry_failed": retry_failed, "keep_versions": keep_versions}
+    survey = Ledger(folder).survey(tasks_of(study), **again)
     left = sum(survey.todo)
     chosen = next(compress(tasks_of(study), survey.todo), None) or next(tasks_of(study))
     prepared(chosen)  # once for all runs on a map
     began = time.perf_counter()
     outcome = perform(chosen)
-    seconds = time.perf_counter() - began
-    size = sum(map(len, outcome.files.values()))
-    return Rehearsal(
-        runs=len(study),
-        left=left,
-        axes=axes_of(study),
-        run=chosen.name,
-        error=outcome.error,
-        seconds_a_run=seconds,
-        bytes_a_run=size,
-        seconds=seconds * left / max(1, min(workers, left)),
-        bytes=size * len(study),
-        notes=survey.words(keep_versions=keep_versions),
-    )
+    seconds, size = time.perf_counter() - began, sum(map(len, outcome.files.values()))
+    one = axes_of(study), chosen.name, outcome.error, seconds, size
+    every = seconds * left / max(1, min(workers, left)), size * len(study)
+    return Rehearsal(len(study), left, *one, *every, survey.words(keep_versions=keep_versions))
 
 
 def axes_of(study: Study) -> dict[str, int]:
-    """Return how many values there are of each thing that a study varies."""
-    axes: dict[str, Any] = {"maps": study.maps, "robots": study.robots, "teams": study.teams}
-    axes |= {"starts": [name for each in study.maps for name in study.starts_on(each)]}
-    axes |= {"seeds": study.seeds, "controllers": study.controllers}
-    sizes = {name: len(values) for name, values in axes.items()}
+    sizes = {name: len(getattr(study, name)) for name in ("maps", "robots", "teams")}
+    sizes["starts"] = sum(len(study.starts_on(each)) for each in study.maps)
+    sizes |= {name: len(getattr(study, name)) for name in ("seeds", "controllers")}
     return sizes | {f"gains of {name}": len(study.gains_of(name).choices) for name in study.controllers}

@@ -9,28 +9,23 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from robocov.controllers import gains_of
 from robocov.controllers.gains import Option
 from robocov.errors import OutputError
 from robocov.files.atomic import on_disk, writable
-from robocov_app.sweep.ledger import Entry
+from robocov_app.sweep.ledger import STUDY, Entry
 from robocov_app.sweep.study import CONDITIONS, UNITS, WORDS, Study, Task, parameter_column
 from robocov_app.sweep.worker import FIGURES, TIMED
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
 CSV, PARQUET = "results.csv", "results.parquet"
-
-_PART = ".results.part.{}"  # temporary name, while a table is written
-
+_CSV_PART, _PARQUET_PART = ".results.part.csv", ".results.part.parquet"  # names while a table is written
 ROW_GROUP = 4096  # rows of a row group, and the most that are in memory
 
 
 class Column(NamedTuple):
-    """A column of the table. `meaning`: one line."""
+    """A column of the table."""
 
     name: str
     kind: str
@@ -89,15 +84,11 @@ def columns_of(study: Study) -> tuple[Column, ...]:
             if gains.setdefault(name, column).kind != kind:
                 # a number here and a word there: both can be written as words
                 gains[name] = gains[name]._replace(kind="string")
-    team = (
-        Column(
-            parameter_column(name),
-            "string" if name in WORDS else "double",
-            UNITS[name],
-            f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}",
-        )
-        for name in study.swept
-    )
+    team = []
+    for name in study.swept:
+        meaning = f"{name.replace('_', ' ')} {'of the run' if name in CONDITIONS else 'of the robots'}"
+        kind = "string" if name in WORDS else "double"
+        team.append(Column(parameter_column(name), kind, UNITS[name], meaning))
     figures = (*_FIGURES, *((_TIME,) if study.mixed_speeds else ()), *(_METRICS if study.metrics else ()))
     return (*_BEFORE, *gains.values(), *team, _DURATION, *figures, *_AFTER)
 
@@ -110,13 +101,8 @@ def gain_column(name: str) -> str:
 
 
 def row_of(task: Task, entry: Entry) -> dict[str, Any]:
-    """Return the row of a run, by the names of the columns."""
     return {
-        "map": task.map,
-        "controller": task.controller,
-        "robots": task.robots,
-        "start": task.start,
-        "seed": task.seed,
+        **{column.name: getattr(task, column.name) for column in _BEFORE},
         **{gain_column(name): value for name, value in task.gains.items()},
         **{parameter_column(name): value for name, value in task.team.items()},
         "duration_s": task.duration,
@@ -138,42 +124,69 @@ class Table:
         self.complete, self.replaced = True, False
         self._folder, self._columns, self._study = folder, columns, study
         self._broken: OutputError | None = None
-        self._names = [column.name for column in columns]
         self._rows: list[dict[str, Any]] = []
-        self._count = -1  # the header is no row
+        self._size, self._count = 0, -1  # the header is no row
 
     def __enter__(self) -> Table:
+        import pyarrow as pa
         import pyarrow.parquet as pq
 
-        self._former, grows = _former_rows(self._folder)
-        self._shown_from = self._former if grows else math.inf
-        self._schema = _schema(self._columns)
+        for name in (CSV, PARQUET):
+            writable(self._folder / name)
+        self._former = 0  # rows of an earlier table, which only one that grows replaces before the end
+        with suppress(OSError), (self._folder / CSV).open("rb") as file:
+            self._former = max(0, sum(1 for _ in file) - 1)
+        self._shown_from = math.inf if (self._folder / PARQUET).exists() else self._former
+        fields = (
+            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
+            for name, kind, unit, meaning in self._columns
+        )
+        self._schema = pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})
         with ExitStack() as stack:
-            for suffix in ("csv", "parquet"):
-                stack.callback((self._folder / _PART.format(suffix)).unlink, missing_ok=True)
+            for part in (_CSV_PART, _PARQUET_PART):
+                stack.callback((self._folder / part).unlink, missing_ok=True)
             with _told(self._folder / CSV):
-                self._csv = (self._folder / _PART.format("csv")).open("wb", buffering=0)
+                self._csv = (self._folder / _CSV_PART).open("wb", buffering=0)
             stack.callback(lambda: self._csv.close())  # it may be another one by then
             with _told(self._folder / PARQUET):
-                self._parquet = pq.ParquetWriter(self._folder / _PART.format("parquet"), self._schema)
+                self._parquet = pq.ParquetWriter(self._folder / _PARQUET_PART, self._schema)
             stack.callback(self._close_parquet)
-            self._size = 0
-            self._write(_csv_line(self._names))
+            self._write(_csv_line(column.name for column in self._columns))
             self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *exception: Any) -> None:
+        """Replace the files of an earlier sweep by those of this one, all after another at once."""
         with self._stack:
-            if exception[0] is None:
-                self._finish()
+            if exception[0] is not None:
+                return
+            self._flush()
+            with _told(self._folder / PARQUET):
+                self._parquet.close()
+            self._csv.close()
+            if not self.complete and self._count < self._former and not self.replaced:
+                return
+            names = {PARQUET: _PARQUET_PART} | ({} if self.replaced else {CSV: _CSV_PART})
+            with _told(self._folder / PARQUET):
+                study = self._folder / STUDY
+                if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
+                    names[STUDY] = ".study.part.json"
+                    (self._folder / names[STUDY]).write_bytes(self._study)
+                grown = [self._folder / CSV] * self.replaced
+                on_disk([self._folder / part for part in names.values()] + grown)
+                for name, part in names.items():
+                    (self._folder / part).replace(self._folder / name)
+                on_disk([self._folder])
+            self.replaced = True
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Append a row; what it does not hold is null."""
         if self._broken is not None:
             raise self._broken
-        values = {name: row.get(name) for name in self._names}
-        texts = [name for name, kind, *_ in self._columns if kind == "string" and values[name] is not None]
-        values |= {name: str(values[name]) for name in texts}
+        values = {column.name: row.get(column.name) for column in self._columns}
+        for name, kind, *_ in self._columns:
+            if kind == "string" and values[name] is not None:
+                values[name] = str(values[name])
         try:
             self._write(_csv_line(values.values()))
             self._rows.append(values)
@@ -185,21 +198,20 @@ class Table:
 
     def _write(self, line: str) -> None:
         """Append a line to the CSV file, all of it or nothing, and show the file when it is time."""
+        rest = memoryview(line.encode())
+        size = self._size + len(rest)
         with _told(self._folder / CSV):
-            data = line.encode()
             try:
-                rest = memoryview(data)
                 while rest:
                     rest = rest[self._csv.write(rest) :]
             except OSError:
                 with suppress(OSError):
                     os.ftruncate(self._csv.fileno(), self._size)
                 raise
-            self._size += len(data)
-            self._count += 1
+            self._size, self._count = size, self._count + 1
             if self._count >= self._shown_from:
                 self._csv.close()  # open files cannot be renamed everywhere
-                (self._folder / _PART.format("csv")).replace(self._folder / CSV)
+                (self._folder / _CSV_PART).replace(self._folder / CSV)
                 self._csv = (self._folder / CSV).open("ab", buffering=0)
                 self._shown_from, self.replaced = math.inf, True
 
@@ -216,44 +228,14 @@ class Table:
         with suppress(OSError):
             self._parquet.close()
 
-    def _finish(self) -> None:
-        """Replace the files of an earlier sweep by those of this one, all after another at once."""
-        self._flush()
-        with _told(self._folder / PARQUET):
-            self._parquet.close()
-        self._csv.close()
-        if not self.complete and self._count < self._former and not self.replaced:
-            return
-        names = {PARQUET: _PART.format("parquet")}
-        names |= {} if self.replaced else {CSV: _PART.format("csv")}
-        with _told(self._folder / PARQUET):
-            study = self._folder / "study.json"
-            if self._study is not None and not (study.is_file() and study.read_bytes() == self._study):
-                names["study.json"] = ".study.part.json"
-                (self._folder / names["study.json"]).write_bytes(self._study)
-            on_disk([self._folder / part for part in names.values()] + [self._folder / CSV] * self.replaced)
-            for name, part in names.items():
-                (self._folder / part).replace(self._folder / name)
-            on_disk([self._folder])
-        self.replaced = True
-
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Tell of a file that cannot be written. Raises OutputError."""
+    """Raise OutputError where the system refuses to write a file."""
     try:
         yield
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _former_rows(folder: Path) -> tuple[int, bool]:
-    """Return how many rows an earlier table has, and whether it may be replaced by one that grows."""
-    for name in (CSV, PARQUET):
-        writable(folder / name)
-    with suppress(OSError), (folder / CSV).open("rb") as file:
-        return max(0, sum(1 for _ in file) - 1), not (folder / PARQUET).exists()
-    return 0, not (folder / PARQUET).exists()
 
 
 def _csv_line(values: Any) -> str:
@@ -261,13 +243,3 @@ def _csv_line(values: Any) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(values)
     return text.getvalue()
-
-
-def _schema(columns: Sequence[Column]) -> pa.Schema:
-    import pyarrow as pa
-
-    fields = [
-        pa.field(column.name, column.kind, metadata={"unit": column.unit, "meaning": column.meaning})
-        for column in columns
-    ]
-    return pa.schema(fields, metadata={"format": "robocov-results", "version": "1"})

@@ -5,8 +5,7 @@ import io
 import json
 import threading
 import traceback
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any
@@ -19,7 +18,7 @@ from robocov.cost import CoverageCost
 from robocov.environment import Environment
 from robocov.errors import RobocovError
 from robocov.mapfile import from_json
-from robocov.metrics import CostHistory, cost_history, summarise
+from robocov.metrics import cost_history, summarise
 from robocov.metrics.run_metrics import figures_of
 from robocov.planning.discovered import DiscoveredMap
 from robocov.record import Record, versions
@@ -32,19 +31,15 @@ from robocov_app.toolkit.worker import Line
 
 _REMEMBERED = 4  # maps whose costs a worker keeps; tasks come map by map
 _TIDY = 1000  # steps after which garbage is collected in a long run
-
 FIGURES = (
     *("mean_distance_m", "mean_distance_over_run_m", "cost_m3", "uncovered_area_m2", "settled_at_s"),
     *("contacts", "min_clearance_m", "path_length_m", "stuck_robots"),
 )
 """Figures of a run in the table, in this order."""
-
+TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
 EFFORT = "effort.json"  # of runs with metrics: computing time differs each time, so the table has it not
 POSITION, CELL = 20, 5  # bytes that are told of a position, and of a cell of a map
-
-TIMED = "mean_time_s"  # what it holds as well where robots are not equally fast
-
-
+_ONE_AT_A_TIME = threading.Lock()
 _RESULTS = 3
 """Counted up whenever the same inputs give other results: 3 since only robots in contact are substepped."""
 
@@ -68,13 +63,23 @@ class Outcome:
 
 
 def perform(task: Task) -> Outcome:
-    """Do a run; what goes wrong in it is a part of the outcome."""
-    with _undisturbed():
+    """Do a run; what goes wrong in it is a part of the outcome.
+
+    No other thread of this process comes near the physics meanwhile, for which pymunk is not made. What runs
+    leave behind is collected here too: another thread would free bodies amid the next run's steps.
+    """
+    with _ONE_AT_A_TIME:
+        enabled = gc.isenabled()
+        gc.disable()
         try:
             return _performed(task)
         except (Exception, SystemExit) as error:
             message = str(error) if isinstance(error, RobocovError) else f"{type(error).__name__}: {error}"
             return failed(message, traceback.format_exc())
+        finally:
+            gc.collect(1)  # what is older than the run is none of its garbage
+            if enabled:
+                gc.enable()
 
 
 class Performing:
@@ -83,12 +88,10 @@ class Performing:
     failing = "the run failed"
 
     def __call__(self, questions: list[Task], line: Line) -> Outcome:
-        """Do a run."""
         return perform(questions[-1])
 
 
 def failed(message: str, details: str) -> Outcome:
-    """Return the outcome of a run that failed."""
     # one line of what files can hold, whatever a controller of a user's says
     message = " ".join(message.split()).encode(errors="replace").decode()
     content = {"error": message, "traceback": details}
@@ -96,13 +99,15 @@ def failed(message: str, details: str) -> Outcome:
 
 
 def simulated(task: Task, environment: Environment) -> Record:
-    """Simulate a run, and return the whole of it."""
     return measured(task, environment)[0]
 
 
 def measured(task: Task, environment: Environment) -> tuple[Record, dict[str, float | None]]:
     """Simulate a run, and return the whole of it, and what it took: what ``effort.json`` holds."""
-    spec = spec_of(task, environment)
+    law, team = (task.controller, task.gains, task.source), team_of(task.robots, task.team)
+    more: dict[str, Any] = {"duration": task.duration, "dt": task.dt}
+    more["conditions"] = conditions_of(task.team, task.seed, task.robots)
+    spec = RunSpec(environment, *law, team, task.start, task.seed, **more)
     with provided(spec.source.modules if spec.source else {}):
         simulation = spec.simulation()
         telling = Telling(simulation)
@@ -128,8 +133,7 @@ class Telling:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        conditions = simulation.conditions
-        rate = None if conditions is None else conditions.message_rate
+        rate: float | None = getattr(simulation.conditions, "message_rate", None)
         self._share = 1.0 if rate is None else min(1.0, rate * simulation.dt)
         self._sharing = information_of(simulation.controller) == "shared map"
         self._maps = self._known()
@@ -139,7 +143,6 @@ class Telling:
         return getattr(self._simulation.memory, "maps", None) if self._sharing else ()
 
     def count(self) -> None:
-        """Count what is told in the step that was just made."""
         before, self._maps = self._maps, self._known()
         if self.bytes is None or before is None or self._maps is None:
             self.bytes = None
@@ -148,22 +151,6 @@ class Telling:
         for old, new in zip(before, self._maps, strict=True):
             if new is not old:
                 self.bytes += CELL * int(np.count_nonzero(new.state != old.state))
-
-
-def spec_of(task: Task, environment: Environment) -> RunSpec:
-    """Return the run of a task on its map."""
-    return RunSpec(
-        environment,
-        task.controller,
-        task.gains,
-        task.source,
-        team_of(task.robots, task.team),
-        task.start,
-        task.seed,
-        duration=task.duration,
-        dt=task.dt,
-        conditions=conditions_of(task.team, task.seed, task.robots),
-    )
 
 
 def prepared(task: Task) -> tuple[Environment, CoverageCost]:
@@ -177,26 +164,6 @@ def _prepared(document: str, name: str, lattice: int) -> tuple[Environment, Cove
     return environment, CoverageCost(environment, lattice)
 
 
-_ONE_AT_A_TIME = threading.Lock()
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Let no other thread of this process near the physics, for which pymunk is not made.
-
-    What runs leave behind is collected here too: another thread would free bodies amid the next run's steps.
-    """
-    with _ONE_AT_A_TIME:
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
-            yield
-        finally:
-            gc.collect(1)  # what is older than the run is none of its garbage
-            if enabled:
-                gc.enable()
-
-
 def _performed(task: Task) -> Outcome:
     environment, cost = prepared(task)
     record, effort = measured(task, environment)
@@ -205,27 +172,18 @@ def _performed(task: Task) -> Outcome:
     summary = finite(summarise(record, history))
     path = summary["path_length_m"]
     figures = {**summary, "path_length_m": sum(path) / len(path)}
-    known = {name: figures[name] for name in FIGURES}
-    if TIMED in figures:
-        known[TIMED] = figures[TIMED]
-    if task.metrics:
-        known |= finite(figures_of(record, history))
-    files = _files(task, record, history, summary)
-    if task.metrics:
-        files[EFFORT] = json_text(effort).encode()
-    return Outcome(files, known)
-
-
-def _files(task: Task, record: Record, history: CostHistory, summary: Mapping[str, Any]) -> dict[str, bytes]:
+    figures = {name: figures[name] for name in (*FIGURES, TIMED) if name in figures}
     content = record.to_json(summary, lattice=task.lattice)
     content |= {"cost_hz": task.cost_hz, "record_hz": task.record_hz}
-    if task.source is not None:
-        content["controller"] |= source_json(task.source)
-    kept = record.thinned(task.record_hz)
-    arrays = io.BytesIO()
+    content["controller"] |= source_json(task.source)
+    kept, arrays = record.thinned(task.record_hz), io.BytesIO()
     np.savez_compressed(arrays, **{name: getattr(kept, name) for name in kept.arrays})
-    return {
+    files = {
         "run.json": json_text(content).encode(),
         "record.npz": arrays.getvalue(),
         "cost.csv": csv_text(*cost_table(history)).encode(),
     }
+    if task.metrics:
+        figures |= finite(figures_of(record, history))
+        files[EFFORT] = json_text(effort).encode()
+    return Outcome(files, figures)

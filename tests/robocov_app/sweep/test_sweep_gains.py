@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from robocov.controllers import Rapf, Rpf, gain_values, gains_of
 from robocov.errors import ParameterError
-from robocov_app.sweep.gains import Gains, Method, Range, Sampling
+from robocov_app.sweep.study import Gains, Method, Range, Sampling
 
 METHODS = ("sobol", "halton", "latin-hypercube")
 

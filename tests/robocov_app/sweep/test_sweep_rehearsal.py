@@ -58,6 +58,6 @@ def test_what_is_done_already_is_not_counted(tmp_path: Path) -> None:
     assert sorted(path.stat().st_mtime_ns for path in tmp_path.rglob("*")) == before
 
 
-def test_a_run_that_fails_says_so() -> None:
-    found = rehearsed(small_study(robots=(500,)), None, workers=1)
+def test_a_run_that_fails_says_so(tmp_path: Path) -> None:
+    found = rehearsed(small_study(robots=(500,)), tmp_path, workers=1)
     assert found.error is not None and "room for about" in found.error

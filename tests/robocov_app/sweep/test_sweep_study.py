@@ -8,8 +8,7 @@ import pytest
 from swept import HALL, ROOM, controller, small_study
 
 from robocov.errors import InputError, ParameterError
-from robocov_app.sweep.gains import Range, Sampling
-from robocov_app.sweep.study import Study, StudyMap, tasks_of, team_of
+from robocov_app.sweep.study import Range, Sampling, Study, StudyMap, tasks_of, team_of
 
 MAPS = (StudyMap("room", ROOM), StudyMap("hall", HALL))
 
