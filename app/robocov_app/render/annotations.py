@@ -29,7 +29,6 @@ def is_small(height: float, scale: float, shown: Set[str]) -> bool:
 
 
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
-    """Draw a bar of a round length at the foot of a canvas, with its length."""
     height = canvas.surface.get_height()
     if not is_small(height, canvas.scale, canvas.shown):
         _draw_bar(canvas, EDGE * canvas.scale, height - 0.5 * STRIP * canvas.scale)
@@ -71,13 +70,10 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     canvas.text(cost, (right, y), anchor="right")
 
 
-def draw_brief_status(canvas: Canvas, scene: Scene) -> None:
-    """Draw the status line without what a caption says: the controller and the cost."""
-    draw_status(canvas, replace(scene, label="", cost=""))
-
-
 def draw_status(canvas: Canvas, scene: Scene) -> None:
-    """Draw controller, time and cost in the strip below the arena."""
+    """Draw controller, time and cost below the arena; a caption above it says the controller and the cost."""
+    if "caption" in canvas.shown:
+        scene = replace(scene, label="", cost="")
     bar = bar_length(canvas)
     taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
     taken += canvas.text_width(length_label(bar), bold=True)
@@ -109,7 +105,6 @@ class LegendStrip:
         self._strip = Latest[pygame.Surface]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the canvas's legend at the top."""
         width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
         strip = self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas))
@@ -149,7 +144,6 @@ def legend_picture(
 
 
 def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:
-    """Break the entries into rows that fit the surface's width."""
     room = canvas.surface.get_width() - 2 * MARGIN * canvas.scale
     rows: list[list[LegendEntry]] = []
     used = 0.0

@@ -34,21 +34,18 @@ class Camera:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """The middle of the view in pixels."""
         left, top, width, height = self.view
         return left + width / 2, top + height / 2
 
     def to_pixels(self, points: Array) -> Array:
         """Return the pixels of (..., 2) points in metres."""
-        x, y = self.middle
         scale = np.array([self.zoom, -self.zoom])
-        return np.asarray((points - np.array(self.center)) * scale + np.array([x, y]))
+        return np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
 
     def to_world(self, pixels: Array) -> Array:
         """Return the points in metres of (..., 2) pixels."""
-        x, y = self.middle
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
-        return np.asarray((pixels - np.array([x, y])) * scale + np.array(self.center))
+        return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))
 
     def zoomed(self, factor: float, at: tuple[float, float]) -> "Camera":
         """Return the camera that magnifies by `factor` and keeps what is under pixel `at` there."""
@@ -63,11 +60,9 @@ class Camera:
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
     def within(self, view: tuple[float, float, float, float]) -> "Camera":
-        """Return the camera that shows the same middle at the same zoom in another rectangle."""
         return replace(self, view=view)
 
     def visible(self) -> tuple[float, float, float, float]:
-        """Return the bounds of what is shown, in metres."""
         half_x, half_y = self.view[2] / 2 / self.zoom, self.view[3] / 2 / self.zoom
         x, y = self.center
         return x - half_x, y - half_y, x + half_x, y + half_y

@@ -37,9 +37,8 @@ def dots(environment: Environment, most: int) -> tuple[Array, Array]:
 
 def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
     """Return how far the density at (w,) x and (h,) y, m, is from the least to the most, (h, w), 0 to 1."""
-    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
     low, high = value_range(density, bounds)
-    value = density.value(points).reshape(len(y), len(x))
+    value = density.value(_grid(x, y)).reshape(len(y), len(x))
     return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
 
 
@@ -52,7 +51,6 @@ def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
 
 
 def density_range(environment: Environment) -> tuple[float, float]:
-    """Return the least and the largest value that the density has in the region."""
     if environment.density is None:
         return 1.0, 1.0
     return value_range(environment.density, environment.region.bounds)
@@ -61,39 +59,30 @@ def density_range(environment: Environment) -> tuple[float, float]:
 @lru_cache(maxsize=16)
 def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
     """Return the least and the largest value of a density within bounds."""
-    low_x, low_y, high_x, high_y = bounds
-    step = max(high_x - low_x, high_y - low_y) / _SAMPLES
-    x, y = (np.arange(low + 0.5 * step, high, step) for low, high in ((low_x, high_x), (low_y, high_y)))
-    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
-    points = np.concatenate([points, _inside(density, bounds)])
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    step = (high - low).max() / _SAMPLES
+    points = _grid(
+        *(np.arange(first + 0.5 * step, last, step) for first, last in zip(low, high, strict=True))
+    )
+    if isinstance(density, Gaussians):  # between samples a narrow one is missed
+        centers = np.array([peak.center for peak in density.peaks]).reshape(-1, 2)
+        points = np.concatenate([points, centers[((low <= centers) & (centers <= high)).all(axis=1)]])
     value = density.value(points)
     return float(value.min()), float(value.max())
 
 
-def _inside(density: Density, bounds: Bounds) -> Array:
-    """Return the centres of Gaussians that are within the bounds: between samples a narrow one is missed."""
-    if not isinstance(density, Gaussians) or not density.peaks:
-        return np.empty((0, 2))
-    centers = np.array([peak.center for peak in density.peaks])
-    low, high = np.array(bounds[:2]), np.array(bounds[2:])
-    return np.asarray(centers[((low <= centers) & (centers <= high)).all(axis=1)])
+def _grid(x: Array, y: Array) -> Array:
+    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def density_label(environment: Environment) -> str:
     """Return the words of the legend, empty where every place counts the same."""
-    if environment.density is None or environment.density.uniform:
-        return ""
-    return range_label(density_range(environment))
+    density = environment.density
+    return "" if density is None or density.uniform else range_label(density_range(environment))
 
 
 def range_label(span: tuple[float, float]) -> str:
-    """Return the words of the legend for a range of values.
-
-    >>> range_label((0.25, 10.0))
-    'density φ, 0.25 to 10'
-    """
-    low, high = span
-    return f"density φ, {low:.3g} to {high:.3g}"
+    return "density φ, {:.3g} to {:.3g}".format(*span)
 
 
 def mean_label(environment: Environment) -> str:
@@ -124,8 +113,6 @@ def density_kind(environment: Environment) -> str | None:
 
 def density_lines(environment: Environment) -> Iterator[str]:
     """Yield the line that says by what the figures above it are weighed; none where nothing weighs them."""
-    density = environment.density
-    if density is None or density.uniform:
-        return
-    low, high = density_range(environment)
-    yield f"weighed by φ    {density.kind}, {low:.3g} to {high:.3g}"
+    if environment.density is not None and not environment.density.uniform:
+        low, high = density_range(environment)
+        yield f"weighed by φ    {environment.density.kind}, {low:.3g} to {high:.3g}"

@@ -1,7 +1,6 @@
 """Distances to the nearest robot at every pixel of a picture, and their colours."""
 
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from robocov_app.render.theme import Theme
 
 # least angle in radians at which two distances are taken to grow apart, so that borders stay thin
 _SHALLOW = 0.05
-
 
 # the squares beside a square: rows up and columns right, and the corners that the two share
 _BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
@@ -46,10 +44,8 @@ class FieldLattice:
     def squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
         """Return the columns and the rows of the squares that hold coordinates, (w,) and (h,) m."""
         last = len(self.around) - 1
-        column, row = (
-            np.clip(np.floor((places - start) / self.spacing) + 1, 0, last).astype(np.intp)
-            for places, start in ((x, self.origin[0]), (y, self.origin[1]))
-        )
+        cells = [(at - low) / self.spacing for at, low in zip((x, y), self.origin, strict=True)]
+        column, row = (np.clip(np.floor(at) + 1, 0, last).astype(np.intp) for at in cells)
         return column, row
 
 
@@ -63,7 +59,6 @@ class Borders:
     gap: Array
 
     def within(self, gap: float) -> "Borders":
-        """Return those that are no farther from a border."""
         near = (self.gap <= gap).nonzero()[0]
         return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
 
@@ -139,23 +134,24 @@ class Field:
 
     def borders(self, x: Array, y: Array, within: float) -> Borders:
         """Return the places at even (w,) x and (h,) y, at most `within` m from a change of owner."""
-        _, pixels = self._coarse_and_fine(x, y, within)
-        return pixels.within(within)
+        return self._coarse_and_fine(x, y, within)[1].within(within)
 
     def _coarse_and_fine(self, x: Array, y: Array, within: float) -> tuple[Borders, Borders]:
         """Return what is near a border by blocks, each as its middle is, then by pixels."""
         # blocks with a corner in a square with rivals
         column, row = self.lattice.squares(x, y)
         numbered = self._around.number >= 0
-        ends = [
+        low_row, high_row, left, right = (
             np.minimum(np.arange(0, n, _BLOCK) + more, n - 1)
             for n in (len(y), len(x))
             for more in (0, _BLOCK - 1)
+        )
+        corners = [
+            numbered[row[high][:, None], column[wide]]
+            for high in (low_row, high_row)
+            for wide in (left, right)
         ]
-        some = np.zeros((len(ends[0]), len(ends[2])), dtype=bool)
-        for high, wide in product(ends[:2], ends[2:]):
-            some |= numbered[row[high][:, None], column[wide]]
-        high, wide = some.nonzero()
+        high, wide = np.logical_or.reduce(corners).nonzero()
         middle_x, middle_y = (middles(places, _BLOCK) for places in (x, y))
         column, row = self.lattice.squares(middle_x, middle_y)
         known = numbered[row[high], column[wide]]
@@ -165,11 +161,9 @@ class Field:
         near = (blocks.gap <= within + 1.5 * _BLOCK * step).nonzero()[0]
         coarse = _spread(blocks.row, blocks.column, len(y), len(x))
         coarse_owner, coarse_gap = blocks.owner[coarse[2]], blocks.gap[coarse[2]]
-        fine = _spread(
-            *(np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])),
-            *(len(y), len(x)),
-        )
-        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(*fine[:2], x, y)
+        high, wide = np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])
+        row, column, _ = _spread(high, wide, len(y), len(x))
+        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(row, column, x, y)
 
     def _bordering(self, high: IntArray, wide: IntArray, x: Array, y: Array) -> Borders:
         """Return who is nearest, and how far the border is, at chosen rows and columns; inf for no border."""
@@ -185,8 +179,8 @@ class Field:
         first = distance.argmin(axis=1)
         others = np.where(owner == owner[each, first][:, None], np.inf, distance)
         second = others.argmin(axis=1)
-        (ux, uy), (vx, vy) = (self._heading(around[each, k], px, py) for k in (first, second))
-        apart = np.maximum(np.hypot(ux - vx, uy - vy), _SHALLOW)
+        u, v = (self._heading(around[each, k], px, py) for k in (first, second))
+        apart = np.maximum(np.hypot(*(u - v)), _SHALLOW)
         # between places that robots reach and such that none does, there is a wall
         with np.errstate(invalid="ignore"):
             gap = (others[each, second] - distance[each, first]) / apart
@@ -197,22 +191,19 @@ class Field:
         """Return what the rivals of (k,) places in numbered squares say, (k, r), inf behind a wall."""
         distance = self._distance(rivals.site[number], x[:, None], y[:, None])
         # the square's corner beside the place
-        right, upper = (
-            np.floor((places - start) / self.lattice.spacing - 0.5).astype(np.intp)
-            - np.floor((places - start) / self.lattice.spacing).astype(np.intp)
-            + 1
-            for places, start in ((x, self.lattice.origin[0]), (y, self.lattice.origin[1]))
-        )
+        cells = [
+            (at - low) / self.lattice.spacing for at, low in zip((x, y), self.lattice.origin, strict=True)
+        ]
+        right, upper = ((np.floor(at - 0.5) - np.floor(at)).astype(np.intp) + 1 for at in cells)
         return np.where(rivals.right[number, 2 * upper + right], distance, np.inf)
 
     def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
         dx, dy = x - self._way_x[site], y - self._way_y[site]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._start[site])
 
-    def _heading(self, site: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
-        dx, dy = x - self._way_x[site], y - self._way_y[site]
-        length = np.maximum(np.hypot(dx, dy), 1e-12)
-        return dx / length, dy / length
+    def _heading(self, site: IntArray, x: Array, y: Array) -> Array:
+        along = np.stack([x - self._way_x[site], y - self._way_y[site]])
+        return np.asarray(along / np.maximum(np.hypot(*along), 1e-12))
 
 
 class Fields:

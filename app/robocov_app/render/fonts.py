@@ -46,7 +46,6 @@ def _living(size: int, bold: bool) -> pygame.font.Font:
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    """Return the width of `text` in pixels, without drawing it."""
     return _living(size, bold).size(text)[0]
 
 

@@ -34,21 +34,15 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     view = canvas.surface.get_clip()
     corners = np.array([view.topleft, view.bottomright], dtype=float)
     row, column = raster.cells(canvas.camera.to_world(corners))
-    first, last = (int(row.min()), int(column.min())), (int(row.max()) + 1, int(column.max()) + 1)
-    state = np.minimum(known.state[first[0] : last[0], first[1] : last[1]], WALL)
-    outside = raster.outside[first[0] : last[0], first[1] : last[1]]
+    seen = slice(row.min(), row.max() + 1), slice(column.min(), column.max() + 1)
+    state, outside = np.minimum(known.state[seen], WALL), raster.outside[seen]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
-    theme = canvas.theme
-    for value, colour in (
-        (UNKNOWN, theme.obstacle),
-        (PRESUMED, theme.forces["repulsion_obstacle"]),
-        (WALL, theme.forces["repulsion_obstacle"]),
-    ):
-        pixels[(state == value) & ~outside] = premultiplied(colour, _OPACITY[value])
-    x, y = raster.origin
-    low = np.array([x + first[1] * raster.cell, y + first[0] * raster.cell])
-    high = np.array([x + last[1] * raster.cell, y + last[0] * raster.cell])
-    (left, bottom), (right, top) = canvas.camera.to_pixels(np.array([low, high])).round().astype(int).tolist()
+    for value, opacity in _OPACITY.items():
+        colour = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
+        pixels[(state == value) & ~outside] = premultiplied(colour, opacity)
+    ends = np.array([[column.min(), row.min()], [column.max() + 1, row.max() + 1]])
+    ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell)
+    (left, bottom), (right, top) = ends.round().astype(int).tolist()
     if right <= left or bottom <= top:
         return
     # the lowest row comes first, in a picture the highest
@@ -76,25 +70,21 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     """Draw what a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
     camera, colour = canvas.camera, canvas.theme.final
     scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
-    corners = bounded(np.concatenate([ends for _, ends in scans]))
-    low = np.floor(corners.min(axis=0)).astype(int) - 2
-    high = np.ceil(corners.max(axis=0)).astype(int) + 3
-    box = pygame.Rect(low.tolist(), (high - low).tolist()).clip(canvas.surface.get_clip())
-    if not box.width or not box.height:
+    box = sprites.visible_box(bounded(np.concatenate([ends for _, ends in scans])), 3.0, canvas.surface)
+    if box is None:
         return
-    large = pygame.Surface((box.width * _FINE, box.height * _FINE), pygame.SRCALPHA, 32)
+    sketch = sprites.Sketch(box, _FINE)
     # drawing replaces what is there: where scans overlap nothing gets darker
     corner = np.array(box.topleft) - 0.5
     fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
     outlines = [ring for _, ends in fine for ring in clipped_polygon(ends)]
     for ring in outlines:
-        pygame.draw.polygon(large, premultiplied(colour, 0.11), np.rint(ring).tolist())
+        pygame.draw.polygon(sketch.large, premultiplied(colour, 0.11), np.rint(ring).tolist())
     for place, ends in fine:
-        _draw_rays(large, place, ends, canvas)
+        _draw_rays(sketch.large, place, ends, canvas)
     for ring in outlines:
-        pygame.draw.lines(large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
-    picture = pygame.transform.smoothscale(large, box.size)
-    canvas.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        pygame.draw.lines(sketch.large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
+    sketch.onto(canvas.surface)
     _dots(canvas, np.concatenate([_hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
 
 
@@ -111,13 +101,12 @@ def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas)
     first = place + along[shown] * (begin[shown] / length[shown])[:, None]
     colour = premultiplied(canvas.theme.final, 0.3)
     width = max(1, round(0.5 * canvas.scale * _FINE))
-    for line in np.hstack([first, ends[shown]]).tolist():
-        if (seen := clipped_segment(*line)) is not None:
-            pygame.draw.line(large, colour, *seen, width)
+    for line in zip(first.tolist(), ends[shown].tolist(), strict=True):
+        if seen := clipped_segment(*line):
+            pygame.draw.line(large, colour, seen[0], seen[1], width)
 
 
 def _hits(place: Array, ends: Array) -> Array:
-    """Return the ends of the rays that met something: those shorter than the longest."""
     length = np.hypot(*(ends - place).T)
     return np.asarray(ends[length < length.max() * (1.0 - 1e-6)])
 
@@ -138,48 +127,33 @@ class SensedObstacles:
     """Sensed points, of the selected robot or of all, over a paler map; and its discovered map."""
 
     def __init__(self) -> None:
-        self._page: pygame.Surface | None = None
+        self._page = pygame.Surface((0, 0))
         self._key: object = None
         self._of: tuple[object, object] = (None, None)
-        self._drawn = 0
-        self._last: list[float] = []
+        self._drawn = np.empty((0, 2))
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the page of the pale truth and the points, and a discovered map over it."""
         assert scene.sensed is not None
         points, robots = scene.sensed.until(scene.now.time)
         asked = None if scene.selected is None else scene.number(scene.selected)
-        page, begin = self._page_for(canvas, scene, points, asked)
-        if begin < len(points):
-            fresh = points[begin:]
-            if asked is not None:
-                fresh = fresh[robots[begin:] == asked]
-            colour = canvas.theme.forces["repulsion_obstacle"]
-            _dots(replace(canvas, surface=page), canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
-            self._last = points[-1].tolist()
-        self._drawn = len(points)
-        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        known = discovered_map(scene)
-        if known is not None:
-            draw_discovered(canvas, known)
-
-    def _page_for(
-        self, canvas: Canvas, scene: Scene, points: Array, asked: int | None
-    ) -> tuple[pygame.Surface, int]:
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
         key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
         # objects rather than their ids, which others may get when these are gone
         known = self._of[0] is scene.environment and self._of[1] is scene.sensed
-        grown = self._drawn <= len(points) and (
-            self._drawn == 0 or points[self._drawn - 1].tolist() == self._last
-        )
-        if self._page is None or not (known and grown) or self._key != key:
-            self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
+        begin = len(self._drawn)
+        if not known or self._key != key or not np.array_equal(points[begin - 1 : begin], self._drawn[-1:]):
+            self._page, begin = pygame.Surface(size, pygame.SRCALPHA, 32), 0
             self._page.set_clip(clip)
             if "obstacles" in canvas.shown:
                 _draw_pale(replace(canvas, surface=self._page), scene)
-            self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), 0
-        return self._page, self._drawn
+        fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
+        page, colour = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
+        if begin < len(points):
+            _dots(page, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
+        self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), points
+        canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        if (discovered := discovered_map(scene)) is not None:
+            draw_discovered(canvas, discovered)
 
 
 def _draw_pale(canvas: Canvas, scene: Scene) -> None:
@@ -210,12 +184,10 @@ sensed_legend = says("known obstacles", _sensed_glyph)
 
 
 def draw_path(canvas: Canvas, scene: Scene) -> None:
-    """Draw the shortest path from the cursor to its nearest robot, with its length."""
     assert scene.path is not None
     if len(scene.path) < 2:
         return
-    corners = canvas.camera.to_pixels(scene.path)
-    theme = canvas.theme
+    corners, theme = canvas.camera.to_pixels(scene.path), canvas.theme
     # the light around it parts it from whatever it crosses
     canvas.outline(corners, theme.background, canvas.width(4.5), closed=False)
     canvas.outline(corners, theme.final, canvas.width(2.0), closed=False)

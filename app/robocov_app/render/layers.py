@@ -55,7 +55,6 @@ def _colours_mean_distance(canvas: Canvas, scene: Scene) -> bool:
 
 
 def draw_cells(canvas: Canvas, scene: Scene) -> None:
-    """Draw the Voronoi cells, in the tint of their robots."""
     assert scene.cells is not None
     sizes = np.array([len(cell) for cell in scene.cells])
     corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
@@ -86,8 +85,6 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
 
 
 def cells_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of Voronoi cells."""
-
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         fill = None if _colours_mean_distance(canvas, scene) else canvas.theme.cell(0)
         canvas.swatch(x, y, fill, canvas.theme.cell_edge)
@@ -96,7 +93,6 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def draw_grid(canvas: Canvas, scene: Scene) -> None:
-    """Draw lines at round distances of metres."""
     step = grid_step(canvas.camera.zoom, canvas.scale)
     region, seen = scene.environment.region, canvas.camera.visible()
     bounds = region.bounds
@@ -160,7 +156,6 @@ def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Colour, edge: Colour) -> None:
-    """Draw the path of a moving obstacle, its shape, and an arrow where it heads."""
     theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
     for part in shapely.get_parts(shapely.intersection(obstacle.polygon, scene.environment.region.polygon)):
         if not isinstance(part, shapely.Polygon):
@@ -177,8 +172,6 @@ def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Co
 
 
 def obstacles_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entries of static and of moving obstacles."""
-
     def static(canvas: Canvas, x: float, y: float) -> None:
         canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 

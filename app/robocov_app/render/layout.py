@@ -25,7 +25,7 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
         np.fill_diagonal(square, np.inf)
         return np.asarray(np.sqrt(square.min(axis=1)))
     distances: Array = np.asarray(KDTree(points).query(points[::step], k=2)[0])
-    return np.asarray(distances[:, 1])
+    return distances[:, 1]
 
 
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
@@ -87,9 +87,9 @@ def united(legends: Iterable[Sequence[T]], key: Callable[[T], Hashable]) -> list
         for entry in legend:
             name = key(entry)
             if name in keys:
-                place = keys.index(name) + 1
+                place = keys.index(name)
             else:
                 found.insert(place, entry)
                 keys.insert(place, name)
-                place += 1
+            place += 1
     return found

@@ -51,7 +51,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         _extra("obstacle_points", "Nearest obstacle", forces.draw_points, snapshot, forces.points_legend),
         _extra("goals", "Goals", marks.draw_goals, snapshot, marks.goals_legend),
         Layer("centroids", "Centroids", marks.draw_centroids, snapshot, marks.centroids_legend),
-        _extra("velocities", "Velocities", forces.draw_velocities, snapshot, forces.velocities_legend),
+        forces.velocity_layer(),
         forces.force_layer("attraction", "Attraction", "full"),
         forces.force_layer("repulsion_robots", "Robot repulsion", "open"),
         forces.force_layer("repulsion_obstacle", "Obstacle repulsion", "dot"),
@@ -81,9 +81,8 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
 def pane_layers(trails: str = "robots") -> list[Layer]:
     """Return the layers of one picture among several: a caption in place of the legend, which they share."""
     return [
-        *(layer for layer in standard_layers(trails) if layer.name not in ("legend", "status")),
+        *(layer for layer in standard_layers(trails) if layer.name != "legend"),
         _strip("caption", "Caption", annotations.draw_caption),
-        _strip("status", "Status line", annotations.draw_brief_status),
     ]
 
 
@@ -126,11 +125,9 @@ class Painter:
         self._room: tuple[object, int, float] = (None, 0, 0.0)
 
     def show(self, names: Iterable[str]) -> None:
-        """Show these layers and no others. Raises ParameterError when there is no layer of that name."""
-        known = {layer.name for layer in self.layers}
-        wanted = set(names)
-        for name in sorted(wanted - known):
-            raise ParameterError(unknown_name("layer", name, known))
+        wanted, known = set(names), {layer.name for layer in self.layers}
+        if unknown := wanted - known:
+            raise ParameterError(unknown_name("layer", min(unknown), known))
         self.visible = wanted
 
     def change(self, also: Iterable[str], without: Iterable[str]) -> None:
@@ -169,19 +166,16 @@ class Painter:
         return [entry.text for entry in self.legend_entries(scene)]
 
     def legend_entries(self, scene: Scene) -> list[LegendEntry]:
-        """Return the legend's entries for what is drawn of `scene`."""
         return [entry for layer in self._shown() if layer.has(scene) for entry in layer.legend(scene)]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
-        """Draw `scene` on the whole of `surface`, which has this painter's size."""
         if surface.get_size() != self.size:
             self.resize(surface.get_size(), self.scale)
         self._hues = _hues(scene, self._hues)
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
-        names = {layer.name for layer in self._shown()}
-        rows = int("caption" in names)
-        if not rows and "legend" in names:
+        rows = int("caption" in shown)
+        if not rows and any(layer.name == "legend" for layer in self._shown()):
             rows = len(annotations.legend_rows(canvas, entries))
         self._place_view(*self._steady(rows, heatmaps.bar_room(canvas, scene)))
         canvas = replace(canvas, camera=self.camera)
@@ -212,9 +206,7 @@ class Painter:
     def _place_view(self, rows: int, beside: float = 0.0) -> None:
         """Give the world what the strips above and below, and `beside` pixels at the right, leave."""
         width, height = self.size
-        top = MARGIN * self.scale
-        if rows:
-            top = (6 + LEGEND_ROW * rows + 6) * self.scale
+        top = (6 + LEGEND_ROW * rows + 6 if rows else MARGIN) * self.scale
         small = annotations.is_small(height, self.scale, self.visible)
         below = bool({"scale_bar", "status"} & self.visible) and not small
         bottom = (STRIP if below else MARGIN) * self.scale

@@ -9,7 +9,8 @@ from robocov.arrays import Array, IntArray
 from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
 from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
-from robocov_app.render.sprites import Sketch
+from robocov_app.render.sprites import Sketch, visible_box
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
@@ -32,10 +33,9 @@ class Trajectories:
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
         self._ended: list[tuple[int, list[list[float]]]] = []
-        self._colours: tuple[object, list[Colour]] | None = None
+        self._trail_colours = Latest[list[Colour]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw old sections from the page, and what is new over it."""
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
@@ -74,7 +74,6 @@ class Trajectories:
                 last[far] = row[far]
 
     def _come_and_go(self, row: Array, last: Array) -> None:
-        """Begin the paths of robots that were not there before, and end those of robots that go."""
         changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
         for robot in np.nonzero(changed)[0].tolist():
             self._ended.append((robot, self._open[robot]))
@@ -85,29 +84,20 @@ class Trajectories:
         self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
     ) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
-        whole = self._sketch_of_all(page) if together else None
         corners = 2 if together else 1 + SECTION / PIECE
-        long = [(robot, path) for robot, path in enumerate(self._open) if len(path) >= corners]
-        for robot, path in [*self._ended, *long]:
-            if len(path) < 2:
-                continue
-            sketch = whole if whole is not None else Sketch.around(path, width)
-            if sketch is not None:
-                sketch.path(path, colours[robot], width)
-                if sketch is not whole:
-                    sketch.onto(page)
-            if path is self._open[robot]:
-                self._open[robot] = path[-1:]
+        done = [(robot, path) for robot, path in self._ended if len(path) > 1]
         self._ended.clear()
-        if whole is not None:
-            whole.onto(page)
-
-    def _sketch_of_all(self, page: pygame.Surface) -> Sketch | None:
-        """Return a sketch that holds all of the paths that can be seen, None when nothing moved."""
-        paths = [*self._open, *(path for _, path in self._ended)]
-        moved = [np.array(path) for path in paths if len(path) > 1]
-        box = _box_of(np.concatenate(moved), 5.0, page) if moved else None
-        return Sketch(box) if box is not None else None
+        for robot, path in enumerate(self._open):
+            if len(path) >= corners:
+                done.append((robot, path))
+                self._open[robot] = path[-1:]
+        for group in [done] * bool(done) if together else [[each] for each in done]:
+            box = visible_box(np.concatenate([path for _, path in group]), 5.0 + width, page)
+            if box is not None:
+                sketch = Sketch(box)
+                for robot, path in group:
+                    sketch.path(path, colours[robot], width)
+                sketch.onto(page)
 
     def _page_for(
         self, canvas: Canvas, scene: Scene, trail: Array, colours: list[Colour], width: float
@@ -147,14 +137,10 @@ class Trajectories:
             return [theme.trajectory] * n
         if n > ONE_HUE_EACH:
             return [mix(theme.trajectory, theme.background, 0.25)] * n
-        key = theme.name, tuple(canvas.hues.tolist())
-        if self._colours is None or self._colours[0] != key:
-            self._colours = key, [theme.trail(hue) for hue in canvas.hues.tolist()]
-        return self._colours[1]
+        hues = canvas.hues.tolist()
+        return self._trail_colours.of(None, (theme.name, hues), lambda: [theme.trail(hue) for hue in hues])
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
-        """Return the entry of trajectories."""
-
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             angle = np.linspace(-np.pi, np.pi, 24)
             wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
@@ -176,10 +162,9 @@ def _fade_onto(
     colours: list[Colour],
     width: float,
 ) -> None:
-    """Draw the last seconds, ever more transparent into the past."""
     begin = int(np.searchsorted(time, time[-1] - fade))
     points = bounded(canvas.camera.to_pixels(trail[begin:]))
-    box = _box_of(points, 5.0 + width, page)
+    box = visible_box(points, 5.0 + width, page)
     if box is None:
         return
     shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
@@ -187,7 +172,7 @@ def _fade_onto(
     rows = _corners(points, shade, FADE_PIECE * canvas.scale)
     points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
     shade = shade[rows]
-    large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
+    sketch = Sketch(box, _FADE_FINE)
     wide = max(1, round(width * _FADE_FINE))
     pens = np.full((len(colours), 2), np.nan)
     edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
@@ -205,21 +190,9 @@ def _fade_onto(
             if pen[robot][0] == pen[robot][0]:  # not nan
                 lines[robot][0] = pen[robot]
             for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
-                _stroke(large, run, colour, wide)
+                _stroke(sketch.large, run, colour, wide)
         pens[moves] = paths[-1, moves]
-    picture = pygame.transform.smoothscale(large, box.size)
-    page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-
-
-def _box_of(points: Array, margin: float, page: pygame.Surface) -> pygame.Rect | None:
-    """Return what of the surroundings of (..., 2) px points can be seen on a page; None for nothing."""
-    flat = points.reshape(-1, 2)
-    flat = flat[np.isfinite(flat[:, 0])]
-    if not len(flat):
-        return None
-    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
-    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(page.get_clip())
-    return box if box.width and box.height else None
+    sketch.onto(page)
 
 
 def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
@@ -227,21 +200,16 @@ def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
     gone = np.isnan(points[..., 0])
     steps = np.hypot(*np.moveaxis(np.diff(points, axis=0), -1, 0))
     way = np.floor(np.cumsum(np.where(np.isnan(steps), 0.0, steps).max(axis=1)) / piece)
-    needed = np.zeros(len(points), dtype=bool)
-    needed[0] = needed[-1] = True
-    needed[1:] |= np.diff(way, prepend=0.0) > 0
-    needed[1:] |= np.diff(shade) != 0
     changes = (gone[1:] != gone[:-1]).any(axis=1)
-    needed[1:] |= changes
+    needed = np.append(True, (np.diff(way, prepend=0.0) > 0) | (np.diff(shade) != 0) | changes)
     needed[:-1] |= changes
+    needed[-1] = True
     return np.flatnonzero(needed)
 
 
 def _runs(path: Array) -> list[list[list[float]]]:
-    there = np.isfinite(path[:, 0])
-    if there.all():
-        return [path.tolist()]
-    pieces = np.split(path, np.flatnonzero(np.diff(there)) + 1)
+    """Return the pieces of (k, 2) between those where the robot is not there."""
+    pieces = np.split(path, np.flatnonzero(np.diff(np.isfinite(path[:, 0]))) + 1)
     return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]
 
 
