@@ -9,22 +9,21 @@ clipboard, and sends whole pictures as JPEG: all that is here would have come on
 from __future__ import annotations
 
 import asyncio
-import hmac
 import json
 import os
 import secrets
 import threading
 from collections import deque
+from dataclasses import dataclass, field
 from hashlib import sha256
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from importlib.resources import files
 from io import BytesIO
 from itertools import count, islice
 from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, quote, unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -37,6 +36,7 @@ from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
+from robocov_app.web.access import cookies_of, link_to, same, token_in
 from robocov_app.web.events import (
     MOST_PIXELS,
     Control,
@@ -61,25 +61,9 @@ if TYPE_CHECKING:
 
 LONGEST = 1 << 17  # letters of a message that comes in
 LARGEST_UPLOAD = 1 << 24  # bytes of a file
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff", ".pgm")
-MAPS = (
-    *(
-        ".json",
-        ".geojson",
-        ".wkt",
-        ".svg",
-        ".dxf",
-        ".yaml",
-        ".yml",
-        ".tmx",
-        ".osm",
-        ".map",
-        ".scen",
-        ".world",
-    ),
-    *(".argos", ".xml"),
-)
-UPLOADS = frozenset((".robocov", *PICTURES, *MAPS))
+_PICTURES = "png jpg jpeg bmp gif webp tif tiff pgm"
+_MAPS = "json geojson wkt svg dxf yaml yml tmx osm map scen world argos xml"
+UPLOADS = frozenset(f".{suffix}" for suffix in f"robocov {_PICTURES} {_MAPS}".split())
 _OFFERED = UPLOADS | {".mp4", ".csv", ".html", ".pdf", ".zip"}  # what is saved is offered for download
 _MOST_COPIED = 100_000
 MOST_EVENTS = 400.0  # messages a second that are taken from one page; what is more waits in the line
@@ -102,20 +86,20 @@ _CURSORS = {
 }
 
 
+@dataclass(eq=False)
 class Page:
     """A browser that shows the window."""
 
-    def __init__(self, line: ServerConnection, number: int, teacher: bool) -> None:
-        self.line = line
-        self.number = number
-        self.teacher = teacher  # may take control at any time
-        self.name = f"{'Teacher' if teacher else 'Viewer'} {number}"
-        self.asks = False  # for control
-        self.shown: Picture | None = None  # the picture that it has, or will have
-        self.sent: deque[int] = deque()  # numbers of pictures on their way
-        self.told: dict[str, Any] = {}
-        self.size: PageChanged | None = None
-        self.changed = asyncio.Event()
+    line: ServerConnection
+    number: int
+    teacher: bool  # may take control at any time
+    name: str
+    asks: bool = False  # for control
+    shown: Picture | None = None  # the picture that it has, or will have
+    sent: deque[int] = field(default_factory=deque)  # numbers of pictures on their way
+    told: dict[str, Any] = field(default_factory=dict)
+    size: PageChanged | None = None
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class WebDisplay:
@@ -145,16 +129,15 @@ class WebDisplay:
         self._told: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
         self._pages: list[Page] = []
         self._encoded: dict[tuple[int, int], bytes] = {}
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop
         self._ended = asyncio.Event()
-        self._thread = threading.Thread(target=self._serve, name="web", daemon=True)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="web", daemon=True)
         self._begun, self._called = threading.Event(), threading.Event()
         self._trouble: OSError | None = None
 
     # the window's side
 
     def __enter__(self) -> WebDisplay:
-        """Listen; InputError where that cannot be."""
         self._thread.start()
         self._begun.wait()
         if self._trouble is not None:
@@ -163,27 +146,20 @@ class WebDisplay:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let all pages go."""
         self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join(5.0)
 
     @property
     def link(self) -> str:
         """The address of who controls."""
-        return f"{self._address}?token={self.token}"
+        return link_to(self.host, self.port, self.token)
 
     @property
     def watch_link(self) -> str:
         """The address of those who watch."""
-        return f"{self._address}?token={self.watch_token}"
-
-    @property
-    def _address(self) -> str:
-        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
+        return link_to(self.host, self.port, self.watch_token)
 
     def wait(self, seconds: float) -> None:
-        """Wait until something comes in, and so many seconds at most."""
         if self._called.wait(max(seconds, 0.001)):  # other threads get their turn in any case
             self._called.clear()
 
@@ -212,7 +188,6 @@ class WebDisplay:
                 posted = True
 
     def send(self, surface: pygame.Surface) -> None:
-        """Show a picture where it is another than the last one."""
         before = self._picture
         picture = Picture.of(surface, 1 if before is None else before.number + 1)
         title = next(iter(pygame.display.get_caption()), "robocov")
@@ -231,41 +206,25 @@ class WebDisplay:
         for page in self._pages:
             page.changed.set()
 
-    def _serve(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._loop.run_until_complete(self._listen())
-        finally:
-            self._begun.set()
-            self._loop.close()
-
-    async def _listen(self) -> None:
+    async def _serve(self) -> None:
         from websockets.asyncio.server import serve
 
+        self._loop = asyncio.get_running_loop()
+        how: dict[str, Any] = {"process_request": self._answer, "compression": None, "server_header": None}
+        how |= {"max_size": LARGEST_UPLOAD, "max_queue": 16, "write_limit": 1 << 16}
         try:
-            server = await serve(
-                self._talk,
-                self.host,
-                self.port,
-                process_request=self._answer,
-                compression=None,
-                max_size=LARGEST_UPLOAD,
-                max_queue=16,
-                write_limit=1 << 16,
-                server_header=None,
-            )
+            async with serve(self._talk, self.host, self.port, **how) as server:
+                self.port = server.sockets[0].getsockname()[1]
+                self._begun.set()
+                await self._ended.wait()
         except OSError as error:
             self._trouble = error
-            return
-        async with server:
-            self.port = server.sockets[0].getsockname()[1]
+        finally:
             self._begun.set()
-            await self._ended.wait()
 
     async def _answer(self, line: ServerConnection, request: Request) -> Response | None:
         """Answer a request for the page; None lets a socket be opened."""
         place = urlsplit(request.path)
-        given = (parse_qs(place.query).get("token") or [""])[0]
         if not self._known(self._secret(request)):
             return line.respond(
                 HTTPStatus.FORBIDDEN, "This needs the whole link that robocov printed, with its token.\n"
@@ -281,56 +240,46 @@ class WebDisplay:
             return await asyncio.to_thread(self._download, line, unquote(name))
         if not place.path.endswith("/"):
             return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
-        return self._page(line, given)
+        return self._page(line, token_in(request.path))
 
     def _page(self, line: ServerConnection, given: str) -> Response:
         nonce = secrets.token_urlsafe(12)
         page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
-        answer = line.respond(HTTPStatus.OK, page)
-        headers = answer.headers
-        del headers["Content-Type"]
-        headers["Content-Type"] = "text/html; charset=utf-8"
         framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
-        headers["Content-Security-Policy"] = (
+        policy = (
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
-            "connect-src 'self'; base-uri 'none'; form-action 'none'; "
-            f"frame-ancestors {framed}"
+            f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        headers["Referrer-Policy"] = "no-referrer"
-        headers["X-Content-Type-Options"] = "nosniff"
-        headers["Cache-Control"] = "no-store"
+        headers = {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer"}
+        headers |= {"Cache-Control": "no-store"}
         if self._known(given):  # of no path: it is that of the page, also behind a proxy
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
-        return answer
+        return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
 
     def _download(self, line: ServerConnection, name: str) -> Response:
         """Answer with a file that was saved, or with a folder as a zip."""
-        answer, path = line.respond(HTTPStatus.OK, ""), self.folder / name
+        path = self.folder / name
         try:
-            answer.body = zipped(path) if path.is_dir() else path.read_bytes()
+            body = zipped(path) if path.is_dir() else path.read_bytes()
         except OSError:
             return line.respond(HTTPStatus.NOT_FOUND, "It is not there any more.\n")
         name += ".zip" * path.is_dir()
-        for header in ("Content-Type", "Content-Length"):
-            del answer.headers[header]
-        answer.headers["Content-Type"] = "application/octet-stream"
-        answer.headers["Content-Length"] = str(len(answer.body))
-        answer.headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name)}"
-        answer.headers["X-Content-Type-Options"] = "nosniff"
-        return answer
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
+        return _answer(line, body, "application/octet-stream", headers)
 
     def _secret(self, request: Request) -> str:
         """Return the token that came with a request: in its address, else as a cookie."""
-        given = (parse_qs(urlsplit(request.path).query).get("token") or [""])[0]
-        return given or _cookie(request, self._cookie)
+        cookies = cookies_of(request.headers.get_all("Cookie"))
+        return token_in(request.path) or cookies.get(self._cookie, "")
 
     def _known(self, token: str) -> bool:
-        return _same(token, self.token) or _same(token, self.watch_token)
+        return same(token, self.token) or same(token, self.watch_token)
 
     async def _talk(self, line: ServerConnection) -> None:
         """Show a page the window for as long as it is there, and take what it tells."""
         assert line.request is not None
-        page = Page(line, next(self._numbers), _same(self._secret(line.request), self.token))
+        number, teacher = next(self._numbers), same(self._secret(line.request), self.token)
+        page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}")
         self._pages.append(page)
         self._give_control(self._control)
         sender = asyncio.ensure_future(self._send_all(page))
@@ -380,10 +329,8 @@ class WebDisplay:
 
     def _take(self, page: Page, message: Message) -> None:
         if isinstance(message, PictureShown):
-            while page.sent and page.sent[0] != message.number:
-                page.sent.popleft()
-            if page.sent:
-                page.sent.popleft()
+            while page.sent and page.sent.popleft() != message.number:
+                pass
             page.changed.set()
         elif isinstance(message, Control):
             self._hand_over(page, message.to)
@@ -467,13 +414,14 @@ class WebDisplay:
         return found
 
 
-def _cookie(request: Request, name: str) -> str:
-    """Return a cookie that came with a request."""
-    try:
-        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
-    except CookieError:
-        return ""
-    return cookies[name].value if name in cookies else ""
+def _answer(line: ServerConnection, body: bytes, kind: str, headers: dict[str, str]) -> Response:
+    answer = line.respond(HTTPStatus.OK, "")
+    answer.body = body
+    for name in ("Content-Type", "Content-Length"):
+        del answer.headers[name]
+    answer.headers.update({"Content-Type": kind, "Content-Length": str(len(body)), **headers})
+    answer.headers["X-Content-Type-Options"] = "nosniff"
+    return answer
 
 
 def _own_origin(request: Request) -> bool:
@@ -481,10 +429,6 @@ def _own_origin(request: Request) -> bool:
     origins = request.headers.get_all("Origin")
     hosts = request.headers.get_all("Host") + request.headers.get_all("X-Forwarded-Host")
     return all(urlsplit(origin).netloc in hosts for origin in origins) and len(origins) < 2
-
-
-def _same(token: str, other: str) -> bool:
-    return hmac.compare_digest(token.encode(errors="replace"), other.encode())
 
 
 def saved_since(folder: Path, since: float) -> tuple[str, ...]:
