@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED
-from robocov_app.terminal.output import BOLD, RIGHT, finite, listed, print_table
+from robocov_app.terminal.output import BOLD, RIGHT, listed, print_table, tell
 
 if TYPE_CHECKING:
     from robocov.environment import Environment
@@ -33,7 +32,6 @@ class Arguments(RunOptions):
 
 
 def command(options: Arguments) -> int:
-    """Run every controller, then draw them together."""
     from robocov.mapfile import load_map
     from robocov_app.runs.artifacts import gains_for, performed, rows_of
     from robocov_app.runs.saved import folder_names
@@ -53,36 +51,27 @@ def command(options: Arguments) -> int:
         dict(zip(folder_names(names), specs, strict=True)), out, options, comparison=True
     )
     rows = rows_of(runs)
-    if options.json:
-        print(json.dumps(finite({"out": str(out), "interrupted": stopped, "runs": rows})))
-    else:
+    if not options.json:
         print_rows(rows, next(iter(runs.values())).record.environment)
-        done = "stopped; what was done is in" if stopped else "saved in"
-        print(f"{done} {out}/: {listed(out)}{options.record_words}")
+    done = "stopped; what was done is in" if stopped else "saved in"
+    answer = {"out": str(out), "interrupted": stopped, "runs": rows}
+    tell(options, answer, f"{done} {out}/: {listed(out)}{options.record_words}")
     return INTERRUPTED if stopped else 0
 
 
 def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
-    """Print the comparison for people."""
     from robocov_app.render.density import density_lines
 
-    timed = all("mean_time_s" in row for row in rows)
-    titles = ["mean distance", *(["mean time"] if timed else []), "above best"]
-    titles += ["cost", "settled", "contacts", "clearance", "path"]
-    cells = (
-        (
-            row["label"],
-            f"{row['mean_distance_m']:.3f} m",
-            *([f"{row['mean_time_s']:.3f} s"] if timed else []),
-            f"{row['above_best']:.1%}",
-            f"{row['cost_m3']:.2f} m³",
-            "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s",
-            str(row["contacts"]),
-            f"{row['min_clearance_m']:.3f} m",
-            f"{row['mean_path_length_m']:.2f} m",
-        )
-        for row in rows
-    )
-    print_table([("", BOLD), *((title, RIGHT) for title in titles)], cells)
+    columns = {"": "{label}", "mean distance": "{mean_distance_m:.3f} m", "mean time": "{mean_time_s:.3f} s"}
+    columns |= {"above best": "{above_best:.1%}", "cost": "{cost_m3:.2f} m³", "settled": "{settled}"}
+    columns |= {"contacts": "{contacts}", "clearance": "{min_clearance_m:.3f} m"}
+    columns |= {"path": "{mean_path_length_m:.2f} m"}
+    if not all("mean_time_s" in row for row in rows):
+        del columns["mean time"]
+    cells = []
+    for row in rows:
+        settled = "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s"
+        cells.append([text.format(**row, settled=settled) for text in columns.values()])
+    print_table([(title, RIGHT if title else BOLD) for title in columns], cells)
     for line in density_lines(environment):
         print(line)

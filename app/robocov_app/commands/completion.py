@@ -51,7 +51,6 @@ class Arguments:
 
 
 def command(options: Arguments) -> None:
-    """Print the script."""
     kinds = {
         name: import_module(f"robocov_app.commands.{module}").Arguments
         for name, (module, _) in COMMANDS.items()
@@ -89,7 +88,6 @@ def _case(name: str, words: list[str]) -> str:
 
 
 def _positionals(kind: Any) -> Iterator[str]:
-    """Yield the names of positional arguments."""
     for name, hint in get_type_hints(kind, include_extras=True).items():
         if tyro.conf.Positional in getattr(hint, "__metadata__", ()):
             yield name

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,6 @@ class Arguments:
 
 
 def command(options: Arguments) -> None:
-    """Build the pages where they are missing or old, and open or name them."""
     if options.out is not None:
         built(options.out)
         print(f"saved in {options.out}/: begin with index.html")
@@ -77,14 +77,18 @@ def built(folder: Path) -> None:
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
-    _require_sphinx()
+    if missing := [name for name in ("sphinx", "furo", "myst_parser") if find_spec(name) is None]:
+        raise RobocovError(
+            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
+            f"the pages can be read as text, too: {sources() / 'index.md'}"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as work:
             # a copy: the reference is written beside the other pages, and packages may be read-only
             copy, pages = Path(work, "sources"), Path(work, "pages")
             shutil.copytree(sources(), copy, ignore=shutil.ignore_patterns("reference", "__pycache__"))
-            call = [*(sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html")]
+            call = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
             call += ["-d", str(Path(work, "doctrees")), str(copy), str(pages)]
             done = subprocess.run(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             if done.returncode:
@@ -92,13 +96,3 @@ def built(folder: Path) -> None:
             pages.replace(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
-
-
-def _require_sphinx() -> None:
-    from importlib.util import find_spec
-
-    if missing := [name for name in ("sphinx", "furo", "myst_parser") if find_spec(name) is None]:
-        raise RobocovError(
-            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
-            f"the pages can be read as text, too: {sources() / 'index.md'}"
-        )

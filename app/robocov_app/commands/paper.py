@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ import tyro
 from robocov.errors import InputError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, finite, print_table
+from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
@@ -67,7 +66,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
-    """Run the study and write all that comes of it."""
     from robocov_app.replication import beyond_claims, claims, pages, results
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
@@ -106,36 +104,24 @@ def command(options: Arguments) -> int:
             page = pages.paper_page(plan, images, runs, first, paper, found, more)
             pages.save(out / pages.PAGE, page)
         except Interrupted:
-            if quiet:
-                print(json.dumps({"out": str(out), "interrupted": True}))
-            else:
-                again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
-                print(f"stopped; to go on: robocov paper {again}")
+            again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
+            tell(options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}")
             return INTERRUPTED
-    failed = sum(part.failed for part in (paper, beyond) if part)
-    if options.json:
-        answer = {
-            "out": str(out),
-            "plan": plan.name,
-            "interrupted": False,
-            "runs": (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0),
-            "failed": failed,
-            "page": str(out / "index.html"),
-            "claims": [claim.to_json() for claim in (*found, *more)],
-        }
-        print(json.dumps(finite(answer)))
-        return int(failed > 0)
-    if found or more:
-        print_claims((*found, *more))
-    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(found or more)]
-    print(f"saved in {out}/: {', '.join(written)}, figures/, studies/")
+    failed, verdicts = sum(part.failed for part in (paper, beyond) if part), (*found, *more)
+    if verdicts and not quiet:
+        print_claims(verdicts)
+    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(verdicts)]
+    lines = [f"saved in {out}/: {', '.join(written)}, figures/, studies/"]
     if failed:
-        print(f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why")
+        lines += [f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why"]
+    answer = {"out": str(out), "plan": plan.name, "interrupted": False}
+    answer["runs"] = (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0)
+    answer |= {"failed": failed, "page": str(out / "index.html")}
+    tell(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
     return int(failed > 0)
 
 
 def print_claims(claims: Sequence[Claim]) -> None:
-    """Print the verdicts for people."""
     fold, rows = {"overflow": "fold"}, []
     for claim in claims:
         measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"

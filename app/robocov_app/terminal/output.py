@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+def tell(options: Any, answer: Any, *lines: str, indent: int | None = None) -> None:
+    """Print an answer: with --json as one JSON object, with null for what is not finite; else as lines."""
+    if options.json:
+        print(json.dumps(finite(answer), indent=indent))  # noqa: T201 - it is the answer
+    else:
+        print(*lines, sep="\n", end="\n" if lines else "")  # noqa: T201
+
+
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
     """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
     stem = stem.rstrip("0123456789").rstrip("-") or stem
@@ -26,12 +34,14 @@ def free_name(folder: Path, stem: str, suffix: str) -> Path:
     return folder / f"{stem}-{k}{suffix}"
 
 
-def require_fresh(path: Path, other: str, *, overwrite: bool, source: Path | None = None) -> None:
+def require_fresh(
+    path: Path, other: str, *, overwrite: bool, source: Path | None = None, read: str = "file"
+) -> None:
     """Raise InputError where `path` may not be written: it is the source, or there is a file already."""
     if not writable(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
-        raise InputError(f"{path}: the file that is read; {other} was wanted")
+        raise InputError(f"{path}: the {read} that is read; {other} was wanted")
     if not overwrite:
         raise InputError(f"{path}: exists already; {other}, or --overwrite, was wanted")
 
@@ -48,7 +58,6 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def json_text(content: Any) -> str:
-    """Return what `write_json` writes."""
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
@@ -59,8 +68,7 @@ def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None
 
 
 def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
-    """Return what `write_csv` writes."""
-    lines = [header, *(",".join(str(cell) for cell in row) for row in rows)]
+    lines = [header, *(",".join(map(str, row)) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
