@@ -59,29 +59,14 @@ _RUN_CSS = """
 """
 
 
-def plot_environment(
-    environment: Environment,
-    axes: Axes | None = None,
-    *,
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-) -> Axes:
+def plot_environment(environment: Environment, axes: Axes | None = None, **options: Any) -> Axes:
     """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
-    return _plotted("plot_environment", environment, axes, theme, size)
+    return _plotted("plot_environment", environment, axes, options)
 
 
-def plot_record(
-    record: Record,
-    axes: Axes | None = None,
-    *,
-    theme: Theme | str = LIGHT,
-    colours: str = "paper",
-    size: tuple[int, int] | None = None,
-    mean_distance: float | None = None,
-    mean_time: float | None = None,
-) -> Axes:
+def plot_record(record: Record, axes: Axes | None = None, **options: Any) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
-    return _plotted("plot_trajectories", record, axes, theme, colours, size, mean_distance, mean_time)
+    return _plotted("plot_trajectories", record, axes, options)
 
 
 def plot_history(
@@ -90,13 +75,11 @@ def plot_history(
     *,
     label: str = "at the end",
     controller: str = "",
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
+    **options: Any,
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
     curve = (label, controller, history.time, history.mean_distance)
-    return _plotted("plot_cost", [curve], axes, theme, size, title)
+    return _plotted("plot_cost", [curve], axes, options)
 
 
 def plot_result(
@@ -217,9 +200,9 @@ def _checked(axes: Any) -> Any:
     return axes
 
 
-def _plotted(function: str, thing: Any, axes: Axes | None, *look: Any) -> Axes:
+def _plotted(function: str, thing: Any, axes: Axes | None, options: dict[str, Any]) -> Axes:
     """Return the axes on which a function of `robocov_app.figures.runs` has drawn: the given ones, or new."""
     from robocov_app.figures import runs
 
-    figure: Figure = getattr(runs, function)(thing, _checked(axes), *look)
+    figure: Figure = getattr(runs, function)(thing, _checked(axes), **options)
     return figure.axes[-1] if axes is None else axes

@@ -134,11 +134,7 @@ def goals(row: Row) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """Return a time in the unit that suits it, nothing for none.
-
-    >>> duration(0.00031), duration(0.012), duration(2.5)
-    ('310 µs', '12.0 ms', '2.50 s')
-    """
+    """Return a time in the unit that suits it, nothing for none."""
     if seconds is None:
         return ""
     if seconds < 1e-3:

@@ -37,17 +37,22 @@ def command(options: Arguments) -> None:
         return
     import webbrowser
 
+    import robocov
     from robocov.files.array_files import ArrayCache
 
     cache = ArrayCache.of_user()
     home = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
-    pages = home / state_of_sources()
-    if not (pages / "index.html").is_file():
+    # another folder when a page or a module of the program has changed
+    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
+    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
+    written = [file for file in files if sources() / "reference" not in file.parents]
+    pages = home / ArrayCache.key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
+    index = pages / "index.html"
+    if not index.is_file():
         if cache is not None:
             shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
         print("building the handbook, once ...", file=sys.stderr)
         built(pages)
-    index = pages / "index.html"
     print(index)
     webbrowser.open(index.as_uri())
 
@@ -56,18 +61,6 @@ def sources() -> Path:
     """Return the folder of the handbook's sources: in the package, else in the checkout."""
     app = Path(__file__).resolve().parents[1]
     return next(each for each in (app / "handbook", app.parent / "handbook") if each.is_dir())
-
-
-def state_of_sources() -> str:
-    """Return a name that changes when a page or a module of the program does."""
-    import robocov
-    from robocov.files.array_files import ArrayCache
-
-    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
-    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
-    generated = sources() / "reference"
-    stats = (f"{file} {file.stat().st_mtime_ns}" for file in files if generated not in file.parents)
-    return ArrayCache.key(*stats)
 
 
 def built(folder: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +16,7 @@ from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
-    from robocov_app.replication.results import Forecast, RunnerOptions
+    from robocov_app.replication.results import Forecast
 
 _MOST_WORKERS = 1024
 
@@ -80,12 +79,12 @@ def command(options: Arguments) -> int:
     more: tuple[Claim, ...] = ()
     paper = beyond = None
     with Interruption() as stop:
-        runner = RunnerOptions(
-            options.workers or processors(), options.scheduler, quiet, stop, options.keep_versions
-        )
+        workers, scheduler = options.workers or processors(), options.scheduler
+        runner = RunnerOptions(workers, scheduler, quiet, stop, options.keep_versions)
         if not quiet:
-            expected = forecast(out, plan, runner.workers, claims=with_claims, beyond=with_beyond)
-            _announce(expected, plan.name, runner)
+            expected = forecast(out, plan, workers, claims=with_claims, beyond=with_beyond)
+            words = _forecast_words(expected, workers, scheduler)
+            print(f"paper ({plan.name}): {words}", file=sys.stderr, flush=True)
         try:
             if with_claims:
                 paper = results.run_paper(out, plan, runner)
@@ -109,7 +108,11 @@ def command(options: Arguments) -> int:
             return INTERRUPTED
     failed, verdicts = sum(part.failed for part in (paper, beyond) if part), (*found, *more)
     if verdicts and not quiet:
-        print_claims(verdicts)
+        fold, rows = {"overflow": "fold"}, []
+        for claim in verdicts:
+            measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
+            rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
+        print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
     written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(verdicts)]
     lines = [f"saved in {out}/: {', '.join(written)}, figures/, studies/"]
     if failed:
@@ -121,26 +124,15 @@ def command(options: Arguments) -> int:
     return int(failed > 0)
 
 
-def print_claims(claims: Sequence[Claim]) -> None:
-    fold, rows = {"overflow": "fold"}, []
-    for claim in claims:
-        measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
-        rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
-    print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
-
-
-def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
+def _forecast_words(forecast: Forecast, workers: int, scheduler: str | None) -> str:
     from robocov_app.sweep.sweeping import duration
 
     if forecast.left == 0:
-        words = f"all {forecast.runs:,} runs are there"
-    else:
-        done = forecast.runs - forecast.left
-        there = f", {done:,} of them there already" if done else ""
-        each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
-        if runner.scheduler:
-            long = f"about {duration(forecast.seconds * runner.workers)} of computing, on a Dask cluster"
-        else:
-            long = f"about {duration(forecast.seconds)} on {runner.workers} processes"
-        words = f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"
-    print(f"paper ({name}): {words}", file=sys.stderr, flush=True)
+        return f"all {forecast.runs:,} runs are there"
+    done = forecast.runs - forecast.left
+    there = f", {done:,} of them there already" if done else ""
+    each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
+    long = f"about {duration(forecast.seconds)} on {workers} processes"
+    if scheduler:
+        long = f"about {duration(forecast.seconds * workers)} of computing, on a Dask cluster"
+    return f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"

@@ -121,6 +121,5 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):
-        raise InputError(
-            f"{target}: the file is no report of robocov; another --out, or --overwrite, was wanted"
-        )
+        wanted = "another --out, or --overwrite, was wanted"
+        raise InputError(f"{target}: the file is no report of robocov; {wanted}")

@@ -69,22 +69,14 @@ class Camera:
 
 
 def round_length(at_most: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`.
-
-    >>> [round_length(x) for x in (0.7, 1.0, 3.9, 49.0)]
-    [0.5, 1.0, 2.0, 20.0]
-    """
+    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`."""
     power = float(10.0 ** np.floor(np.log10(at_most) + 1e-12))
     step = max(s for s in (1.0, 2.0, 5.0) if s * power <= at_most * (1 + 1e-9))
     return float(f"{step * power:.12g}")
 
 
 def length_label(metres: float) -> str:
-    """Return a length as people write it.
-
-    >>> [length_label(x) for x in (0.05, 0.5, 2.0, 5000.0)]
-    ['5 cm', '0.5 m', '2 m', '5 km']
-    """
+    """Return a length as people write it."""
     if metres >= 1000:
         return f"{metres / 1000:g} km"
     return f"{metres * 100:g} cm" if metres < 0.1 else f"{metres:g} m"

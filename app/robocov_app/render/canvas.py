@@ -26,11 +26,7 @@ def bounded(points: Array) -> Array:
 
 
 def clipped_polygon(corners: Array) -> list[Array]:
-    """Return the rings of what of the (k, 2) px polygon lies within `FAR`: mostly the one given.
-
-    >>> len(clipped_polygon(np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])))
-    1
-    """
+    """Return the rings of what of the (k, 2) px polygon lies within `FAR`: mostly the one given."""
     if len(corners) < 3:
         return []
     if np.abs(corners).max() <= FAR:
@@ -41,11 +37,7 @@ def clipped_polygon(corners: Array) -> list[Array]:
 
 
 def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
-    """Return the ends of what of a segment lies within `FAR`, none when nothing does.
-
-    >>> clipped_segment((0.0, 0.0), (40000.0, 20000.0)), clipped_segment((0.0, 30000.0), (9.0, 30000.0))
-    ([[0.0, 0.0], [20000.0, 10000.0]], [])
-    """
+    """Return the ends of what of a segment lies within `FAR`, none when nothing does."""
     if max(abs(start[0]), abs(start[1]), abs(end[0]), abs(end[1])) <= FAR:
         return start, end
     inside = shapely.clip_by_rect(shapely.LineString([start, end]), -FAR, -FAR, FAR, FAR)

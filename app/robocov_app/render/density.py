@@ -94,9 +94,6 @@ def cost_label(what: str, mean_distance: float, mean_time: float | None = None) 
     """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
 
     What is not finite is left out: a team of which no robot works covers nothing.
-
-    >>> cost_label("mean distance", 1.25), cost_label("mean distance by φ", 1.25, 3.0)
-    ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
     """
     known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
     return ", ".join(

@@ -275,11 +275,7 @@ FARTHEST = 253  # number of the colour at the limit of the scale and beyond
 
 
 def round_limit(distance: float) -> float:
-    """Return a round length not below a distance, m, to which a scale of colours may reach.
-
-    >>> [round_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
-    [1.0, 1.0, 5.0, 15.0, 1.0]
-    """
+    """Return a round length not below a distance, m, to which a scale of colours may reach."""
     if not np.isfinite(distance) or distance <= 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(distance))
@@ -287,11 +283,7 @@ def round_limit(distance: float) -> float:
 
 
 def ticks(limit: float, most: int = 5) -> list[float]:
-    """Return round lengths from zero to a limit, m, for a scale of colours.
-
-    >>> ticks(5.0), ticks(1.5), ticks(8.0)
-    ([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], [0.0, 0.5, 1.0, 1.5], [0.0, 2.0, 4.0, 6.0, 8.0])
-    """
+    """Return round lengths from zero to a limit, m, for a scale of colours."""
     power = 10.0 ** np.floor(np.log10(limit))
     for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         count = limit / (step * power)

@@ -99,27 +99,36 @@ _BORDER = 1.6  # width of the borders of geodesic cells
 _HATCH = 5  # pixels of the coarse picture from one slanted line to the next
 
 
-class FieldPicture:
-    """A picture of a field, by `draw_picture` at (w,) x and (h,) y m; kept until field or view change."""
+def field_drawing(
+    draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface],
+) -> Callable[[Canvas, Scene], None]:
+    """Return what draws a picture of a field, by `draw_picture` at (w,) x and (h,) y m, within the region.
 
-    def __init__(self, draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface]) -> None:
-        self.draw_picture = draw_picture
-        self._picture = Latest[pygame.Surface]()
+    It is kept until field or view change.
+    """
+    kept = Latest[pygame.Surface]()
 
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        field = scene.field
-        left, top, width, height = _seen(canvas, scene)
-        if field is None or width <= 0 or height <= 0:
+    def draw(canvas: Canvas, scene: Scene) -> None:
+        field, camera = scene.field, canvas.camera
+        low_x, low_y, high_x, high_y = scene.environment.region.bounds
+        begin, end = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+        # those of the view's pixels that show the region
+        begin = np.maximum(np.floor(begin), np.floor(camera.view[:2])).astype(int)
+        end = np.minimum(np.ceil(end), np.ceil(np.add(camera.view[:2], camera.view[2:]))).astype(int) + 1
+        if field is None or (end <= begin).any():
             return
-        view = canvas.camera, canvas.theme.name, canvas.scale, (left, top, width, height)
-        key = (scene.field_limit, *view, canvas.hues.tolist(), "distances" in canvas.shown)
+        corner = begin.tolist()
+        key = (corner, end.tolist(), scene.field_limit, camera, canvas.theme.name, canvas.scale)
 
         def picture() -> pygame.Surface:
-            x, y = _to_world(canvas, left + np.arange(width), top + np.arange(height))
-            return self.draw_picture(canvas, scene, field, x, y)
+            x, y = _to_world(canvas, np.arange(begin[0], end[0]), np.arange(begin[1], end[1]))
+            return draw_picture(canvas, scene, field, x, y)
 
-        canvas.surface.blit(self._picture.of(field, key, picture), (left, top))
+        look = (*key, canvas.hues.tolist(), "distances" in canvas.shown)
+        canvas.surface.blit(kept.of(field, look, picture), corner)
         _cut_to_region(canvas, scene)
+
+    return draw
 
 
 def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
@@ -131,14 +140,15 @@ def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Arra
     return large.subsurface((0, 0, len(x), len(y)))
 
 
-def distances_legend(scene: Scene) -> list[LegendEntry]:
-    def closed(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
+unreached_legend = says(
+    "no robot can come",
+    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge),
+    lambda scene: scene.field is not None and bool((scene.field.result.owner < 0).any()),
+)
 
-    entries = [_strip_entry("distance to the nearest robot", Theme.heat_table)]
-    if scene.field is not None and (scene.field.result.owner < 0).any():
-        entries.append(LegendEntry("no robot can come", closed))
-    return entries
+
+def distances_legend(scene: Scene) -> list[LegendEntry]:
+    return [_strip_entry("distance to the nearest robot", Theme.heat_table), *unreached_legend(scene)]
 
 
 def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
@@ -209,17 +219,6 @@ def _marks(scene: Scene) -> list[tuple[float, str]]:
     if scene.field.largest > scene.field_limit * (1.0 + 1e-9):
         words[-1] = f"≥ {words[-1]}"
     return list(zip(marks, words, strict=True))
-
-
-def _seen(canvas: Canvas, scene: Scene) -> tuple[int, int, int, int]:
-    """Return left, top, width and height of the pixels of the view that show the region."""
-    low_x, low_y, high_x, high_y = scene.environment.region.bounds
-    corners = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    (left, top), (right, bottom) = np.floor(corners[0]), np.ceil(corners[1])
-    view_left, view_top, wide, high = canvas.camera.view
-    left, top = max(left, np.floor(view_left)), max(top, np.floor(view_top))
-    right, bottom = min(right, np.ceil(view_left + wide)), min(bottom, np.ceil(view_top + high))
-    return int(left), int(top), int(right - left) + 1, int(bottom - top) + 1
 
 
 def _cut_to_region(canvas: Canvas, scene: Scene) -> None:

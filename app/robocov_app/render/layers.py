@@ -9,7 +9,6 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov.arrays import Array
 from robocov.environment import Environment
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
@@ -93,40 +92,25 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def draw_grid(canvas: Canvas, scene: Scene) -> None:
-    step = grid_step(canvas.camera.zoom, canvas.scale)
+    """Draw lines within the region at the least round distance that leaves `GRID_GAP` between them."""
+    least = GRID_GAP * canvas.scale / canvas.camera.zoom
+    step = round_length(least)
+    step = step if step >= least else round_length(2.5001 * step)
     region, seen = scene.environment.region, canvas.camera.visible()
-    bounds = region.bounds
     colour, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
-    clip = canvas.surface.get_clip()
     for axis in (0, 1):
-        low, high = max(bounds[axis], seen[axis]), min(bounds[axis + 2], seen[axis + 2])
+        low, high = max(region.bounds[axis], seen[axis]), min(region.bounds[axis + 2], seen[axis + 2])
         for place in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
             line = np.full((2, 2), place)
-            # down, and to the right
-            line[:, 1 - axis] = (bounds[3], bounds[1]) if axis == 0 else (bounds[0], bounds[2])
-            (left, top), (right, bottom) = _across(canvas, region.polygon, line)
-            if axis == 0:
-                box = pygame.Rect(round(left - width / 2), round(top), width, round(bottom) - round(top))
-            else:
-                box = pygame.Rect(round(left), round(top - width / 2), round(right) - round(left), width)
-            canvas.surface.fill(colour, box.clip(clip))
-
-
-def _across(canvas: Canvas, region: shapely.Polygon, line: Array) -> list[list[float]]:
-    """Return the ends, in pixels, of what of `line` lies in the convex `region`; no length where nothing."""
-    inside = shapely.get_coordinates(shapely.intersection(region, shapely.LineString(line)))
-    if len(inside) != 2:
-        inside = line[[0, 0]]
-    elif np.hypot(*(inside[0] - line[0])) > np.hypot(*(inside[1] - line[0])):
-        inside = inside[::-1]
-    return canvas.camera.to_pixels(inside).tolist()  # type: ignore[no-any-return]
-
-
-def grid_step(zoom: float, scale: float) -> float:
-    """Return the distance of the grid's lines in metres: the least round one that leaves `GRID_GAP`."""
-    least = GRID_GAP * scale / zoom
-    below = round_length(least)
-    return below if below >= least else round_length(2.5001 * below)
+            line[:, 1 - axis] = region.bounds[1 - axis], region.bounds[3 - axis]
+            inside = shapely.get_coordinates(shapely.intersection(region.polygon, shapely.LineString(line)))
+            if len(inside) == 2:
+                ends = canvas.camera.to_pixels(inside)
+                begin, end = ends.min(axis=0), ends.max(axis=0)
+                sides = (np.rint(end) - np.rint(begin)).astype(int)
+                begin[axis], sides[axis] = begin[axis] - width / 2, width
+                box = pygame.Rect(np.rint(begin).astype(int).tolist(), sides.tolist())
+                canvas.surface.fill(colour, box.clip(canvas.surface.get_clip()))
 
 
 def draw_blocked(canvas: Canvas, environment: Environment, fill: Colour, edge: Colour) -> None:
@@ -134,10 +118,8 @@ def draw_blocked(canvas: Canvas, environment: Environment, fill: Colour, edge: C
     rings = []
     # courtyards before what stands in them
     for part in sorted(environment.blocked.geoms, key=lambda part: -shapely.Polygon(part.exterior).area):
-        for ring, colour in (
-            (part.exterior, (*fill, 255)),
-            *((hole, (0, 0, 0, 0)) for hole in part.interiors),
-        ):
+        colours = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
+        for ring, colour in zip((part.exterior, *part.interiors), colours, strict=True):
             rings.append(canvas.camera.to_pixels(np.asarray(ring.coords)[:-1]))
             canvas.polygon(rings[-1], colour)
     for corners in rings:
@@ -171,18 +153,18 @@ def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Co
     canvas.arrow((middle - along).tolist(), (middle + along).tolist(), theme.ink, 2.0 * canvas.scale)
 
 
-def obstacles_legend(scene: Scene) -> list[LegendEntry]:
-    def static(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
+def _moving_glyph(canvas: Canvas, x: float, y: float) -> None:
+    canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+    half = 10.0 * canvas.scale
+    canvas.arrow((x - half, y), (x + half, y), canvas.theme.ink, 1.6 * canvas.scale)
 
-    def moving(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
-        half = 10.0 * canvas.scale
-        canvas.arrow((x - half, y), (x + half, y), canvas.theme.ink, 1.6 * canvas.scale)
 
-    found = not scene.environment.blocked.is_empty
-    entries = [LegendEntry("obstacle (unknown to robots)", static)] if found else []
-    return [*entries, LegendEntry("moving obstacle and its path", moving)] if scene.moving else entries
+obstacles_legend = says(
+    "obstacle (unknown to robots)",
+    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge),
+    lambda scene: not scene.environment.blocked.is_empty,
+)
+moving_legend = says("moving obstacle and its path", _moving_glyph, lambda scene: bool(scene.moving))
 
 
 def draw_boundary(canvas: Canvas, scene: Scene) -> None:

@@ -29,17 +29,21 @@ _strip = partial(Layer, in_world=False)
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
     """Return one of each layer, from the lowest to the topmost; `trails` are colours of `Trajectories`."""
-    distances = heatmaps.FieldPicture(heatmaps.draw_distances)
-    geodesic = heatmaps.FieldPicture(heatmaps.draw_geodesic_cells)
+    distances = heatmaps.field_drawing(heatmaps.draw_distances)
+    geodesic = heatmaps.field_drawing(heatmaps.draw_geodesic_cells)
     sensed = knowledge.SensedObstacles()
     trajectories, snapshot = Trajectories(trails), ("snapshot",)
+
+    def obstacles(scene: Scene) -> list[LegendEntry]:
+        return [*layers.obstacles_legend(scene), *layers.moving_legend(scene)]
+
     return [
-        _extra("distances", "Distance map", distances.draw, ("field",), heatmaps.distances_legend),
-        _extra("geodesic_cells", "Geodesic cells", geodesic.draw, ("field",), heatmaps.geodesic_legend),
+        _extra("distances", "Distance map", distances, ("field",), heatmaps.distances_legend),
+        _extra("geodesic_cells", "Geodesic cells", geodesic, ("field",), heatmaps.geodesic_legend),
         Layer("cells", "Voronoi cells", layers.draw_cells, ("cells",), layers.cells_legend),
         _fixed("grid", "Grid", layers.draw_grid),
         _fixed("density", "Density φ", heatmaps.draw_density, (), heatmaps.density_legend),
-        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), layers.obstacles_legend),
+        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), obstacles),
         _fixed("boundary", "Boundary", layers.draw_boundary),
         _extra("sensed", "Known obstacles", sensed.draw, ("sensed", "snapshot"), knowledge.sensed_legend),
         _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),

@@ -17,20 +17,12 @@ MAP_COLOURS = 6  # hues for larger teams, where only cells that share an edge mu
 
 
 def rgb(code: str) -> Colour:
-    """Return the colour that is written as ``RRGGBB``.
-
-    >>> rgb("88CCEE")
-    (136, 204, 238)
-    """
+    """Return the colour that is written as ``RRGGBB``."""
     return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
 
 
 def mix(first: Colour, second: Colour, part: float) -> Colour:
-    """Return `first` with `part` (0 to 1) of `second` mixed in.
-
-    >>> mix((0, 0, 0), (200, 100, 50), 0.5)
-    (100, 50, 25)
-    """
+    """Return `first` with `part` (0 to 1) of `second` mixed in."""
     red, green, blue = (round(a + (b - a) * part) for a, b in zip(first, second, strict=True))
     return red, green, blue
 

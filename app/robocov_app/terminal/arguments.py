@@ -79,11 +79,7 @@ def _for_readers(kind: type[T]) -> type[T]:
 
 
 def _default_hint(label: str) -> str:
-    """Return what the help says of a default value.
-
-    >>> _default_hint("0.016666666666666666"), _default_hint("None")
-    ('(default: 0.01667)', '')
-    """
+    """Return what the help says of a default value."""
     with contextlib.suppress(ValueError):
         label = f"{float(label):.4g}" if "." in label else label
     return "" if label in ("", "None", "False") else f"(default: {label})"
@@ -95,12 +91,7 @@ def groups_of(kind: Any) -> list[Any]:
 
 
 def by_option(kind: Any, message: str) -> str:
-    """Return a message on a value with the option that gives it in the place of the value's path.
-
-    >>> from dataclasses import make_dataclass
-    >>> by_option(make_dataclass("Arguments", ["fail"]), "conditions.failures[0]: robot 9, but 1 was wanted")
-    '--fail: robot 9, but 1 was wanted'
-    """
+    """Return a message on a value with the option that gives it in the place of the value's path."""
     groups = [kind, *groups_of(kind)]
     found = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
     name = {"failures": "fail", "joins": "join"}.get(found[1], found[1]) if found else ""
@@ -149,11 +140,7 @@ def window_size(text: str | None) -> tuple[int, int] | None:
 
 
 def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
-
-    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
-    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
-    """
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word."""
     gains: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import secrets
 import threading
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from http import HTTPStatus
@@ -36,21 +36,8 @@ from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
+from robocov_app.web import events
 from robocov_app.web.access import cookies_of, link_to, same, token_in
-from robocov_app.web.events import (
-    MOST_PIXELS,
-    Control,
-    Hands,
-    Left,
-    Message,
-    Named,
-    OfHands,
-    PageChanged,
-    PictureShown,
-    Uploaded,
-    message_of,
-    modifiers,
-)
 from robocov_app.web.pictures import Picture, encoded
 
 if TYPE_CHECKING:
@@ -98,7 +85,7 @@ class Page:
     shown: Picture | None = None  # the picture that it has, or will have
     sent: deque[int] = field(default_factory=deque)  # numbers of pictures on their way
     told: dict[str, Any] = field(default_factory=dict)
-    size: PageChanged | None = None
+    size: events.PageChanged | None = None
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -119,10 +106,10 @@ class WebDisplay:
         self._looked, self._since = 0.0, time()
         # browsers share cookies among all ports of a machine
         self._cookie = f"robocov-{sha256(self.token.encode()).hexdigest()[:12]}"
-        self._waiting: deque[OfHands | Uploaded] = deque()
-        self._wanted: PageChanged | None = None
-        self._given: PageChanged | None = None
-        self._hands = Hands()
+        self._waiting: deque[events.OfHands | events.Uploaded] = deque()
+        self._wanted: events.PageChanged | None = None
+        self._given: events.PageChanged | None = None
+        self._hands = events.Hands()
         self._held, self._narrow = 0, False
         self._picture: Picture | None = None
         # also a page that is there before the first picture is told all of it
@@ -143,21 +130,13 @@ class WebDisplay:
         if self._trouble is not None:
             why = self._trouble.strerror or self._trouble
             raise InputError(f"--port: {self.host}:{self.port} cannot be listened to: {why}")
+        self.link = link_to(self.host, self.port, self.token)
+        self.watch_link = link_to(self.host, self.port, self.watch_token)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join(5.0)
-
-    @property
-    def link(self) -> str:
-        """The address of who controls."""
-        return link_to(self.host, self.port, self.token)
-
-    @property
-    def watch_link(self) -> str:
-        """The address of those who watch."""
-        return link_to(self.host, self.port, self.watch_token)
 
     def wait(self, seconds: float) -> None:
         if self._called.wait(max(seconds, 0.001)):  # other threads get their turn in any case
@@ -182,7 +161,7 @@ class WebDisplay:
                     self._called.set()
                     return
                 self._held = held
-                pygame.key.set_mods(modifiers(held))
+                pygame.key.set_mods(events.modifiers(held))
             for event in self._hands.events(self._waiting.popleft()):
                 pygame.event.post(event)
                 posted = True
@@ -226,9 +205,8 @@ class WebDisplay:
         """Answer a request for the page; None lets a socket be opened."""
         place = urlsplit(request.path)
         if not self._known(self._secret(request)):
-            return line.respond(
-                HTTPStatus.FORBIDDEN, "This needs the whole link that robocov printed, with its token.\n"
-            )
+            words = "This needs the whole link that robocov printed, with its token.\n"
+            return line.respond(HTTPStatus.FORBIDDEN, words)
         if place.path.endswith("/socket"):
             if not _own_origin(request):
                 return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
@@ -250,8 +228,11 @@ class WebDisplay:
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
             f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        headers = {"Content-Security-Policy": policy, "Referrer-Policy": "no-referrer"}
-        headers |= {"Cache-Control": "no-store"}
+        headers = {
+            "Content-Security-Policy": policy,
+            "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-store",
+        }
         if self._known(given):  # of no path: it is that of the page, also behind a proxy
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
         return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
@@ -301,14 +282,14 @@ class WebDisplay:
                 self._wanted = page.size or self._wanted
                 self._called.set()
             if self._held:  # keys that the one before has held
-                self._waiting.append(Left(kind="blur"))
+                self._waiting.append(events.Left(kind="blur"))
         self._wake()
 
     async def _take_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
 
         allowed, before = MOST_EVENTS, monotonic()
-        try:
+        with suppress(ConnectionClosed):
             async for text in page.line:
                 now = monotonic()
                 allowed, before = min(allowed + (now - before) * MOST_EVENTS, MOST_EVENTS) - 1.0, now
@@ -321,24 +302,27 @@ class WebDisplay:
                     elif len(text) > LONGEST:
                         raise ValueError
                     else:
-                        self._take(page, message_of(text))
+                        self._take(page, events.message_of(text))
                 except ValueError:
                     await page.line.close(1008, "not understood")
-        except ConnectionClosed:
-            pass
 
-    def _take(self, page: Page, message: Message) -> None:
-        if isinstance(message, PictureShown):
+    def _take(self, page: Page, message: events.Message) -> None:
+        if isinstance(message, events.PictureShown):
             while page.sent and page.sent.popleft() != message.number:
                 pass
             page.changed.set()
-        elif isinstance(message, Control):
-            self._hand_over(page, message.to)
-        elif isinstance(message, Named):
+        elif isinstance(message, events.Control):
+            if message.to == 0:
+                page.asks = not page.asks and page is not self._control
+                self._wake()
+            elif page is self._control or page.teacher:
+                named = (each for each in self._pages if each.number == message.to)
+                self._give_control(next(named, self._control))
+        elif isinstance(message, events.Named):
             page.name = "".join(filter(str.isprintable, message.name)).strip() or page.name
             self._wake()
-        elif isinstance(message, PageChanged):
-            if message.width * message.height > MOST_PIXELS:
+        elif isinstance(message, events.PageChanged):
+            if message.width * message.height > events.MOST_PIXELS:
                 raise ValueError
             page.size = message
             if page is self._control:
@@ -348,14 +332,6 @@ class WebDisplay:
             self._waiting.append(message)
             self._called.set()
 
-    def _hand_over(self, page: Page, to: int) -> None:
-        """Let another page control, or note that one asks for it."""
-        if to == 0:
-            page.asks = not page.asks and page is not self._control
-            self._wake()
-        elif page is self._control or page.teacher:
-            self._give_control(next((each for each in self._pages if each.number == to), self._control))
-
     def _upload(self, page: Page, data: bytes) -> None:
         """Put a file into the folder, under a name that is free, and let the window open it."""
         name, _, content = data.partition(b"\n")
@@ -364,22 +340,24 @@ class WebDisplay:
             raise ValueError
         if len(path.name) > 100 or not path.name.isprintable() or path.name.startswith("."):
             raise ValueError
-        target = self.folder / path.name
+        target = self.folder / path
         if target.exists():
             target = free_name(self.folder, path.stem, path.suffix)
         with written(target) as part:
             part.write_bytes(content)
-        self._waiting.append(Uploaded(path=str(target)))
+        self._waiting.append(events.Uploaded(path=str(target)))
         self._called.set()
 
     async def _send_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        try:
+        with suppress(ConnectionClosed):
             while True:
                 await page.changed.wait()
                 page.changed.clear()
-                told = self._told_to(page)
+                told = self._told | {"people": self._people(), "you": page.number, "teacher": page.teacher}
+                if page is not self._control:
+                    told.pop("copied", None)  # the clipboard is of the one who controls alone
                 if told != page.told:
                     page.told = told
                     await page.line.send(json.dumps(told))
@@ -388,30 +366,21 @@ class WebDisplay:
                     before, page.shown = page.shown, picture
                     page.sent.append(picture.number)
                     await page.line.send(await self._bytes(picture, before))
-        except ConnectionClosed:
-            pass
 
-    def _told_to(self, page: Page) -> dict[str, Any]:
-        """Return what a page is told beside pictures: the clipboard is of the one who controls alone."""
-        told = dict(self._told)
-        if page is not self._control:
-            told.pop("copied", None)
-        told["people"] = [
+    def _people(self) -> list[dict[str, Any]]:
+        return [
             {"number": each.number, "name": each.name, "asks": each.asks, "controls": each is self._control}
             for each in self._pages
         ]
-        return {**told, "you": page.number, "teacher": page.teacher}
 
     async def _bytes(self, picture: Picture, before: Picture | None) -> bytes:
         """Return a picture as a page needs it that shows another; those who watch in step share it."""
         key = picture.number, 0 if before is None else before.number
-        found = self._encoded.get(key)
-        if found is None:
-            found = await asyncio.to_thread(encoded, picture, before)
-            if len(self._encoded) >= 8:
-                self._encoded.pop(next(iter(self._encoded)))
-            self._encoded[key] = found
-        return found
+        if key not in self._encoded:
+            self._encoded[key] = await asyncio.to_thread(encoded, picture, before)
+            for old in list(self._encoded)[:-8]:
+                del self._encoded[old]
+        return self._encoded[key]
 
 
 def _answer(line: ServerConnection, body: bytes, kind: str, headers: dict[str, str]) -> Response:
@@ -434,19 +403,17 @@ def _own_origin(request: Request) -> bool:
 def saved_since(folder: Path, since: float) -> tuple[str, ...]:
     """Return the names of what windows save that was written to a folder since a time, the newest first."""
     try:
-        with os.scandir(folder) as there:
-            seen = [each for each in islice(there, MOST_LISTED) if _is_saved(each)]
+        seen = [each for each in islice(folder.iterdir(), MOST_LISTED) if _is_saved(each)]
         found = [(changed, each.name) for each in seen if (changed := each.stat().st_mtime) >= since]
     except OSError:
         return ()
     return tuple(name for _, name in sorted(found, reverse=True)[:20])
 
 
-def _is_saved(entry: os.DirEntry[str]) -> bool:
-    """Return whether it looks like a file that windows save, or a folder of results."""
-    if entry.name.startswith("."):
+def _is_saved(path: Path) -> bool:
+    if path.name.startswith("."):
         return False
-    return Path(entry, MANIFEST).exists() if entry.is_dir() else Path(entry).suffix.lower() in _OFFERED
+    return (path / MANIFEST).exists() if path.is_dir() else path.suffix.lower() in _OFFERED
 
 
 def zipped(folder: Path) -> bytes:

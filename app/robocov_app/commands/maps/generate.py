@@ -140,9 +140,8 @@ def _require_map(path: Path) -> None:
         try:
             load_map(path)
         except MapError:
-            raise InputError(
-                f"{path}: is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
-            ) from None
+            why = "is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
+            raise InputError(f"{path}: {why}") from None
 
 
 def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:
