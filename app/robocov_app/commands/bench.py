@@ -128,9 +128,8 @@ def print_tables(rows: Sequence[Row]) -> None:
 def goals(row: Row) -> str:
     """Return what is wanted, and whether it is missed."""
     wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
-    if row.goal_seconds is not None:
-        wanted.append(duration(row.goal_seconds))
-    return ", ".join(wanted) + (" missed" if row.met is False else "")
+    wanted += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
+    return ", ".join(wanted) + " missed" * (row.met is False)
 
 
 def duration(seconds: float | None) -> str:

@@ -68,25 +68,19 @@ def command(options: Arguments) -> int:
     options.film.layers()
     story = options.run / "session.robocov" if (options.run / "story.json").is_file() else options.run
     if story.suffix == ".robocov":
-        return play_story(options, story)
+        from robocov_app.viewer.session.file import load_session
+        from robocov_app.viewer.session.session import Session
+
+        if options.headless:
+            raise ParameterError(f"{story}: a film of a session is made by robocov run {story} --video")
+        session = Session.opened(load_session(story, options.controller))
+        session.recorded_until = session.end
+        session.look_at(0.0)
+        session.playing = True
+        return open_window(options, session, story)
     saved = load_saved(options.run)
-    return make_film(options, saved) if options.headless else play_runs(options, saved)
-
-
-def play_story(options: Arguments, path: Path) -> int:
-    from robocov_app.viewer.session.file import load_session
-    from robocov_app.viewer.session.session import Session
-
     if options.headless:
-        raise ParameterError(f"{path}: a film of a session is made by robocov run {path} --video")
-    session = Session.opened(load_session(path, options.controller))
-    session.recorded_until = session.end
-    session.look_at(0.0)
-    session.playing = True
-    return open_window(options, session, path)
-
-
-def play_runs(options: Arguments, saved: list[Saved]) -> int:
+        return make_film(options, saved)
     from robocov.controllers import controller_kind
     from robocov_app.viewer.session.recorded import replayed_session
 

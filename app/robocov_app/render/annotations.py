@@ -48,13 +48,11 @@ def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
 
 
 def bar_length(canvas: Canvas) -> float:
-    """Return the length of the scale bar in metres: round, and at most an eighth of the surface wide."""
     room = min(max(canvas.surface.get_width() / 8, 30.0), 160 * canvas.scale)
     return round_length(room / canvas.camera.zoom)
 
 
 def draw_caption(canvas: Canvas, scene: Scene) -> None:
-    """Draw the controller's name and the cost above the arena, where several pictures stand side by side."""
     left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
     y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
     size = 1.15 * canvas.theme.text
@@ -71,9 +69,6 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
 
 
 def draw_status(canvas: Canvas, scene: Scene) -> None:
-    """Draw controller, time and cost below the arena; a caption above it says the controller and the cost."""
-    if "caption" in canvas.shown:
-        scene = replace(scene, label="", cost="")
     bar = bar_length(canvas)
     taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
     taken += canvas.text_width(length_label(bar), bold=True)

@@ -43,7 +43,6 @@ class Camera:
         return np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
 
     def to_world(self, pixels: Array) -> Array:
-        """Return the points in metres of (..., 2) pixels."""
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
         return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))
 
@@ -56,7 +55,6 @@ class Camera:
         return replace(self, center=center, zoom=zoom)
 
     def panned(self, dx: float, dy: float) -> "Camera":
-        """Return the camera after the world was dragged by (`dx`, `dy`) pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
     def within(self, view: tuple[float, float, float, float]) -> "Camera":

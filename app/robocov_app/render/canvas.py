@@ -89,7 +89,6 @@ class Canvas:
         return max(7, round(pixels * self.scale))
 
     def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
-        """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
         for ring in clipped_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
@@ -184,7 +183,6 @@ class Canvas:
         sketch.onto(self.surface)
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
-        """Put a sprite where it belongs to a quarter of a pixel."""
         self.stamps([sprite], np.array([center], dtype=float))
 
     def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:

@@ -24,7 +24,6 @@ _DOTS = 60_000
 
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:
-    """Draw how much each place counts, where not all count the same; distances, in colours too, hide it."""
     density, hidden = scene.environment.density, scene.field is not None and "distances" in canvas.shown
     if density is not None and not density.uniform and not hidden:
         draw_shading(canvas, density, scene.environment.region.vertices)

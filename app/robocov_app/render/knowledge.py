@@ -89,7 +89,6 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
 
 
 def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
-    """Draw hair lines, each from where it is far enough from those beside it."""
     along = ends - place
     length = np.hypot(along[:, 0], along[:, 1])
     ray = np.arange(len(ends))
@@ -208,7 +207,7 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
     box = pygame.Rect(0, 0, wide + round(12 * scale), round(20 * scale))
     x, y = corners[0].tolist()
     radii = drawn_radii(canvas, scene)
-    centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist() if scene.snapshot else []
+    centers = canvas.camera.to_pixels(scene.snapshot.positions if scene.snapshot else np.empty((0, 2)))
     path = bounded(corners).tolist()
     places = []
     # not below at the right first: the arrow of the cursor is there
@@ -219,10 +218,8 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
         placed = box.clamp(view)
         hidden = 4 * (placed != box)
         hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in pairwise(path))
-        for (robot_x, robot_y), radius in zip(centers, radii, strict=True):
-            gap_x = max(placed.left - robot_x, 0.0, robot_x - placed.right)
-            gap_y = max(placed.top - robot_y, 0.0, robot_y - placed.bottom)
-            hidden += np.hypot(gap_x, gap_y) < radius
+        outside = np.maximum(np.maximum(placed.topleft - centers, centers - placed.bottomright), 0.0)
+        hidden += int((np.hypot(*outside.T) < radii).sum())
         places.append((hidden, placed))
     return min(places, key=lambda each: each[0])[1]
 

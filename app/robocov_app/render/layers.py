@@ -44,7 +44,6 @@ class Layer:
     in_world: bool = True
 
     def has(self, scene: Scene) -> bool:
-        """Return whether there may be something of the layer in a scene."""
         values = [getattr(scene, name) for name in self.needs]
         return not any(each is None or (isinstance(each, Sequence | Mapping) and not each) for each in values)
 
@@ -168,6 +167,5 @@ moving_legend = says("moving obstacle and its path", _moving_glyph, lambda scene
 
 
 def draw_boundary(canvas: Canvas, scene: Scene) -> None:
-    """Draw the outline of the convex region, all that robots know of the map."""
     corners = canvas.camera.to_pixels(scene.environment.region.vertices)
     canvas.outline(corners, canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))

@@ -7,7 +7,6 @@ import numpy as np
 import pygame
 
 from robocov.arrays import Array
-from robocov.observation import Snapshot
 from robocov.voronoi import VoronoiPartition
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
@@ -204,11 +203,20 @@ failed_legend = says("failed robot", lambda canvas, x, y: _draw_wreck(canvas, x,
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
     """Draw a ring around the robot that is asked about; where messages fail, also what it believes."""
     assert scene.selected is not None
-    if scene.now.seen.reported_positions is not None:
-        _draw_belief(canvas, scene.now, scene.selected)
-    radius = drawn_radii(canvas, scene)[scene.selected] + 4.0 * canvas.scale
-    center = canvas.camera.to_pixels(scene.now.positions[scene.selected]).tolist()
-    canvas.stamp(partial(sprites.ring, radius, canvas.theme.ink, 2.2 * canvas.scale), center)
+    robot, seen, cells, theme = scene.selected, scene.now.seen, scene.now.decision.cells, canvas.theme
+    there = canvas.camera.to_pixels(scene.now.positions).tolist()
+    if seen.reported_positions is not None:
+        if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
+            corners = canvas.camera.to_pixels(cells.polygons[robot])
+            canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
+        known = [robot, *seen.neighbours.of(robot).tolist()]
+        places = np.concatenate([seen.positions[[robot]], seen.neighbour_positions(robot)])
+        for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
+            hue = int(canvas.hues[other])
+            canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
+            _stamp_belief(canvas, hue, place)
+    radius = drawn_radii(canvas, scene)[robot] + 4.0 * canvas.scale
+    canvas.stamp(partial(sprites.ring, radius, theme.ink, 2.2 * canvas.scale), there[robot])
 
 
 def belief_legend(scene: Scene) -> list[LegendEntry]:
@@ -222,17 +230,3 @@ def belief_legend(scene: Scene) -> list[LegendEntry]:
 def _stamp_belief(canvas: Canvas, hue: int, place: list[float]) -> None:
     colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
     canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), place)
-
-
-def _draw_belief(canvas: Canvas, snapshot: Snapshot, robot: int) -> None:
-    seen, cells, theme = snapshot.seen, snapshot.decision.cells, canvas.theme
-    if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
-        corners = canvas.camera.to_pixels(cells.polygons[robot])
-        canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
-    known = [robot, *seen.neighbours.of(robot).tolist()]
-    places = np.concatenate([seen.positions[[robot]], seen.neighbour_positions(robot)])
-    there = canvas.camera.to_pixels(snapshot.positions).tolist()
-    for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
-        hue = int(canvas.hues[other])
-        canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
-        _stamp_belief(canvas, hue, place)

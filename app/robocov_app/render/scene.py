@@ -136,7 +136,6 @@ class Scene:
         return self.failed_radii.get(number, float(self.team.radius[0]))
 
     def number(self, robot: int) -> int:
-        """Return what people call the robot of a row."""
         return robot + 1 if self.numbers is None else self.numbers[robot]
 
     @property

@@ -132,7 +132,6 @@ def nose(radius: float, fill: Colour, edge: Colour, turn: int, shift: Shift) -> 
 
 
 def ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
-    """Return a circle's line, its middle at `radius` pixels."""
     return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
 
 

@@ -97,7 +97,6 @@ class Theme:
 
     @property
     def moving_obstacle(self) -> Colour:
-        """The fill of obstacles that move: paler than that of static ones."""
         return mix(self.obstacle, self.background, 0.5)
 
     def cell(self, hue: int) -> Colour:
@@ -118,7 +117,6 @@ class Theme:
         return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
 
     def controller(self, name: str) -> Colour:
-        """Return the colour of a controller's curves and labels, that of others where it has none."""
         return self.controllers.get(name, self.others[0])
 
     def trail(self, hue: int) -> Colour:

@@ -60,7 +60,6 @@ class Trajectories:
                 canvas.outline(np.array([*path, end]), colour, whole, closed=False)
 
     def _lengthen(self, rows: Array) -> None:
-        """Add the corners that lie far enough from the last of each path."""
         last = np.array([path[-1] for path in self._open])
         gaps = bool(np.isnan(last).any() or np.isnan(rows).any())
         for row in rows:

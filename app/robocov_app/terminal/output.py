@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,10 +29,8 @@ def tell(options: Any, answer: Any, *lines: str, indent: int | None = None) -> N
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
     """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
     stem = stem.rstrip("0123456789").rstrip("-") or stem
-    k = 1
-    while os.path.lexists(folder / f"{stem}-{k}{suffix}"):  # a link to nothing is there, too
-        k += 1
-    return folder / f"{stem}-{k}{suffix}"
+    paths = (folder / f"{stem}-{k}{suffix}" for k in count(1))
+    return next(path for path in paths if not os.path.lexists(path))  # a link to nothing is there, too
 
 
 def require_fresh(
@@ -47,7 +46,6 @@ def require_fresh(
 
 
 def listed(folder: Path) -> str:
-    """Return the names of what a result consists of, for people."""
     return ", ".join(sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")))
 
 
@@ -78,9 +76,7 @@ def finite(content: Any) -> Any:
         return {key: finite(value) for key, value in content.items()}
     if isinstance(content, list):
         return [finite(value) for value in content]
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
-    return content
+    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 PIPED_WIDTH = 140  # columns of a table that goes to a file or a pipe

@@ -71,7 +71,6 @@ class Sessions:
         self._starting = asyncio.Lock()
 
     async def serve(self, tell: Callable[[str], object]) -> None:
-        """Listen until the process is stopped; InputError where that cannot be."""
         host, port = self._options.host, self._options.port
         try:
             server = await asyncio.start_server(self._carry, host, port, limit=LONGEST_HEAD)

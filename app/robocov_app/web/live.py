@@ -37,7 +37,6 @@ class LiveWindow:
         self.link = found[1]
 
     def close(self) -> None:
-        """End the window."""
         self._end()
 
     def _repr_html_(self) -> str:

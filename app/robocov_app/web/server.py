@@ -208,7 +208,10 @@ class WebDisplay:
             words = "This needs the whole link that robocov printed, with its token.\n"
             return line.respond(HTTPStatus.FORBIDDEN, words)
         if place.path.endswith("/socket"):
-            if not _own_origin(request):
+            # our own page opens it; what is no browser names no origin
+            origins, headers = request.headers.get_all("Origin"), request.headers
+            hosts = headers.get_all("Host") + headers.get_all("X-Forwarded-Host")
+            if len(origins) > 1 or any(urlsplit(origin).netloc not in hosts for origin in origins):
                 return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
             if len(self._pages) >= MOST_PAGES:
                 return line.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages show this window.\n")
@@ -238,7 +241,6 @@ class WebDisplay:
         return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
 
     def _download(self, line: ServerConnection, name: str) -> Response:
-        """Answer with a file that was saved, or with a folder as a zip."""
         path = self.folder / name
         try:
             body = zipped(path) if path.is_dir() else path.read_bytes()
@@ -257,7 +259,6 @@ class WebDisplay:
         return same(token, self.token) or same(token, self.watch_token)
 
     async def _talk(self, line: ServerConnection) -> None:
-        """Show a page the window for as long as it is there, and take what it tells."""
         assert line.request is not None
         number, teacher = next(self._numbers), same(self._secret(line.request), self.token)
         page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}")
@@ -355,7 +356,16 @@ class WebDisplay:
             while True:
                 await page.changed.wait()
                 page.changed.clear()
-                told = self._told | {"people": self._people(), "you": page.number, "teacher": page.teacher}
+                people = [
+                    {
+                        "number": one.number,
+                        "name": one.name,
+                        "asks": one.asks,
+                        "controls": one is self._control,
+                    }
+                    for one in self._pages
+                ]
+                told = self._told | {"people": people, "you": page.number, "teacher": page.teacher}
                 if page is not self._control:
                     told.pop("copied", None)  # the clipboard is of the one who controls alone
                 if told != page.told:
@@ -366,12 +376,6 @@ class WebDisplay:
                     before, page.shown = page.shown, picture
                     page.sent.append(picture.number)
                     await page.line.send(await self._bytes(picture, before))
-
-    def _people(self) -> list[dict[str, Any]]:
-        return [
-            {"number": each.number, "name": each.name, "asks": each.asks, "controls": each is self._control}
-            for each in self._pages
-        ]
 
     async def _bytes(self, picture: Picture, before: Picture | None) -> bytes:
         """Return a picture as a page needs it that shows another; those who watch in step share it."""
@@ -391,13 +395,6 @@ def _answer(line: ServerConnection, body: bytes, kind: str, headers: dict[str, s
     answer.headers.update({"Content-Type": kind, "Content-Length": str(len(body)), **headers})
     answer.headers["X-Content-Type-Options"] = "nosniff"
     return answer
-
-
-def _own_origin(request: Request) -> bool:
-    """Return whether a socket is opened by our own page; what is no browser names no origin."""
-    origins = request.headers.get_all("Origin")
-    hosts = request.headers.get_all("Host") + request.headers.get_all("X-Forwarded-Host")
-    return all(urlsplit(origin).netloc in hosts for origin in origins) and len(origins) < 2
 
 
 def saved_since(folder: Path, since: float) -> tuple[str, ...]:
