@@ -80,7 +80,8 @@ def command(options: Arguments) -> None:
 def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:
     """Return a command's options, its groups' too, and words and names of its positional arguments."""
     hints, plain, groups = get_type_hints(kind, include_extras=True), get_type_hints(kind), groups_of(kind)
-    flags, words, positionals = [], [], set()
+    flags, positionals = [], set()
+    words: list[str] = []
     for each in fields(kind):
         more = getattr(hints[each.name], "__metadata__", ())
         if tyro.conf.Positional in more:

@@ -124,15 +124,11 @@ def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surfa
 
 
 def legend_picture(
-    entries: Sequence[LegendEntry],
-    width: int,
-    theme: Theme,
-    scale: float,
-    shown: frozenset[str] = frozenset(),
+    entries: Sequence[LegendEntry], width: int, theme: Theme, scale: float, shown: Set[str] = frozenset()
 ) -> NDArray[np.uint8]:
     """Return entries as an RGB picture of a width, (height, width, 3), for pictures of the layers `shown`."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
-    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), shown)
+    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), frozenset(shown))
     strip = legend_strip(entries, canvas)
     pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
     return pixels.reshape(strip.get_height(), width, 3)

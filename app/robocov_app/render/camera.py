@@ -1,13 +1,16 @@
 """The camera: world metres, y up, to pixels, y down, and back."""
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array
 
-# limits of the zoom in pixels per metre: from a hundred times the largest map to a tenth of the smallest
-SMALLEST, LARGEST = 1e-4, 1e7
+SMALLEST, LARGEST = 1e-4, 1e7  # zoom, px/m: from a hundred times the largest map to a tenth of the smallest
+
+
+Box: TypeAlias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -16,15 +19,10 @@ class Camera:
 
     center: tuple[float, float]
     zoom: float
-    view: tuple[float, float, float, float]
+    view: Box
 
     @classmethod
-    def fit(
-        cls,
-        bounds: tuple[float, float, float, float],
-        view: tuple[float, float, float, float],
-        margin: float = 0.0,
-    ) -> "Camera":
+    def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> "Camera":
         """Return the camera that shows `bounds`, m, as large as possible, `margin` px from the sides."""
         low_x, low_y, high_x, high_y = bounds
         width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
@@ -57,10 +55,10 @@ class Camera:
     def panned(self, dx: float, dy: float) -> "Camera":
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
-    def within(self, view: tuple[float, float, float, float]) -> "Camera":
+    def within(self, view: Box) -> "Camera":
         return replace(self, view=view)
 
-    def visible(self) -> tuple[float, float, float, float]:
+    def visible(self) -> Box:
         half_x, half_y = self.view[2] / 2 / self.zoom, self.view[3] / 2 / self.zoom
         x, y = self.center
         return x - half_x, y - half_y, x + half_x, y + half_y

@@ -45,10 +45,8 @@ def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
     return ends
 
 
-# gives the sprite for a shift in quarters of a pixel
-Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
-# draws a sign around a pixel, within 22 x 14 px at scale 1
-Glyph: TypeAlias = Callable[["Canvas", float, float], None]
+Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]  # for a shift in quarters of a pixel
+Glyph: TypeAlias = Callable[["Canvas", float, float], None]  # around a pixel, in 22 x 14 px at scale 1
 
 
 def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:

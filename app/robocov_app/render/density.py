@@ -13,8 +13,7 @@ from robocov.environment import Environment
 from robocov_app.render.theme import Theme
 
 _SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
-# smallest x, smallest y, largest x, largest y in metres
-Bounds: TypeAlias = tuple[float, float, float, float]
+Bounds: TypeAlias = tuple[float, float, float, float]  # smallest x and y, largest x and y in metres
 
 
 def shading(environment: Environment, most: int, theme: Theme) -> NDArray[np.uint8]:

@@ -1,7 +1,7 @@
 """Distances to the nearest robot at every pixel of a picture, and their colours."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov_app.render.theme import Theme
 
-# least angle in radians at which two distances are taken to grow apart, so that borders stay thin
-_SHALLOW = 0.05
-
+_SHALLOW = 0.05  # least angle, rad, at which two distances are taken to grow apart: borders stay thin
 # the squares beside a square: rows up and columns right, and the corners that the two share
 _BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
 _BLOCK = 4  # pixels along the side of blocks that are looked at as a whole first
@@ -63,15 +61,9 @@ class Borders:
         return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
 
 
-class _Rivals(NamedTuple):
-    """Sites (k, r) whose ways a place may choose from; `number` (s, s): of each square with any, else -1.
-
-    `right` (k, 4, r): no wall is between the end of the way and a square's corner, to which none is shorter.
-    """
-
-    number: IntArray
-    site: IntArray
-    right: BoolArray
+# Squares whose places may choose from several ways: number of each (s, s), -1 for none; sites (k, r); whether
+# no wall is between a way's end and a square's corner, to which none is shorter, (k, 4, r).
+_Rivals: TypeAlias = tuple[IntArray, IntArray, BoolArray]
 
 
 class Field:
@@ -105,7 +97,7 @@ class Field:
         points = self.result.points[corner]
         length = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
         known = self.result.distances[corner][..., None]
-        return _Rivals(number, site, length >= known - 1e-9 * self.lattice.spacing)
+        return number, site, length >= known - 1e-9 * self.lattice.spacing
 
     @property
     def largest(self) -> float:
@@ -118,7 +110,7 @@ class Field:
         column, row = self.lattice.squares(x, y)
         site = self.lattice.around[..., 0][row[:, None], column]
         distance = self._distance(site, np.broadcast_to(x, site.shape), y[:, None])
-        number = self._inside.number[row[:, None], column]
+        number = self._inside[0][row[:, None], column]
         high, wide = (number >= 0).nonzero()
         distance[high, wide] = self._asked(self._inside, number[high, wide], x[wide], y[high]).min(axis=1)
         return distance
@@ -140,18 +132,14 @@ class Field:
         """Return what is near a border by blocks, each as its middle is, then by pixels."""
         # blocks with a corner in a square with rivals
         column, row = self.lattice.squares(x, y)
-        numbered = self._around.number >= 0
-        low_row, high_row, left, right = (
-            np.minimum(np.arange(0, n, _BLOCK) + more, n - 1)
-            for n in (len(y), len(x))
-            for more in (0, _BLOCK - 1)
-        )
-        corners = [
-            numbered[row[high][:, None], column[wide]]
-            for high in (low_row, high_row)
-            for wide in (left, right)
-        ]
-        high, wide = np.logical_or.reduce(corners).nonzero()
+        numbered = self._around[0] >= 0
+
+        def ends(square: IntArray) -> tuple[IntArray, IntArray]:
+            first = np.arange(0, len(square), _BLOCK)
+            return square[first], square[np.minimum(first + _BLOCK - 1, len(square) - 1)]
+
+        some = [numbered[np.ix_(high, wide)] for high in ends(row) for wide in ends(column)]
+        high, wide = np.logical_or.reduce(some).nonzero()
         middle_x, middle_y = (middles(places, _BLOCK) for places in (x, y))
         column, row = self.lattice.squares(middle_x, middle_y)
         known = numbered[row[high], column[wide]]
@@ -168,11 +156,11 @@ class Field:
     def _bordering(self, high: IntArray, wide: IntArray, x: Array, y: Array) -> Borders:
         """Return who is nearest, and how far the border is, at chosen rows and columns; inf for no border."""
         column, row = self.lattice.squares(x, y)
-        number = self._around.number[row[high], column[wide]]
+        number = self._around[0][row[high], column[wide]]
         some = (number >= 0).nonzero()[0]
         number, high, wide = number[some], high[some], wide[some]
         px, py = x[wide], y[high]
-        around = self._around.site[number]
+        around = self._around[1][number]
         distance = self._asked(self._around, number, px, py)
         owner = self._owner[around]
         each = np.arange(len(around))
@@ -189,13 +177,14 @@ class Field:
 
     def _asked(self, rivals: _Rivals, number: IntArray, x: Array, y: Array) -> Array:
         """Return what the rivals of (k,) places in numbered squares say, (k, r), inf behind a wall."""
-        distance = self._distance(rivals.site[number], x[:, None], y[:, None])
+        _, site, right_way = rivals
+        distance = self._distance(site[number], x[:, None], y[:, None])
         # the square's corner beside the place
         cells = [
             (at - low) / self.lattice.spacing for at, low in zip((x, y), self.lattice.origin, strict=True)
         ]
         right, upper = ((np.floor(at - 0.5) - np.floor(at)).astype(np.intp) + 1 for at in cells)
-        return np.where(rivals.right[number, 2 * upper + right], distance, np.inf)
+        return np.where(right_way[number, 2 * upper + right], distance, np.inf)
 
     def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
         dx, dy = x - self._way_x[site], y - self._way_y[site]

@@ -19,8 +19,7 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Theme, border_colour
 
-# on a surface the density is looked at in at most about so many places; between them it is interpolated
-_DOTS = 60_000
+_DOTS = 60_000  # about so many places of a surface at most where the density is looked at, not interpolated
 
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:

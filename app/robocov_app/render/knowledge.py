@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
-from robocov_app.render.layers import draw_blocked, draw_boundary, draw_motion, says
+from robocov_app.render.layers import draw_blocked, draw_boundary, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
@@ -53,8 +53,7 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
 
 
 _FINE = 2  # scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer
-# least distance between rays in pixels at scale 1: nearer to the robot every second one is left out
-_RAY_GAP = 5.0
+_RAY_GAP = 5.0  # least pixels between rays at scale 1: nearer to the robot every second one is left out
 _PALE = 0.3  # how much of its colour is left of an obstacle that nobody has sensed
 _DOT = 2.1  # radius of a sensed point in pixels at scale 1
 _HIT = 1.5  # radius of the end of a ray in pixels at scale 1
@@ -144,23 +143,18 @@ class SensedObstacles:
             self._page, begin = pygame.Surface(size, pygame.SRCALPHA, 32), 0
             self._page.set_clip(clip)
             if "obstacles" in canvas.shown:
-                _draw_pale(replace(canvas, surface=self._page), scene)
-        fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
-        page, colour = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
+                fill, edge = _pale_colours(canvas)
+                draw_blocked(replace(canvas, surface=self._page), scene, fill, fill, edge)
+                if "boundary" in canvas.shown:  # what of it was covered
+                    draw_boundary(replace(canvas, surface=self._page), scene)
         if begin < len(points):
+            fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
+            page, colour = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
             _dots(page, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
         self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), points
         canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         if (discovered := discovered_map(scene)) is not None:
             draw_discovered(canvas, discovered)
-
-
-def _draw_pale(canvas: Canvas, scene: Scene) -> None:
-    draw_blocked(canvas, scene.environment, *_pale_colours(canvas))
-    for obstacle in scene.moving:
-        draw_motion(canvas, scene, obstacle, *_pale_colours(canvas))
-    if "boundary" in canvas.shown:  # what of it was covered
-        draw_boundary(canvas, scene)
 
 
 def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:

@@ -9,15 +9,13 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov.environment import Environment
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.scene import MovingObstacle, Scene
 from robocov_app.render.theme import Colour
 
 GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
-# width of cells in pixels at scale 1 below which edges between them are not smooth: they hardly show
-NARROW = 20.0
+NARROW = 20.0  # width of cells in pixels at scale 1 below which their edges are not smooth: they hardly show
 
 Legend: TypeAlias = Callable[[Scene], list[LegendEntry]]
 
@@ -112,27 +110,27 @@ def draw_grid(canvas: Canvas, scene: Scene) -> None:
                 canvas.surface.fill(colour, box.clip(canvas.surface.get_clip()))
 
 
-def draw_blocked(canvas: Canvas, environment: Environment, fill: Colour, edge: Colour) -> None:
+def draw_blocked(canvas: Canvas, scene: Scene, fill: Colour, moving: Colour, edge: Colour) -> None:
     """Draw obstacles on a transparent page: what lies below it shows in their courtyards."""
-    rings = []
+    rings, parts = [], scene.environment.blocked.geoms
     # courtyards before what stands in them
-    for part in sorted(environment.blocked.geoms, key=lambda part: -shapely.Polygon(part.exterior).area):
+    for part in sorted(parts, key=lambda part: -shapely.Polygon(part.exterior).area):
         colours = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
         for ring, colour in zip((part.exterior, *part.interiors), colours, strict=True):
             rings.append(canvas.camera.to_pixels(np.asarray(ring.coords)[:-1]))
             canvas.polygon(rings[-1], colour)
     for corners in rings:
         canvas.outline(corners, edge, canvas.width(canvas.theme.line))
+    for obstacle in scene.moving:
+        draw_motion(canvas, scene, obstacle, moving, edge)
 
 
 def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
     """Draw obstacles, and what of the robots' convex region lies outside the boundary: they know neither."""
-    page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+    page, theme = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32), canvas.theme
     page.set_clip(canvas.surface.get_clip())
     own = replace(canvas, surface=page)
-    draw_blocked(own, scene.environment, canvas.theme.obstacle, canvas.theme.obstacle_edge)
-    for obstacle in scene.moving:
-        draw_motion(own, scene, obstacle, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+    draw_blocked(own, scene, theme.obstacle, theme.moving_obstacle, theme.obstacle_edge)
     canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 

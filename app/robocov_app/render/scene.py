@@ -20,9 +20,7 @@ from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 from robocov_app.render.distance_field import Field, Fields
 
-# metres within which a goal is the centroid: a record's goals are those of a moment before its end
-SAME = 0.05
-
+SAME = 0.05  # metres within which a goal is the centroid: a record's are those of a moment before its end
 CENTROID, GOAL = "cell centroid", "goal"
 
 

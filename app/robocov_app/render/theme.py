@@ -127,8 +127,7 @@ class Theme:
         return colour
 
 
-# codes of the light look and of the dark one
-_COLOURS = {
+_COLOURS = {  # codes of the light look and of the dark one
     "background": ("FFFFFF", "13181F"),
     "panel": ("F4F6FA", "1B212B"),
     "ink": ("1B2330", "E8ECF2"),

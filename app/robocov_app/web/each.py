@@ -130,14 +130,12 @@ class Sessions:
         process = context.Process(target=_session, args=(self._command, own, says), daemon=False)
         process.start()
         says.close()
-        if not said.poll(_START):
-            process.terminate()
-            raise OSError("the window did not open")
-        try:
-            link = said.recv().removeprefix("open ").strip()
-        except EOFError:
-            raise OSError("the window did not open") from None
-        return _Session(process, urlsplit(link).port or 0, token_in(link))
+        with suppress(EOFError):
+            if said.poll(_START):
+                link = said.recv().removeprefix("open ").strip()
+                return _Session(process, urlsplit(link).port or 0, token_in(link))
+        process.terminate()
+        raise OSError("the window did not open")
 
 
 def _answer(status: str, token: str = "") -> str:

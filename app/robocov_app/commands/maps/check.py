@@ -62,7 +62,12 @@ def command(options: Arguments) -> int:
 
 def watch(options: Arguments) -> None:
     """Check again at each save, and say what has changed since the map was last valid; Ctrl-C ends it."""
-    names, output = {_path(name): name for name in options.files}, console()
+    names, output = {}, console()
+    for name in options.files:
+        try:
+            names[map_file(name)] = name
+        except MapError:
+            names[Path(name)] = name
     outcomes: dict[str, MapReport | InputError] = {}
     valid: dict[str, MapReport] = {}
     for changed in changes(list(names)):
@@ -126,13 +131,6 @@ def _lines(outcome: MapReport | InputError, former: MapReport | None = None) -> 
             yield mistake.told(outcome.where)
         if outcome.unlisted:
             yield f"{outcome.where}: and {outcome.unlisted} more mistakes"
-
-
-def _path(name: str) -> Path:
-    try:
-        return map_file(name)
-    except MapError:
-        return Path(name)
 
 
 def report_lines(report: MapReport, former: MapReport | None = None) -> Iterator[str]:
