@@ -95,12 +95,9 @@ def command(options: Arguments) -> None:
 def machine() -> dict[str, Any]:
     """Return what times depend on."""
     names = "numpy", "scipy", "shapely", "pymunk", "pygame-ce"
-    facts = {
-        "python": platform.python_version(),
-        "system": platform.system(),
-        "processor": platform.machine(),
-    }
-    return facts | {"cores": os.cpu_count(), "packages": {name: version(name) for name in names}}
+    facts: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
+    facts |= {"processor": platform.machine(), "cores": os.cpu_count()}
+    return facts | {"packages": {name: version(name) for name in names}}
 
 
 def print_tables(rows: Sequence[Row]) -> None:
@@ -113,8 +110,12 @@ def print_tables(rows: Sequence[Row]) -> None:
             case = "" if words == former else words, row.name if row.case else ""
             times = (duration(each) for each in (row.seconds, row.yardstick_seconds))
             ratios = ("" if each is None else f"{each:.2f}" for each in (row.ratio, row.before))
+            # what is wanted, and whether it is missed
+            goals = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
+            goals += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
+            wanted = ", ".join(goals) + " missed" * (row.met is False)
             yardstick = "" if row.yardstick is None else f"/ {row.yardstick}"
-            cells.append((*case, *times, *ratios, goals(row), yardstick, row.note))
+            cells.append((*case, *times, *ratios, wanted, yardstick, row.note))
             former = words
         print_table(columns, cells, title=PARTS[part][0])
         print()
@@ -123,13 +124,6 @@ def print_tables(rows: Sequence[Row]) -> None:
     out = console()
     out.print("before: about the ratio when nothing was compiled (commit 8838167)")
     out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
-
-
-def goals(row: Row) -> str:
-    """Return what is wanted, and whether it is missed."""
-    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
-    wanted += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
-    return ", ".join(wanted) + " missed" * (row.met is False)
 
 
 def duration(seconds: float | None) -> str:

@@ -82,9 +82,9 @@ class Arguments(JsonOption):
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
         if self.action == "run" and self.controller is None:
             raise ParameterError("--controller: none, but the name of one, or FILE.py:CLASS, was wanted")
-        wanted = {"verify": "one result", "page": "results"}.get(self.action, "")
-        if len(self.paths) != 1 if self.action == "verify" else wanted and self.alone and not self.paths:
-            paths = counted(len(self.paths), "path")
+        verify, paths = self.action == "verify", counted(len(self.paths), "path")
+        if (verify and len(self.paths) != 1) or (self.action == "page" and self.alone and not self.paths):
+            wanted = "one result" if verify else "results"
             raise ParameterError(f"DIR: {paths}, but {wanted} of a benchmark was wanted")
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -70,7 +70,8 @@ def built(folder: Path) -> None:
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
-    if missing := [name for name in ("sphinx", "furo", "myst_parser") if find_spec(name) is None]:
+    needed = "sphinx", "furo", "myst_parser"
+    if missing := [name for name in needed if importlib.util.find_spec(name) is None]:
         raise RobocovError(
             f'{missing[0]} is not installed: pip install "robocov[docs]"; '
             f"the pages can be read as text, too: {sources() / 'index.md'}"

@@ -9,12 +9,11 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, checked, counted
 from robocov.files.atomic import written
 from robocov.lower_bound import FINEST, LowerBound, lower_bound
 from robocov.mapfile import load_map
-from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
+from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
@@ -99,7 +98,16 @@ def command(options: Arguments) -> None:
         with late_progress("proving the bound", quiet=options.json) as update:
             how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": update}
             bound = lower_bound(environment, best.positions, radius=radius, **how)
-    gaps = gaps_of(saved, best, environment, options)
+    gaps = []
+    if saved:
+        lattice_cost = built_cost(environment, lattice, quiet=options.json)
+        for each in saved:
+            if len(each.record.team) != robots:
+                raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
+            result = lattice_cost(each.record.positions[-1])
+            alike = abs(result.uncovered_area - best.uncovered_area) < 1e-6  # the same components are covered
+            gap = best.gap(result.mean_distance) if alike else None
+            gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
     if options.positions is not None:
         rows = ",\n ".join(json.dumps(place) for place in best.positions.tolist())
         with written(options.positions) as part:
@@ -134,21 +142,3 @@ def command(options: Arguments) -> None:
     if options.positions is None:
         lines += ["positions       " + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in best.positions.tolist())]
     tell(options, answer, *lines)
-
-
-def gaps_of(
-    saved: list[Saved], best: Optimum, environment: Environment, options: Arguments
-) -> list[dict[str, Any]]:
-    """Return how far the ends of runs are above the best; None where one covers other components."""
-    if not saved:
-        return []
-    cost = built_cost(environment, options.lattice, quiet=options.json)
-    gaps = []
-    for each in saved:
-        if len(each.record.team) != len(best.positions):
-            raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
-        result = cost(each.record.positions[-1])
-        alike = abs(result.uncovered_area - best.uncovered_area) < 1e-6
-        gap = best.gap(result.mean_distance) if alike else None
-        gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
-    return gaps

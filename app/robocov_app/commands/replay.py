@@ -107,15 +107,9 @@ def open_window(options: Arguments, session: Session, file: Path | None = None) 
     serving = web_display(options.serve, options.host, options.port, Path())
     same = (key for key in bundled_maps() if load_map(key) == session.environment)
     (also, without), film = options.film.layers(), options.film
-    look: dict[str, Any] = {
-        "theme": film.theme,
-        "size": window_size(film.size),
-        "also": also,
-        "without": without,
-    }
-    name, laws = next(same, session.environment.name), options.controller
-    opening = Launcher(session, name, Path(), laws=laws, file=file, served=serving is not None, **look)
-    with opening.window() as window:
+    look: dict[str, Any] = {"theme": film.theme, "size": window_size(film.size), "laws": options.controller}
+    look |= {"also": also, "without": without, "file": file, "served": serving is not None}
+    with Launcher(session, next(same, session.environment.name), Path(), **look).window() as window:
         show(window, serving)
     return 0
 

@@ -1,20 +1,14 @@
 """`robocov run`."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
 from robocov_app.terminal.output import listed, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov_app.runs.run import Run
 
 
 @dataclass
@@ -41,6 +35,7 @@ def command(options: Arguments) -> int:
     if options.map.endswith(".robocov"):
         return remade(options)
     from robocov.mapfile import load_map
+    from robocov_app.render.density import density_lines
     from robocov_app.runs.artifacts import performed
     from robocov_app.runs.saved import folder_names
 
@@ -49,10 +44,28 @@ def command(options: Arguments) -> int:
     options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     runs, stopped = performed({"": spec}, out, options)
-    run = runs[""]
-    end = f"stopped at {run.record.time[-1]:.1f} s; what was done is in" if stopped else "saved in"
-    answer = {"out": str(out), "interrupted": stopped, **run.summary}
-    tell(options, answer, *_summary(run), f"{end} {out}/: {listed(out)}{options.record_words}")
+    record, history, summary = runs[""].record, runs[""].history, runs[""].summary
+    lines = [
+        f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s"
+    ]
+    first = f"(at the start {history.mean_distance[0]:.3f} m)"
+    lines += [f"  mean distance   {summary['mean_distance_m']:.3f} m   {first}"]
+    if history.mean_time is not None:
+        first = f"(at the start {history.mean_time[0]:.3f} s)"
+        lines += [f"  mean time       {summary['mean_time_s']:.3f} s   {first}"]
+    lines += [f"  coverage cost   {summary['cost_m3']:.2f} m³"]
+    lines += [f"  {line}" for line in density_lines(record.environment)]
+    if summary["uncovered_area_m2"] > 0:
+        lines += [f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)"]
+    settled = summary["settled_at_s"]
+    lines += [f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}"]
+    clearance = f"(smallest clearance {summary['min_clearance_m']:.3f} m)"
+    lines += [f"  contacts        {summary['contacts']}   {clearance}"]
+    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
+    end = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stopped else "saved in"
+    lines += [f"  path length     {path:.2f} m per robot"]
+    lines += [f"{end} {out}/: {listed(out)}{options.record_words}"]
+    tell(options, {"out": str(out), "interrupted": stopped, **summary}, *lines)
     return INTERRUPTED if stopped else 0
 
 
@@ -97,25 +110,3 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
         yield answer
         if stop.requested:
             return
-
-
-def _summary(run: Run) -> Iterator[str]:
-    from robocov_app.render.density import density_lines
-
-    summary, record, history = run.summary, run.record, run.history
-    settled = summary["settled_at_s"]
-    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
-    yield f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s"
-    first = f"(at the start {history.mean_distance[0]:.3f} m)"
-    yield f"  mean distance   {summary['mean_distance_m']:.3f} m   {first}"
-    if history.mean_time is not None:
-        first = f"(at the start {history.mean_time[0]:.3f} s)"
-        yield f"  mean time       {summary['mean_time_s']:.3f} s   {first}"
-    yield f"  coverage cost   {summary['cost_m3']:.2f} m³"
-    yield from (f"  {line}" for line in density_lines(record.environment))
-    if summary["uncovered_area_m2"] > 0:
-        yield f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)"
-    yield f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}"
-    clearance = f"(smallest clearance {summary['min_clearance_m']:.3f} m)"
-    yield f"  contacts        {summary['contacts']}   {clearance}"
-    yield f"  path length     {path:.2f} m per robot"

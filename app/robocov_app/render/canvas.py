@@ -147,6 +147,10 @@ class Canvas:
         for start, end in list(pairwise(corners.tolist()))[:: 2 if dashed else 1]:
             self.line(start, end, colour, self.width(1.0))
 
+    def level(self, x: float, y: float, half: float) -> tuple[Pixel, Pixel]:
+        """Return the ends of a level stroke for the legend, around a pixel; `half` its length at scale 1."""
+        return (x - half * self.scale, y), (x + half * self.scale, y)
+
     def swatch(self, x: float, y: float, fill: Colour | None, edge: Colour) -> None:
         size = 11 * self.scale
         box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))

@@ -7,10 +7,11 @@ import numpy as np
 
 from robocov.arrays import Array
 from robocov_app.render import sprites
-from robocov_app.render.canvas import Canvas, LegendEntry
+from robocov_app.render.canvas import Canvas
 from robocov_app.render.layers import Layer, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
+from robocov_app.render.sprites import Pixel
 from robocov_app.render.theme import Colour, Theme, mix
 
 FORCE_LENGTH = 46.0  # longest arrow of a force in pixels at scale 1
@@ -30,7 +31,7 @@ def _arrow_layer(
     `vectors_of`: (n, 2) px at a scale, y down; None for none. `style`: colour, and width at scale 1.
     """
 
-    def arrow(canvas: Canvas, start: list[float], end: list[float]) -> None:
+    def arrow(canvas: Canvas, start: Pixel, end: Pixel) -> None:
         colour, width = style(canvas.theme)
         canvas.arrow(start, end, colour, canvas.scale * width, head)
 
@@ -46,13 +47,11 @@ def _arrow_layer(
                 start = center + vector * (radius / length)
                 arrow(canvas, start.tolist(), (start + vector).tolist())
 
-    def glyph(canvas: Canvas, x: float, y: float) -> None:
-        half = 9 * canvas.scale
-        arrow(canvas, [x - half, y], [x + half, y])
-
-    def legend(scene: Scene) -> list[LegendEntry]:
-        return [] if vectors_of(scene, 1.0) is None else [LegendEntry(words, glyph)]
-
+    legend = says(
+        words,
+        lambda canvas, x, y: arrow(canvas, *canvas.level(x, y, 9)),
+        lambda scene: vectors_of(scene, 1.0) is not None,
+    )
     return Layer(name, title, draw, ("snapshot",), legend, default=False)
 
 
@@ -125,14 +124,12 @@ def draw_links(canvas: Canvas, scene: Scene) -> None:
         _link(canvas, start, end)
 
 
-def _link(canvas: Canvas, start: list[float], end: list[float]) -> None:
+def _link(canvas: Canvas, start: Pixel, end: Pixel) -> None:
     colour = mix(canvas.theme.background, canvas.theme.final, 0.7)
     canvas.line(start, end, colour, canvas.width(canvas.theme.line))
 
 
-links_legend = says(
-    "neighbours", lambda canvas, x, y: _link(canvas, [x - 9 * canvas.scale, y], [x + 9 * canvas.scale, y])
-)
+links_legend = says("neighbours", lambda canvas, x, y: _link(canvas, *canvas.level(x, y, 9)))
 
 
 def draw_points(canvas: Canvas, scene: Scene) -> None:

@@ -72,10 +72,7 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
 
 
 def _dots(begin: int, count: int, step: int) -> tuple[Array, Callable[[Array], Array]]:
-    """Return samples of the density along one axis for `count` pixels, (d,) px, the same for any pixels.
-
-    And what interpolates between them: from (d, k) values there to (count, k) at the pixels.
-    """
+    """Return where the density is looked at along an axis, (d,) px, and what interpolates (d, k) values."""
     place = (begin + np.arange(count) + 0.5) / step - 0.5
     first = np.floor(place).astype(np.intp)
 
@@ -100,10 +97,7 @@ _HATCH = 5  # pixels of the coarse picture from one slanted line to the next
 def field_drawing(
     draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface],
 ) -> Callable[[Canvas, Scene], None]:
-    """Return what draws a picture of a field, by `draw_picture` at (w,) x and (h,) y m, within the region.
-
-    It is kept until field or view change.
-    """
+    """Return what draws a field, by `draw_picture` at (w,) x and (h,) y m, when field or view change."""
     kept = Latest[pygame.Surface]()
 
     def draw(canvas: Canvas, scene: Scene) -> None:
@@ -175,12 +169,12 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     return cells
 
 
-def _border_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 8 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), border_colour(canvas.theme), canvas.width(_BORDER))
-
-
-geodesic_legend = says("geodesic cell border", _border_glyph)
+geodesic_legend = says(
+    "geodesic cell border",
+    lambda canvas, x, y: canvas.line(
+        *canvas.level(x, y, 8), border_colour(canvas.theme), canvas.width(_BORDER)
+    ),
+)
 
 
 def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:

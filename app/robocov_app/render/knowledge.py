@@ -224,9 +224,8 @@ def _draw_path_begin(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _path_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 9 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
-    _draw_path_begin(canvas, x - half + 2 * canvas.scale, y)
+    canvas.line(*canvas.level(x, y, 9), canvas.theme.final, canvas.width(2.0))
+    _draw_path_begin(canvas, x - 9 * canvas.scale + 2 * canvas.scale, y)
 
 
 path_legend = says(

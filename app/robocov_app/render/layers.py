@@ -152,8 +152,7 @@ def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Co
 
 def _moving_glyph(canvas: Canvas, x: float, y: float) -> None:
     canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
-    half = 10.0 * canvas.scale
-    canvas.arrow((x - half, y), (x + half, y), canvas.theme.ink, 1.6 * canvas.scale)
+    canvas.arrow(*canvas.level(x, y, 10.0), canvas.theme.ink, 1.6 * canvas.scale)
 
 
 obstacles_legend = says(

@@ -154,10 +154,7 @@ class Painter:
 
     @property
     def camera(self) -> Camera:
-        """The camera; set it to zoom and pan, see `fit` for the way back.
-
-        The world has what the strips above and below, and the scale of colours beside it, leave.
-        """
+        """The camera, with the view that strips and scale of colours leave; set it to zoom and pan."""
         (width, height), scale, (_, rows, beside) = self.size, self.scale, self._room
         top = (6 + LEGEND_ROW * rows + 6 if rows else MARGIN) * scale
         small = annotations.is_small(height, scale, self.visible)

@@ -56,8 +56,7 @@ def _add_hook() -> None:
 def confined(folder: Path) -> Iterator[None]:
     """Let the process read and write files only below a folder, and read those that programs consist of.
 
-    Also what is typed into the palette, named in a session or linked to is held to this, since Python itself
-    asks; OutsideError, which is an InputError and a PermissionError, says no.
+    Python itself asks: what is typed, named in a session or linked to is held to this. Raises OutsideError.
     """
     global _read, _written
     _add_hook()

@@ -1,9 +1,7 @@
 """The server of a window: one page, its pictures and what hands do there, behind a token.
 
 The window's loop stays in the main thread and knows a `Remote` and nothing of browsers; the server has a
-thread of its own. Only ``websockets`` is needed. (rendercanvas' ``http`` backend, looked at in 2.7.2, has
-one canvas for a process, neither tokens nor origins checked, no control handed over, no text and no
-clipboard, and sends whole pictures as JPEG: all that is here would have come on top of it.)
+thread of its own. (rendercanvas' ``http`` backend has none of tokens, origins, control, text and clipboard.)
 """
 
 from __future__ import annotations
