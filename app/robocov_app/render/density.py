@@ -60,9 +60,8 @@ def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
     """Return the least and the largest value of a density within bounds."""
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
     step = (high - low).max() / _SAMPLES
-    points = _grid(
-        *(np.arange(first + 0.5 * step, last, step) for first, last in zip(low, high, strict=True))
-    )
+    x, y = (np.arange(first + 0.5 * step, last, step) for first, last in zip(low, high, strict=True))
+    points = _grid(x, y)
     if isinstance(density, Gaussians):  # between samples a narrow one is missed
         centers = np.array([peak.center for peak in density.peaks]).reshape(-1, 2)
         points = np.concatenate([points, centers[((low <= centers) & (centers <= high)).all(axis=1)]])
@@ -94,12 +93,9 @@ def cost_label(what: str, mean_distance: float, mean_time: float | None = None) 
 
     What is not finite is left out: a team of which no robot works covers nothing.
     """
-    known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
-    return ", ".join(
-        f"{words} {value:.3f} {unit}"
-        for words, value, unit in known
-        if value is not None and np.isfinite(value)
-    )
+    told = (what, mean_distance, "m"), ("mean time", mean_time, "s")
+    known = (each for each in told if each[1] is not None and np.isfinite(each[1]))
+    return ", ".join(f"{words} {value:.3f} {unit}" for words, value, unit in known)
 
 
 def density_kind(environment: Environment) -> str | None:

@@ -271,12 +271,12 @@ def round_limit(distance: float) -> float:
     return next(float(f"{step * power:.12g}") for step in _STEPS if step * power >= distance * (1.0 - 1e-9))
 
 
-def ticks(limit: float, most: int = 5) -> list[float]:
+def ticks(limit: float) -> list[float]:
     """Return round lengths from zero to a limit, m, for a scale of colours."""
     power = 10.0 ** np.floor(np.log10(limit))
     for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         count = limit / (step * power)
-        if count <= most + 1e-9 and abs(count - round(count)) < 1e-9:
+        if count <= 5 + 1e-9 and abs(count - round(count)) < 1e-9:
             break
     return [float(f"{k * step * power:.12g}") for k in range(round(count) + 1)]
 

@@ -147,11 +147,6 @@ class Painter:
     def needs_field(self) -> bool:
         return bool({"distances", "geodesic_cells"} & self.visible)
 
-    def resize(self, size: tuple[int, int], scale: float | None = None) -> None:
-        """Draw in another size from now on; what was zoomed or panned stays so."""
-        self.size = size
-        self.scale = scale_for(size) if scale is None else scale
-
     @property
     def camera(self) -> Camera:
         """The camera, with the view that strips and scale of colours leave; set it to zoom and pan."""
@@ -183,8 +178,8 @@ class Painter:
         return [entry for layer in self._shown() if layer.has(scene) for entry in layer.legend(scene)]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
-        if surface.get_size() != self.size:
-            self.resize(surface.get_size(), self.scale)
+        """Draw a scene on all of a surface; what was zoomed or panned stays so in another size."""
+        self.size = surface.get_size()
         self._hues = _hues(scene, self._hues)
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)

@@ -207,6 +207,4 @@ def _runs(path: Array) -> list[list[list[float]]]:
 
 
 def _same_rows(rows: Array, other: Array) -> Array:
-    if rows.shape[1:] != other.shape:
-        return np.zeros(len(rows), dtype=bool)
     return np.asarray(((rows == other) | (np.isnan(rows) & np.isnan(other))).all(axis=(1, 2)))
