@@ -30,15 +30,9 @@ def write(app: Sphinx) -> None:
     """Write every page of the reference into `reference/` beside the sources."""
     folder = Path(app.srcdir) / "reference"
     folder.mkdir(exist_ok=True)
-    pages = {
-        "commands.md": commands(),
-        "gains.md": gains(),
-        "formats.md": formats(),
-        "metrics.md": metrics(),
-        "names.rst": names(),
-    }
-    for name, text in pages.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    for page in (commands, gains, formats, metrics):
+        (folder / f"{page.__name__}.md").write_text(page(), encoding="utf-8")
+    (folder / "names.rst").write_text(names(), encoding="utf-8")
 
 
 def commands() -> str:
@@ -58,9 +52,8 @@ def gains() -> str:
     text = "# Controllers and their gains\n"
     for name, kind in controller_kinds().items():
         text += f"\n## {name}\n\n{kind.summary}. Goes by: {information_of(kind)}.\n".replace("..", ".")
-        rows = list(gains_of(kind).values())
-        if rows:
-            text += "\n| gain | default | unit | range | |\n|---|---|---|---|---|\n"
+        rows = gains_of(kind).values()
+        text += "\n| gain | default | unit | range | |\n|---|---|---|---|---|\n" if rows else ""
         for gain in rows:
             if isinstance(gain, Option):
                 span = ", ".join(gain.words)

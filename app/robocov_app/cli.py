@@ -150,16 +150,9 @@ def _complain(message: str) -> int:
 
 def _overview() -> str:
     width = max(map(len, COMMANDS))
-    commands = "\n".join(f"  {name:<{width}}  {line}" for name, (_, line) in COMMANDS.items())
-    examples = "\n".join(f"  {call}\n      {line}" for call, line in _EXAMPLES)
-    return (
-        "usage: robocov COMMAND [options]\n\n"
-        "Multi-robot coverage control among unknown obstacles.\n\n"
-        f"commands:\n{commands}\n\n"
-        f"examples:\n{examples}\n\n"
-        "robocov COMMAND -h explains a command; robocov --version"
-    )
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    parts = ["usage: robocov COMMAND [options]", "Multi-robot coverage control among unknown obstacles."]
+    parts += [
+        "\n".join(["commands:", *(f"  {name:<{width}}  {line}" for name, (_, line) in COMMANDS.items())])
+    ]
+    parts += ["\n".join(["examples:", *(f"  {call}\n      {line}" for call, line in _EXAMPLES)])]
+    return "\n\n".join([*parts, "robocov COMMAND -h explains a command; robocov --version"])

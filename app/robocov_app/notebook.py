@@ -59,30 +59,14 @@ _RUN_CSS = """
 """
 
 
-def plot_environment(
-    environment: Environment,
-    axes: Axes | None = None,
-    *,
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-) -> Axes:
+def plot_environment(environment: Environment, axes: Axes | None = None, **options: Any) -> Axes:
     """Plot a map, and return its axes; see `robocov_app.figures.runs.plot_environment`."""
-    return _map_axes(_figures().plot_environment(environment, _checked(axes), theme, size), axes)
+    return _plotted("plot_environment", environment, axes, options)
 
 
-def plot_record(
-    record: Record,
-    axes: Axes | None = None,
-    *,
-    theme: Theme | str = LIGHT,
-    colours: str = "paper",
-    size: tuple[int, int] | None = None,
-    mean_distance: float | None = None,
-    mean_time: float | None = None,
-) -> Axes:
+def plot_record(record: Record, axes: Axes | None = None, **options: Any) -> Axes:
     """Plot a run, and return its axes; see `robocov_app.figures.runs.plot_trajectories`."""
-    look = (theme, colours, size, mean_distance, mean_time)
-    return _map_axes(_figures().plot_trajectories(record, _checked(axes), *look), axes)
+    return _plotted("plot_trajectories", record, axes, options)
 
 
 def plot_history(
@@ -91,13 +75,11 @@ def plot_history(
     *,
     label: str = "at the end",
     controller: str = "",
-    theme: Theme | str = LIGHT,
-    size: tuple[int, int] | None = None,
-    title: str = "Coverage cost over time",
+    **options: Any,
 ) -> Axes:
     """Plot the mean distance against time, and return the axes; see `robocov_app.figures.runs.plot_cost`."""
     curve = (label, controller, history.time, history.mean_distance)
-    return _map_axes(_figures().plot_cost([curve], _checked(axes), theme, size, title), axes)
+    return _plotted("plot_cost", [curve], axes, options)
 
 
 def plot_result(
@@ -127,7 +109,7 @@ def plot_result(
         sites, result = finer.sites, finer(result.positions)
     moment = Moment(environment, team, Field(FieldLattice(sites), result), environment.name, facts)
     if axes is None:
-        return _map_axes(plot_coverage([], [moment], theme, size, "Coverage cost"), None)
+        return plot_coverage([], [moment], theme, size, "Coverage cost").axes[-1]
     plot_distances(moment, axes, theme)
     return axes
 
@@ -156,17 +138,15 @@ def environment_html(environment: Environment) -> str:
 
 
 def environment_png(environment: Environment) -> bytes:
-    """Return a map's page."""
-    return figure_png(_figures().plot_environment(environment))
+    return _page_png(plot_environment(environment))
 
 
 def record_html(record: Record) -> str:
     """Return a replay of a run, with its cost where that does not take long."""
     run = ReplayRun(record, _history_to_show(record), f"{record.label} on {record.environment.name}")
     width = max(Frame(record.environment, *_REPLAY_SIZE).width, _CONTROLS)
-    replay = replay_html([run])
-    style = f"<style>{_RUN_CSS}</style>"
-    return f'{style}<div class="robocov-run" style="max-width:{width:.0f}px">{replay}</div>'
+    begin = f'<style>{_RUN_CSS}</style><div class="robocov-run" style="max-width:{width:.0f}px">'
+    return f"{begin}{replay_html([run])}</div>"
 
 
 def _history_to_show(record: Record) -> CostHistory | None:
@@ -181,8 +161,7 @@ def _history_to_show(record: Record) -> CostHistory | None:
 
 
 def record_png(record: Record) -> bytes:
-    """Return a run's page."""
-    return figure_png(_figures().plot_trajectories(record))
+    return _page_png(plot_record(record))
 
 
 def show(
@@ -207,6 +186,10 @@ def show(
         return LiveWindow(["demo", str(file), *options], height)
 
 
+def _page_png(axes: Any) -> bytes:
+    return figure_png(axes.figure)
+
+
 def _checked(axes: Any) -> Any:
     """Return axes on which a plot can be drawn, or None; raises ParameterError for any others."""
     from matplotlib.axes import Axes
@@ -217,11 +200,9 @@ def _checked(axes: Any) -> Any:
     return axes
 
 
-def _map_axes(figure: Figure, given: Axes | None) -> Axes:
-    return figure.axes[-1] if given is None else given
-
-
-def _figures() -> Any:
+def _plotted(function: str, thing: Any, axes: Axes | None, options: dict[str, Any]) -> Axes:
+    """Return the axes on which a function of `robocov_app.figures.runs` has drawn: the given ones, or new."""
     from robocov_app.figures import runs
 
-    return runs
+    figure: Figure = getattr(runs, function)(thing, _checked(axes), **options)
+    return figure.axes[-1] if axes is None else axes

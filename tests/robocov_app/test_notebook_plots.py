@@ -310,6 +310,10 @@ def test_the_backend_has_no_options_of_its_own_beside_the_documented():
     """What `plot` documents is what it takes."""
     import inspect
 
+    from robocov_app.figures import runs
+
+    drawn_by = {"plot_environment": runs.plot_environment, "plot_record": runs.plot_trajectories}
+    drawn_by["plot_history"] = runs.plot_cost
     text = inspect.getdoc(Drawable.plot).partition("Returns")[0]
     entries = re.findall(r"^([\w, ]+) : .*\n((?: +.*\n)*)", text, flags=re.MULTILINE)
     documented = {name: words for names, words in entries for name in names.split(", ")}
@@ -322,5 +326,7 @@ def test_the_backend_has_no_options_of_its_own_beside_the_documented():
     ):
         parameters = inspect.signature(getattr(drawing_backend, function)).parameters.values()
         options = {each.name for each in parameters if each.kind is inspect.Parameter.KEYWORD_ONLY}
+        if function in drawn_by:  # the others are handed on, after what is drawn and the axes
+            options |= {*list(inspect.signature(drawn_by[function]).parameters)[2:]}
         own = {name for name, words in documented.items() if f" {whose}" in words}
         assert own | {"theme", "size"} == options

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
 import platform
 import sys
@@ -16,7 +15,7 @@ import tyro
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import RIGHT, console, print_table
+from robocov_app.terminal.output import RIGHT, console, print_table, tell
 from robocov_app.terminal.progress import progress, tell_of_compiling
 
 if TYPE_CHECKING:
@@ -59,7 +58,6 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    """Measure, then print and draw; what was measured until Ctrl-C as well."""
     for name in THREADS:  # read when numpy is loaded, which telling of compiling does
         os.environ.setdefault(name, "1")
     tell_of_compiling()
@@ -87,9 +85,8 @@ def command(options: Arguments) -> None:
         from robocov_app.render.theme import theme_named
 
         save_ratios(rows, options.plot, theme_named(options.theme))
-    if options.json:
-        print(json.dumps({"machine": machine(), "rows": [row.to_dict() for row in rows]}, indent=1))
-    else:
+    tell(options, {"machine": machine(), "rows": [row.to_dict() for row in rows]}, indent=1)
+    if not options.json:
         print_tables(rows)
     if stopped is not None:
         raise stopped
@@ -97,37 +94,28 @@ def command(options: Arguments) -> None:
 
 def machine() -> dict[str, Any]:
     """Return what times depend on."""
-    packages = {name: version(name) for name in ("numpy", "scipy", "shapely", "pymunk", "pygame-ce")}
-    return {
-        "python": platform.python_version(),
-        "system": platform.system(),
-        "processor": platform.machine(),
-        "cores": os.cpu_count(),
-        "packages": packages,
-    }
+    names = "numpy", "scipy", "shapely", "pymunk", "pygame-ce"
+    facts: dict[str, Any] = {"python": platform.python_version(), "system": platform.system()}
+    facts |= {"processor": platform.machine(), "cores": os.cpu_count()}
+    return facts | {"packages": {name: version(name) for name in names}}
 
 
 def print_tables(rows: Sequence[Row]) -> None:
-    """Print the rows for people, one table a part."""
     numbers = [(title, RIGHT) for title in ("time", "yardstick", "ratio", "before", "goal")]
     columns = [("", {}), ("", {}), *numbers, ("", {"no_wrap": True}), ("", {})]
     for part, group in groupby(rows, key=lambda row: row.part):
         cells, former = [], ""
         for row in group:
             words = row.case or row.name
-            cells.append(
-                (
-                    "" if words == former else words,
-                    row.name if row.case else "",
-                    duration(row.seconds),
-                    "" if row.yardstick_seconds is None else duration(row.yardstick_seconds),
-                    "" if row.ratio is None else f"{row.ratio:.2f}",
-                    "" if row.before is None else f"{row.before:.2f}",
-                    goals(row),
-                    "" if row.yardstick is None else f"/ {row.yardstick}",
-                    row.note,
-                )
-            )
+            case = "" if words == former else words, row.name if row.case else ""
+            times = (duration(each) for each in (row.seconds, row.yardstick_seconds))
+            ratios = ("" if each is None else f"{each:.2f}" for each in (row.ratio, row.before))
+            # what is wanted, and whether it is missed
+            goals = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
+            goals += [] if row.goal_seconds is None else [duration(row.goal_seconds)]
+            wanted = ", ".join(goals) + " missed" * (row.met is False)
+            yardstick = "" if row.yardstick is None else f"/ {row.yardstick}"
+            cells.append((*case, *times, *ratios, wanted, yardstick, row.note))
             former = words
         print_table(columns, cells, title=PARTS[part][0])
         print()
@@ -138,20 +126,10 @@ def print_tables(rows: Sequence[Row]) -> None:
     out.print(f"Python {facts['python']}, {facts['system']}, {facts['cores']} cores; {packages}")
 
 
-def goals(row: Row) -> str:
-    """Return what is wanted, and whether it is missed."""
-    wanted = [] if row.goal is None or row.ratio is None else [f"{row.goal:.3g}"]
-    if row.goal_seconds is not None:
-        wanted.append(duration(row.goal_seconds))
-    return ", ".join(wanted) + (" missed" if row.met is False else "")
-
-
-def duration(seconds: float) -> str:
-    """Return a time in the unit that suits it.
-
-    >>> duration(0.00031), duration(0.012), duration(2.5)
-    ('310 µs', '12.0 ms', '2.50 s')
-    """
+def duration(seconds: float | None) -> str:
+    """Return a time in the unit that suits it, nothing for none."""
+    if seconds is None:
+        return ""
     if seconds < 1e-3:
         return f"{seconds * 1e6:.0f} µs"
     return f"{seconds * 1e3:.1f} ms" if seconds < 1.0 else f"{seconds:.2f} s"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +12,7 @@ from robocov.errors import InputError, ParameterError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, print_table
+from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
 
 FAILED = 1
 _USED = {  # the options that each action has beside --json
@@ -83,16 +82,13 @@ class Arguments(JsonOption):
                     raise ParameterError(f"{option}: robocov benchmark {self.action} has no such option")
         if self.action == "run" and self.controller is None:
             raise ParameterError("--controller: none, but the name of one, or FILE.py:CLASS, was wanted")
-        if (self.action == "verify" and len(self.paths) != 1) or (
-            self.action == "page" and self.alone and not self.paths
-        ):
-            many = "one result" if self.action == "verify" else "results"
-            told = f"{counted(len(self.paths), 'path')}, but {many} of a benchmark was wanted"
-            raise ParameterError(f"DIR: {told}")
+        verify, paths = self.action == "verify", counted(len(self.paths), "path")
+        if (verify and len(self.paths) != 1) or (self.action == "page" and self.alone and not self.paths):
+            wanted = "one result" if verify else "results"
+            raise ParameterError(f"DIR: {paths}, but {wanted} of a benchmark was wanted")
 
 
 def command(options: Arguments) -> int:
-    """Do what is wanted."""
     actions = {"run": _run, "suite": _suite, "verify": _verify, "page": _page, "references": _references}
     return actions[options.action](options)
 
@@ -107,21 +103,16 @@ def _run(options: Arguments) -> int:
     with Interruption() as stop:
         result = run_benchmark(contender, selection, out, stop=stop, quiet=options.json, **where)
     if result is None:
-        print(
-            json.dumps({"out": str(out), "interrupted": True})
-            if options.json
-            else "stopped; the same command goes on"
-        )
+        tell(options, {"out": str(out), "interrupted": True}, "stopped; the same command goes on")
         return INTERRUPTED
-    failed = sum("error" in row for row in result["rows"])
-    if options.json:
-        print(json.dumps({"out": str(out), "runs": len(result["rows"]), "failed": failed}))
-    else:
+    runs, failed = len(result["rows"]), sum("error" in row for row in result["rows"])
+    if not options.json:
         from robocov_app.benchmark.ratings import summary_rows
 
-        head, rows = summary_rows(result)
-        print_table([(name, RIGHT if k else BOLD) for k, name in enumerate(head)], rows)
-        print(f"{counted(len(result['rows']), 'run')}, {failed} failed; written to {out / RESULT}")
+        (first, *others), rows = summary_rows(result)
+        print_table([(first, BOLD), *((name, RIGHT) for name in others)], rows)
+    words = f"{counted(runs, 'run')}, {failed} failed; written to {out / RESULT}"
+    tell(options, {"out": str(out), "runs": runs, "failed": failed}, words)
     return FAILED if failed else 0
 
 
@@ -130,30 +121,17 @@ def _suite(options: Arguments) -> int:
 
     if options.json:
         tracks = {name: {"maps": track.maps, "seeds": track.seeds} for name, track in suite.TRACKS.items()}
-        print(json.dumps({"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK}))
+        tell(options, {"version": suite.VERSION, "tracks": tracks, "quick": suite.QUICK})
         return 0
-    rows = [
-        (
-            name,
-            str(len(track.maps)),
-            str(len(track.maps) * len(track.seeds)),
-            str(track.robots),
-            track.summary,
-        )
-        for name, track in suite.TRACKS.items()
-    ]
-    columns: list[tuple[str, Any]] = [
-        ("Track", BOLD),
-        ("Maps", RIGHT),
-        ("Runs", RIGHT),
-        ("Robots", RIGHT),
-        ("", {}),
-    ]
+    rows = []
+    for name, track in suite.TRACKS.items():
+        counts = len(track.maps), len(track.maps) * len(track.seeds), track.robots
+        rows.append((name, *map(str, counts), track.summary))
+    columns = [("Track", BOLD), ("Maps", RIGHT), ("Runs", RIGHT), ("Robots", RIGHT), ("", {})]
     print_table(columns, rows, title=f"Suite {suite.VERSION}; --quick takes {', '.join(suite.QUICK)}")
     print()
-    print_table(
-        [("Family", BOLD), ("Maps", {})], [(name, ", ".join(own)) for name, own in suite.FAMILIES.items()]
-    )
+    families = [(name, ", ".join(own)) for name, own in suite.FAMILIES.items()]
+    print_table([("Family", BOLD), ("Maps", {})], families)
     return 0
 
 
@@ -161,20 +139,15 @@ def _verify(options: Arguments) -> int:
     from robocov_app.benchmark.running import verify
     from robocov_app.sweep.executors import processors
 
-    how: dict[str, Any] = {"sample": options.sample, "seed": options.seed, "quiet": options.json}
+    how: dict[str, Any] = {"controller": options.controller, "sample": options.sample, "seed": options.seed}
     with Interruption() as stop:
-        workers = options.workers or processors()
-        count, found = verify(
-            options.paths[0], controller=options.controller, workers=workers, stop=stop, **how
-        )
+        how |= {"workers": options.workers or processors(), "stop": stop, "quiet": options.json}
+        count, found = verify(options.paths[0], **how)
         if stop.requested:
             return INTERRUPTED
-    if options.json:
-        print(json.dumps({"path": str(options.paths[0]), "runs": count, "differences": found}))
-    else:
-        print(*found, sep="\n", end="\n" if found else "")
-        verdict = f"{counted(len(found), 'difference')}" if found else "all alike, bit for bit"
-        print(f"{counted(count, 'run')} done again: {verdict}")
+    verdict = counted(len(found), "difference") if found else "all alike, bit for bit"
+    answer = {"path": str(options.paths[0]), "runs": count, "differences": found}
+    tell(options, answer, *found, f"{counted(count, 'run')} done again: {verdict}")
     return FAILED if found else 0
 
 
@@ -192,7 +165,7 @@ def _page(options: Arguments) -> int:
     with written(target) as part:
         part.write_bytes(data)
     answer = {"path": str(target), "bytes": len(data), "entries": len(results)}
-    print(json.dumps(answer) if options.json else f"written to {target} ({len(data) / 1e6:.2f} MB)")
+    tell(options, answer, f"written to {target} ({len(data) / 1e6:.2f} MB)")
     return 0
 
 
@@ -207,5 +180,5 @@ def _references(options: Arguments) -> int:
     with Interruption() as stop:
         held, left = make_references(target, workers=workers, quiet=options.json, stop=stop)
     answer = {"path": str(target), "references_and_bounds": held, "left": left}
-    print(json.dumps(answer) if options.json else f"{target}: {held} references and bounds, {left} left")
+    tell(options, answer, f"{target}: {held} references and bounds, {left} left")
     return INTERRUPTED if left else 0

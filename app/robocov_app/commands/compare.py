@@ -1,20 +1,25 @@
 """`robocov compare`."""
 
-from __future__ import annotations
-
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from robocov.errors import ParameterError
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED
-from robocov_app.terminal.output import BOLD, RIGHT, finite, listed, print_table
+from robocov_app.terminal.output import BOLD, RIGHT, listed, print_table, tell
 
-if TYPE_CHECKING:
-    from robocov.environment import Environment
+_COLUMNS = {
+    "": "{label}",
+    "mean distance": "{mean_distance_m:.3f} m",
+    "mean time": "{mean_time_s:.3f} s",
+    "above best": "{above_best:.1%}",
+    "cost": "{cost_m3:.2f} m³",
+    "settled": "{settled}",
+    "contacts": "{contacts}",
+    "clearance": "{min_clearance_m:.3f} m",
+    "path": "{mean_path_length_m:.2f} m",
+}
 
 
 @dataclass
@@ -33,8 +38,8 @@ class Arguments(RunOptions):
 
 
 def command(options: Arguments) -> int:
-    """Run every controller, then draw them together."""
     from robocov.mapfile import load_map
+    from robocov_app.render.density import density_lines
     from robocov_app.runs.artifacts import gains_for, performed, rows_of
     from robocov_app.runs.saved import folder_names
 
@@ -49,40 +54,19 @@ def command(options: Arguments) -> int:
     specs = [options.spec(environment, name, chosen) for name, chosen in zip(names, gains, strict=True)]
     options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-comparison")
-    runs, stopped = performed(
-        dict(zip(folder_names(names), specs, strict=True)), out, options, comparison=True
-    )
+    folders = dict(zip(folder_names(names), specs, strict=True))
+    runs, stopped = performed(folders, out, options, comparison=True)
     rows = rows_of(runs)
-    if options.json:
-        print(json.dumps(finite({"out": str(out), "interrupted": stopped, "runs": rows})))
-    else:
-        print_rows(rows, next(iter(runs.values())).record.environment)
-        done = "stopped; what was done is in" if stopped else "saved in"
-        print(f"{done} {out}/: {listed(out)}{options.record_words}")
+    columns = dict(_COLUMNS)
+    if not all("mean_time_s" in row for row in rows):
+        del columns["mean time"]
+    cells = []
+    for row in rows:
+        settled = "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s"
+        cells.append([text.format(**row, settled=settled) for text in columns.values()])
+    if not options.json:
+        print_table([(title, RIGHT if title else BOLD) for title in columns], cells)
+    done = "stopped; what was done is in" if stopped else "saved in"
+    answer = {"out": str(out), "interrupted": stopped, "runs": rows}
+    tell(options, answer, *density_lines(environment), f"{done} {out}/: {listed(out)}{options.record_words}")
     return INTERRUPTED if stopped else 0
-
-
-def print_rows(rows: list[dict[str, Any]], environment: Environment) -> None:
-    """Print the comparison for people."""
-    from robocov_app.render.density import density_lines
-
-    timed = all("mean_time_s" in row for row in rows)
-    titles = ["mean distance", *(["mean time"] if timed else []), "above best"]
-    titles += ["cost", "settled", "contacts", "clearance", "path"]
-    cells = (
-        (
-            row["label"],
-            f"{row['mean_distance_m']:.3f} m",
-            *([f"{row['mean_time_s']:.3f} s"] if timed else []),
-            f"{row['above_best']:.1%}",
-            f"{row['cost_m3']:.2f} m³",
-            "not yet" if row["settled_at_s"] is None else f"{row['settled_at_s']:.1f} s",
-            str(row["contacts"]),
-            f"{row['min_clearance_m']:.3f} m",
-            f"{row['mean_path_length_m']:.2f} m",
-        )
-        for row in rows
-    )
-    print_table([("", BOLD), *((title, RIGHT) for title in titles)], cells)
-    for line in density_lines(environment):
-        print(line)

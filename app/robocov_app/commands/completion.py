@@ -1,6 +1,5 @@
 """`robocov completion`."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from importlib import import_module
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -51,14 +50,11 @@ class Arguments:
 
 
 def command(options: Arguments) -> None:
-    """Print the script."""
-    kinds = {
-        name: import_module(f"robocov_app.commands.{module}").Arguments
-        for name, (module, _) in COMMANDS.items()
-    }
-    flags = {name: ["--help", *_flags(kind)] for name, kind in kinds.items()}
-    words = {name: found for name, kind in kinds.items() if (found := _words(kind))}
-    mapped = [name for name, kind in kinds.items() if {"map", "files"} & {*_positionals(kind)}]
+    flags, words, mapped = {}, {}, []
+    for name, (module, _) in COMMANDS.items():
+        own, words[name], positionals = _described(import_module(f"robocov_app.commands.{module}").Arguments)
+        flags[name] = ["--help", *own]
+        mapped += [name] * bool({"map", "files"} & positionals)
     maps, controllers = " ".join(bundled_maps()), " ".join(CONTROLLERS)
     if options.shell == "fish":
         print("complete -c robocov -n __fish_use_subcommand -f")
@@ -69,47 +65,29 @@ def command(options: Arguments) -> None:
             for flag in flags[name]:
                 more = f" -x -a '{controllers}'" if flag in ("--controller", "--controllers") else ""
                 print(f"{seen} -l {flag[2:]}{more}")
-            if offered := maps if name in mapped else " ".join(words.get(name, ())):
+            if offered := maps if name in mapped else " ".join(words[name]):
                 print(f"{seen} -a '{offered}'")
         return
-    print(_ZSH * (options.shell == "zsh"), end="")
-    script = _BASH.format(
-        commands=" ".join(COMMANDS),
-        controllers=controllers,
-        maps=maps,
-        mapped="|".join(mapped),
-        options="\n".join(_case(name, own) for name, own in flags.items()),
-        words="\n".join(_case(name, own) for name, own in words.items()),
-    )
-    print(script, end="")
+    cases = [
+        "\n".join(f'                {name}) names="{" ".join(own)}" ;;' for name, own in some.items() if own)
+        for some in (flags, words)
+    ]
+    names: dict[str, str] = {"commands": " ".join(COMMANDS), "controllers": controllers, "maps": maps}
+    script = _BASH.format(**names, mapped="|".join(mapped), options=cases[0], words=cases[1])
+    print(_ZSH * (options.shell == "zsh") + script, end="")
 
 
-def _case(name: str, words: list[str]) -> str:
-    return f'                {name}) names="{" ".join(words)}" ;;'
-
-
-def _positionals(kind: Any) -> Iterator[str]:
-    """Yield the names of positional arguments."""
-    for name, hint in get_type_hints(kind, include_extras=True).items():
-        if tyro.conf.Positional in getattr(hint, "__metadata__", ()):
-            yield name
-
-
-def _words(kind: Any) -> list[str]:
-    """Return the words that a positional argument may be."""
-    hints = get_type_hints(kind)
-    choices = [hints[name] for name in _positionals(kind) if get_origin(hints[name]) is Literal]
-    return [str(word) for choice in choices for word in get_args(choice)]
-
-
-def _flags(kind: Any) -> Iterator[str]:
-    """Yield the options that a command has, with those of its groups."""
-    groups, places = groups_of(kind), {*_positionals(kind)}
-    hints = get_type_hints(kind, include_extras=True)
+def _described(kind: Any) -> tuple[list[str], list[str], set[str]]:
+    """Return a command's options, its groups' too, and words and names of its positional arguments."""
+    hints, plain, groups = get_type_hints(kind, include_extras=True), get_type_hints(kind), groups_of(kind)
+    flags, positionals = [], set()
+    words: list[str] = []
     for each in fields(kind):
-        if each.default_factory not in groups and each.name not in places:
-            told = [getattr(more, "name", None) for more in getattr(hints[each.name], "__metadata__", ())]
-            name = next(filter(None, told), each.name).replace("_", "-")
-            yield f"--{'no-' * (each.default is True)}{name}"
-    for group in groups:
-        yield from _flags(group)
+        more = getattr(hints[each.name], "__metadata__", ())
+        if tyro.conf.Positional in more:
+            positionals.add(each.name)
+            words += get_args(plain[each.name]) if get_origin(plain[each.name]) is Literal else ()
+        elif each.default_factory not in groups:
+            name = next((told.name for told in more if getattr(told, "name", None)), each.name)
+            flags.append(f"--{'no-' * (each.default is True)}{name.replace('_', '-')}")
+    return flags + [flag for group in groups for flag in _described(group)[0]], words, positionals

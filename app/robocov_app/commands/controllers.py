@@ -1,6 +1,5 @@
 """`robocov controllers`."""
 
-import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ from rich.text import Text
 from robocov.controllers import FLAGSHIP, controller_kinds, gains_of, information_of
 from robocov.controllers.gains import Gain, Option, value_text
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.output import console
+from robocov_app.terminal.output import console, tell
 
 
 @dataclass
@@ -24,32 +23,20 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Print the list."""
-    kinds = controller_kinds()
-    if options.json:
-        rows = [
-            {
-                "name": name,
-                "label": getattr(kind, "label", name),
-                "summary": getattr(kind, "summary", ""),
-                "flagship": name == FLAGSHIP,
-                "information": information_of(kind),
-                "gains": [_told(gain) for gain in gains_of(kind).values()],
-            }
-            for name, kind in kinds.items()
-        ]
-        print(json.dumps({"controllers": rows}, indent=1))
-        return
-    out = console()
-    for name, kind in kinds.items():
-        mark = "   (recommended)" if name == FLAGSHIP else ""
-        information = information_of(kind)
-        if information != "own":
-            mark += f"   (informed: {information})"
-        out.print(Text.assemble((name, "bold"), f"   {getattr(kind, 'label', name)}{mark}"))
-        out.print(Text(f"  {getattr(kind, 'summary', '')}"))
+    out, rows = console(), []
+    for name, kind in controller_kinds().items():
+        label, summary = getattr(kind, "label", name), getattr(kind, "summary", "")
+        information, gains = information_of(kind), gains_of(kind).values()
+        row = {"name": name, "label": label, "summary": summary, "flagship": name == FLAGSHIP}
+        rows.append(row | {"information": information, "gains": list(map(_told, gains))})
+        if options.json:
+            continue
+        mark = "   (recommended)" * (name == FLAGSHIP)
+        mark += f"   (informed: {information})" * (information != "own")
+        out.print(Text.assemble((name, "bold"), f"   {label}{mark}"))
+        out.print(Text(f"  {summary}"))
         table = Table(box=None, pad_edge=False, show_header=False, padding=(0, 2, 0, 0))
-        for gain in gains_of(kind).values():
+        for gain in gains:
             default = value_text(gain.default, none="null")
             if isinstance(gain, Option):
                 span = " | ".join(gain.words)
@@ -57,9 +44,8 @@ def command(options: Arguments) -> None:
                 span = f"{gain.low:g} to {gain.high:g}{', or null' if gain.optional else ''}"
             table.add_row("   ", gain.name, f"{default} {gain.unit}", span, gain.meaning)
         out.print(table)
-    out.print(
-        "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
-    )
+    own = "A law of your own: robocov run rooms --controller mine.py:MyController (see robocov handbook)."
+    tell(options, {"controllers": rows}, own, indent=1)
 
 
 def _told(gain: Gain | Option) -> dict[str, Any]:

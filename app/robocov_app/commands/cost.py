@@ -15,7 +15,7 @@ from robocov.mapfile import load_map
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import built_cost, cost_for_pictures, draw_distances
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import finite
+from robocov_app.terminal.output import tell
 
 
 @dataclass
@@ -45,7 +45,6 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    """Evaluate and print."""
     environment = load_map(options.map)
     robots = read_positions(options.positions)
     speeds = speeds_of(options.speeds, len(robots))
@@ -59,31 +58,23 @@ def command(options: Arguments) -> None:
         chosen = timed or result
         arrays: dict[str, Any] = {"points": cost.points, "distances": chosen.distances, "owner": chosen.owner}
         with written(options.sites) as part, part.open("wb") as file:
-            np.savez(file, **arrays | ({} if timed is None else {"times": timed.times}))
+            np.savez(file, **arrays if timed is None else arrays | {"times": timed.times})
     if options.plot is not None:
         mean = f"{mean_label(environment)} {result.mean_distance:.3f} m"
         mean = mean if timed is None else f"mean time {timed.mean_time:.3f} s"
         fine = cost_for_pictures(environment, cost)
         title, theme = "Coverage cost", options.theme
         draw_distances(options.plot, fine, robots, mean, title=title, theme=theme, speeds=speeds)
-    if options.json:
-        answer = {
-            "mean_distance_m": result.mean_distance,
-            **({} if timed is None else {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}),
-            "cost_m3": result.value,
-            "uncovered_area_m2": result.uncovered_area,
-            "robots": len(robots),
-            "sites": len(cost.points),
-            "density": density_kind(environment),
-        }
-        print(json.dumps(finite(answer)))
-        return
-    print(f"mean distance   {result.mean_distance:.4f} m")
+    answer: dict[str, Any] = {"mean_distance_m": result.mean_distance}
+    lines = [f"mean distance   {result.mean_distance:.4f} m"]
     if timed is not None:
-        print(f"mean time       {timed.mean_time:.4f} s")
-    print(f"coverage cost   {result.value:.3f} m³")
-    print(f"uncovered area  {result.uncovered_area:.3f} m²", *density_lines(environment), sep="\n")
-    print(f"on {len(cost.points)} sites, {len(robots)} robots")
+        answer |= {"mean_time_s": timed.mean_time, "cost_m2_s": timed.value}
+        lines += [f"mean time       {timed.mean_time:.4f} s"]
+    answer |= {"cost_m3": result.value, "uncovered_area_m2": result.uncovered_area, "robots": len(robots)}
+    answer |= {"sites": len(cost.points), "density": density_kind(environment)}
+    lines += [f"coverage cost   {result.value:.3f} m³", f"uncovered area  {result.uncovered_area:.3f} m²"]
+    lines += [*density_lines(environment), f"on {len(cost.points)} sites, {len(robots)} robots"]
+    tell(options, answer, *lines)
 
 
 def speeds_of(given: tuple[float, ...], robots: int) -> Array | None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -75,7 +75,6 @@ class Arguments(ScenarioOptions, WindowOptions, LayerOptions):
 
 
 def command(options: Arguments) -> int:
-    """Open the window, or render it without a display."""
     from robocov.compiled import on_compile
     from robocov.controllers import controller_kinds
     from robocov_app.toolkit.window import show_compiling
@@ -100,22 +99,11 @@ def command(options: Arguments) -> int:
     else:
         session = session_of(options)
     also, without = options.layers()
-    opening = Launcher(
-        session,
-        name,
-        options.folder,
-        theme=options.theme,
-        size=window_size(options.size),
-        scale=options.scale,
-        also=also,
-        without=without,
-        headless=headless,
-        served=serving is not None,
-        laws=laws,
-        lattice=options.lattice,
-        file=file,
-        offers_lesson=file is None and options.lesson is None and not options.tour,
-    )
+    look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
+    look |= {"also": also, "without": without, "headless": headless, "served": serving is not None}
+    first = file is None and options.lesson is None and not options.tour
+    given: dict[str, Any] = {"laws": laws, "lattice": options.lattice, "file": file, "offers_lesson": first}
+    opening = Launcher(session, name, options.folder, **look, **given)
     if headless:
         return rendered(opening, options)
     with opening.window() as window:
@@ -132,7 +120,6 @@ def _begin_lesson(window: Window, options: Arguments) -> None:
 
 
 def session_of(options: Arguments) -> Session:
-    """Return the session that the options describe."""
     from robocov.mapfile import load_map
     from robocov.robots import read_team
     from robocov_app.viewer.session.scenario import ControllerChoice, Scenario, TeamSpec
@@ -153,7 +140,6 @@ def session_of(options: Arguments) -> Session:
 
 
 def rendered(opening: Launcher, options: Arguments) -> int:
-    """Render frames of the window without a display."""
     from robocov.files.atomic import writable
     from robocov.files.result_folder import results
     from robocov_app.runs.recording import encoder, save_moving_picture
@@ -163,11 +149,8 @@ def rendered(opening: Launcher, options: Arguments) -> int:
     if options.video is not None:
         writable(options.video)
         encoder()
-    with ExitStack() as stack:
-        out = None
-        if options.out is not None:
-            out = stack.enter_context(results(options.out, overwrite=False)).new
-        window, stop = stack.enter_context(opening.window()), stack.enter_context(Interruption())
+    made = nullcontext() if options.out is None else results(options.out, overwrite=False)
+    with made as result, opening.window() as window, Interruption() as stop:
         _begin_lesson(window, options)
         count = options.frames
         if count is None:
@@ -183,8 +166,8 @@ def rendered(opening: Launcher, options: Arguments) -> int:
                     yield pixels(window.screen)
                     update(done + 1)
 
+            out = None if result is None else result.new
             save_moving_picture(frames(), out, options.video, HEADLESS_FPS)
-    for target in (options.out, options.video):
-        if target is not None:
-            print(f"saved {target}")
+    for target in filter(None, (options.out, options.video)):
+        print(f"saved {target}")
     return INTERRUPTED if stop.requested else 0

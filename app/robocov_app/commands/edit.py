@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -40,24 +40,21 @@ class Arguments(WindowOptions):
 
 
 def command(options: Arguments) -> int:
-    """Open the editor, or save a picture of it."""
+    from robocov.mapfile import bundled_maps, map_file
     from robocov_app.editor.ui.launch import editor_window
     from robocov_app.web import serve_each, show, web_display
 
     if options.each:
         return serve_each(command, options)
     serving = web_display(options.serve, options.host, options.port, options.folder)
-    opening = editor_window(
-        None if options.map is None else map_path(options.map),
-        options.folder,
-        background=options.background,
-        theme=options.theme,
-        size=window_size(options.size),
-        scale=options.scale,
-        headless=options.screenshot is not None,
-        served=serving is not None,
-    )
-    with opening as window:
+    look: dict[str, Any] = {"theme": options.theme, "size": window_size(options.size), "scale": options.scale}
+    look |= {"headless": options.screenshot is not None, "served": serving is not None}
+    path = None if options.map is None else Path(options.map)
+    if options.map in bundled_maps() or (path is not None and not path.suffix):
+        path = map_file(str(options.map))
+    elif path is not None and path.suffix.lower() != ".json" and not path.is_file():
+        raise MapError(f"{options.map}: there is no such file")
+    with editor_window(path, options.folder, background=options.background, **look) as window:
         if options.screenshot is None:
             show(window, serving)
             return 0
@@ -73,15 +70,3 @@ def command(options: Arguments) -> int:
             part.write_bytes(png_bytes(pixels(window.screen)))
     print(f"saved {options.screenshot}")
     return 0
-
-
-def map_path(name: str) -> Path:
-    """Return the file that is meant: a path, or that of a bundled map; raises MapError."""
-    from robocov.mapfile import bundled_maps, map_file
-
-    path = Path(name)
-    if name not in bundled_maps() and path.suffix:
-        if path.suffix.lower() != ".json" and not path.is_file():
-            raise MapError(f"{name}: there is no such file")
-        return path
-    return map_file(name)

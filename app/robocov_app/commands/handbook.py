@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
 import subprocess
 import sys
@@ -30,24 +31,28 @@ class Arguments:
 
 
 def command(options: Arguments) -> None:
-    """Build the pages where they are missing or old, and open or name them."""
     if options.out is not None:
         built(options.out)
         print(f"saved in {options.out}/: begin with index.html")
         return
     import webbrowser
 
+    import robocov
     from robocov.files.array_files import ArrayCache
 
     cache = ArrayCache.of_user()
     home = Path(tempfile.mkdtemp(prefix="robocov-")) if cache is None else cache.folder / "handbook"
-    pages = home / state_of_sources()
-    if not (pages / "index.html").is_file():
+    # another folder when a page or a module of the program has changed
+    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
+    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
+    written = [file for file in files if sources() / "reference" not in file.parents]
+    pages = home / ArrayCache.key(*(f"{file} {file.stat().st_mtime_ns}" for file in written))
+    index = pages / "index.html"
+    if not index.is_file():
         if cache is not None:
             shutil.rmtree(home, ignore_errors=True)  # those of an earlier state
         print("building the handbook, once ...", file=sys.stderr)
         built(pages)
-    index = pages / "index.html"
     print(index)
     webbrowser.open(index.as_uri())
 
@@ -58,18 +63,6 @@ def sources() -> Path:
     return next(each for each in (app / "handbook", app.parent / "handbook") if each.is_dir())
 
 
-def state_of_sources() -> str:
-    """Return a name that changes when a page or a module of the program does."""
-    import robocov
-    from robocov.files.array_files import ArrayCache
-
-    roots = (sources(), Path(__file__).parents[1], Path(robocov.__file__).parent)
-    files = sorted(file for root in roots for file in root.rglob("*") if file.suffix in (".py", ".md"))
-    generated = sources() / "reference"
-    stats = (f"{file} {file.stat().st_mtime_ns}" for file in files if generated not in file.parents)
-    return ArrayCache.key(*stats)
-
-
 def built(folder: Path) -> None:
     """Build the pages into a new folder; a warning of Sphinx is an error.
 
@@ -77,14 +70,19 @@ def built(folder: Path) -> None:
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists already; a new or an empty folder was wanted")
-    _require_sphinx()
+    needed = "sphinx", "furo", "myst_parser"
+    if missing := [name for name in needed if importlib.util.find_spec(name) is None]:
+        raise RobocovError(
+            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
+            f"the pages can be read as text, too: {sources() / 'index.md'}"
+        )
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".handbook-") as work:
             # a copy: the reference is written beside the other pages, and packages may be read-only
             copy, pages = Path(work, "sources"), Path(work, "pages")
             shutil.copytree(sources(), copy, ignore=shutil.ignore_patterns("reference", "__pycache__"))
-            call = [*(sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html")]
+            call = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
             call += ["-d", str(Path(work, "doctrees")), str(copy), str(pages)]
             done = subprocess.run(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             if done.returncode:
@@ -92,13 +90,3 @@ def built(folder: Path) -> None:
             pages.replace(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror}") from error
-
-
-def _require_sphinx() -> None:
-    from importlib.util import find_spec
-
-    if missing := [name for name in ("sphinx", "furo", "myst_parser") if find_spec(name) is None]:
-        raise RobocovError(
-            f'{missing[0]} is not installed: pip install "robocov[docs]"; '
-            f"the pages can be read as text, too: {sources() / 'index.md'}"
-        )

@@ -1,6 +1,5 @@
 """`robocov lesson`."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -8,6 +7,7 @@ from typing import Literal
 import tyro
 
 from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.output import tell
 
 
 @dataclass
@@ -28,7 +28,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
-    """Play all chapters without a window, and say how each ends."""
     from robocov.compiled import compile_kernels
     from robocov_app.viewer.lessons import checked, load_lesson
 
@@ -36,11 +35,9 @@ def command(options: Arguments) -> int:
     assert saved.lesson is not None
     compile_kernels()
     chapters = checked(saved)
-    if options.json:
-        rows = [{"title": title, "seconds": seconds, "ends": ends} for title, seconds, ends in chapters]
-        print(json.dumps({"title": saved.lesson.title, "chapters": rows}))
-    else:
-        print(saved.lesson.title)
-        for k, (title, seconds, ends) in enumerate(chapters, 1):
-            print(f"  {k:2}  {title:44}  {f'ends after {seconds:.1f} s' if ends else 'never ends'}")
+    rows, lines = [], [saved.lesson.title]
+    for k, (title, seconds, ends) in enumerate(chapters, 1):
+        rows.append({"title": title, "seconds": seconds, "ends": ends})
+        lines.append(f"  {k:2}  {title:44}  {f'ends after {seconds:.1f} s' if ends else 'never ends'}")
+    tell(options, {"title": saved.lesson.title, "chapters": rows}, *lines)
     return 0 if all(ends for *_, ends in chapters) else 2

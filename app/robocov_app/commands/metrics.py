@@ -1,6 +1,6 @@
 """`robocov metrics`."""
 
-import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,7 +9,7 @@ import tyro
 
 from robocov.errors import checked
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import BOLD, RIGHT, print_table, write_csv
+from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell, write_csv
 from robocov_app.terminal.progress import counting, progress
 
 
@@ -35,15 +35,14 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    """Measure, write and print."""
     from robocov.files.result_folder import extended
     from robocov.metrics.run_metrics import COLUMNS, run_metrics, time_near_final
     from robocov.record import nearest_moments
     from robocov_app.figures.metrics import Measured
     from robocov_app.runs.saved import load_saved
 
-    measured, answers = [], []
-    runs = load_saved(options.folder)
+    measured, runs = [], load_saved(options.folder)
+    answers: list[dict[str, Any]] = []
     folder = options.folder if options.folder.is_dir() else options.folder.parent
     with extended(folder) as result:
         for saved in runs:
@@ -58,40 +57,37 @@ def command(options: Arguments) -> None:
             about = {"folder": str(saved.folder), "controller": record.controller, "label": record.label}
             near = None if history is None or not len(history.time) else time_near_final(history)
             figures = {"free_area_m2": metrics.free_area, **metrics.final(), "near_final_s": near}
-            answers.append({**about, **figures})
+            answers.append(about | figures)
     if options.plot is not None:
         from robocov_app.figures.files import save_figure
         from robocov_app.figures.metrics import plot_metrics
 
         title = f"Metrics  ·  {options.folder.name}"
         save_figure(plot_metrics(measured, options.theme, title=title), options.plot)
-    if options.json:
-        print(json.dumps({"runs": answers}))
-    else:
-        print_answers(answers)
+    if not options.json:
+        print_table([(title, RIGHT if title else BOLD) for title in _COLUMNS], map(_cells, answers))
+    folders = ", ".join(answer["folder"] for answer in answers)
+    tell(options, {"runs": answers}, f"written to metrics.csv in {folders}")
 
 
-def print_answers(answers: list[dict[str, Any]]) -> None:
-    """Print the figures of all runs for people."""
+_COLUMNS = {
+    # title: name and format of a figure; areas are told as parts of the free area
+    "": ("label", "{}"),
+    "sensed": ("sensed_area_m2", "{:.1%}"),
+    "visible": ("visible_area_m2", "{:.1%}"),
+    "work": ("work_J", "{:.1f} J"),
+    "effort": ("effort_N2_s", "{:.1f} N²s"),
+    "way": ("path_length_m", "{:.2f} m"),
+    "within 5 %": ("near_final_s", "{:.1f} s"),
+    "parts": ("components", "{:.0f}"),
+    "to walls": ("wall_clearance_m", "{:.3f} m"),
+    "to robots": ("robot_clearance_m", "{:.3f} m"),
+}
 
-    def text(value: float | None, decimals: int, unit: str) -> str:
-        return "–" if value is None else f"{value:.{decimals}f} {unit}"
 
-    titles = ("sensed", "visible", "work", "effort", "way", "within 5 %", "parts", "to walls", "to robots")
-    rows = (
-        (
-            answer["label"],
-            f"{answer['sensed_area_m2'] / answer['free_area_m2']:.1%}",
-            f"{answer['visible_area_m2'] / answer['free_area_m2']:.1%}",
-            f"{answer['work_J']:.1f} J",
-            f"{answer['effort_N2_s']:.1f} N²s",
-            f"{answer['path_length_m']:.2f} m",
-            text(answer["near_final_s"], 1, "s"),
-            f"{answer['components']:.0f}",
-            text(answer["wall_clearance_m"], 3, "m"),
-            text(answer["robot_clearance_m"], 3, "m"),
-        )
-        for answer in answers
-    )
-    print_table([("", BOLD), *((title, RIGHT) for title in titles)], rows)
-    print("written to metrics.csv in", ", ".join(answer["folder"] for answer in answers))
+def _cells(answer: dict[str, Any]) -> Iterator[str]:
+    for name, template in _COLUMNS.values():
+        value = answer[name]
+        if value is not None and name.endswith("area_m2"):
+            value /= answer["free_area_m2"]
+        yield "–" if value is None else template.format(value)

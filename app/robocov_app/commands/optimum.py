@@ -9,18 +9,17 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from robocov.environment import Environment
 from robocov.errors import InputError, ParameterError, checked, counted
 from robocov.files.atomic import written
 from robocov.lower_bound import FINEST, LowerBound, lower_bound
 from robocov.mapfile import load_map
-from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, Optimum, optimum
+from robocov.optimum import MOST_RESTARTS, MOST_ROBOTS, optimum
 from robocov.robots import DEFAULT_RADIUS
 from robocov_app.render.density import density_kind, density_lines, mean_label
 from robocov_app.runs.cost import PICTURE_LATTICE, built_cost, draw_distances
 from robocov_app.runs.options import PlotOptions
 from robocov_app.runs.saved import Saved, load_saved
-from robocov_app.terminal.output import finite, require_fresh
+from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import late_progress
 
 _ROBOTS = 6
@@ -79,7 +78,6 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    """Search, save and print."""
     saved: list[Saved] = []
     if options.run is not None:
         saved = load_saved(options.run)
@@ -92,15 +90,24 @@ def command(options: Arguments) -> None:
         radius = DEFAULT_RADIUS if options.radius is None else options.radius
     lattice, began = options.lattice, time.perf_counter()
     search: dict[str, Any] = {"lattice": lattice, "restarts": options.restarts, "seed": options.seed}
-    with late_progress("searching", quiet=options.json) as tell:
-        best = optimum(environment, robots, radius=radius, progress=tell, **search)
+    with late_progress("searching", quiet=options.json) as update:
+        best = optimum(environment, robots, radius=radius, progress=update, **search)
     seconds = time.perf_counter() - began
     bound: LowerBound | None = None
     if options.bound:
-        with late_progress("proving the bound", quiet=options.json) as tell:
-            how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": tell}
+        with late_progress("proving the bound", quiet=options.json) as update:
+            how: dict[str, Any] = {"lattice": lattice, "precision": options.precision, "progress": update}
             bound = lower_bound(environment, best.positions, radius=radius, **how)
-    gaps = gaps_of(saved, best, environment, options)
+    gaps = []
+    if saved:
+        lattice_cost = built_cost(environment, lattice, quiet=options.json)
+        for each in saved:
+            if len(each.record.team) != robots:
+                raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
+            result = lattice_cost(each.record.positions[-1])
+            alike = abs(result.uncovered_area - best.uncovered_area) < 1e-6  # the same components are covered
+            gap = best.gap(result.mean_distance) if alike else None
+            gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
     if options.positions is not None:
         rows = ",\n ".join(json.dumps(place) for place in best.positions.tolist())
         with written(options.positions) as part:
@@ -110,59 +117,28 @@ def command(options: Arguments) -> None:
         mean = f"{mean_label(environment)} {best.mean_distance:.3f} m"
         title, theme = "Best positions found", options.theme
         draw_distances(options.plot, cost, best.positions, mean, title=title, theme=theme, radius=radius)
-    if options.json:
-        answer = {
-            "mean_distance_m": best.mean_distance,
-            "cost_m3": best.value,
-            "uncovered_area_m2": best.uncovered_area,
-            "density": density_kind(environment),
-            "robots": robots,
-            "positions_m": best.positions.tolist(),
-            "restarts": len(best.costs),
-            "agreement": {f"{within:g}": best.agreement(within) for within in _WITHIN},
-            "restart_mean_distances_m": best.costs.tolist(),
-            "undescended_mean_distances_m": best.undescended.tolist(),
-            "runs": gaps,
-            "lower_bound": None
-            if bound is None
-            else {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap},
-        }
-        print(json.dumps(finite(answer)))
-        return
-    print(f"mean distance   {best.mean_distance:.4f} m")
-    print(f"coverage cost   {best.value:.3f} m³")
-    print(f"uncovered area  {best.uncovered_area:.3f} m²", *density_lines(environment), sep="\n")
+    agreement, count = {within: best.agreement(within) for within in _WITHIN}, len(best.costs)
+    answer: dict[str, Any] = {"mean_distance_m": best.mean_distance, "cost_m3": best.value}
+    answer |= {"uncovered_area_m2": best.uncovered_area, "density": density_kind(environment)}
+    answer |= {"robots": robots, "positions_m": best.positions.tolist(), "restarts": count}
+    answer |= {"agreement": {f"{within:g}": agreeing for within, agreeing in agreement.items()}}
+    answer |= {"restart_mean_distances_m": best.costs.tolist()}
+    answer |= {"undescended_mean_distances_m": best.undescended.tolist(), "runs": gaps, "lower_bound": None}
+    lines = [f"mean distance   {best.mean_distance:.4f} m", f"coverage cost   {best.value:.3f} m³"]
+    lines += [f"uncovered area  {best.uncovered_area:.3f} m²", *density_lines(environment)]
     if bound is not None:
-        print(
-            f"lower bound     {bound.mean_distance:.4f} m, no placement is more than {bound.gap:.2%} better"
-        )
-    count = len(best.costs)
-    print(f"{counted(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these")
-    for within in _WITHIN:
-        print(f"  within {within:.1%} of the best  {round(best.agreement(within) * count):>4}")
-    print(f"the median restart ends {best.gap(float(np.median(best.costs))):.2%} above the best")
-    print(f"descent of the exact cost gained {best.gap(float(best.undescended.min())):.2%}")
+        proved = {"mean_distance_m": bound.mean_distance, "cost_m3": bound.value, "gap": bound.gap}
+        answer["lower_bound"], better = proved, f"no placement is more than {bound.gap:.2%} better"
+        lines += [f"lower bound     {bound.mean_distance:.4f} m, {better}"]
+    lines += [f"{counted(robots, 'robot')}, {count} restarts in {seconds:.1f} s, of these"]
+    for within, agreeing in agreement.items():
+        lines += [f"  within {within:.1%} of the best  {round(agreeing * count):>4}"]
+    lines += [f"the median restart ends {best.gap(float(np.median(best.costs))):.2%} above the best"]
+    lines += [f"descent of the exact cost gained {best.gap(float(best.undescended.min())):.2%}"]
     for row in gaps:
-        gap = row["gap"]
-        above = "other rooms than the best covers" if gap is None else f"{gap:.1%} above the best"
-        print(f"{row['run']}: mean distance {row['mean_distance_m']:.4f} m, {above}")
+        above = "other rooms than the best covers"
+        above = above if row["gap"] is None else f"{row['gap']:.1%} above the best"
+        lines += [f"{row['run']}: mean distance {row['mean_distance_m']:.4f} m, {above}"]
     if options.positions is None:
-        print("positions       " + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in best.positions.tolist()))
-
-
-def gaps_of(
-    saved: list[Saved], best: Optimum, environment: Environment, options: Arguments
-) -> list[dict[str, Any]]:
-    """Return how far the ends of runs are above the best; None where one covers other components."""
-    if not saved:
-        return []
-    cost = built_cost(environment, options.lattice, quiet=options.json)
-    gaps = []
-    for each in saved:
-        if len(each.record.team) != len(best.positions):
-            raise InputError(f"{each.folder}: another number of robots than in {saved[0].folder}")
-        result = cost(each.record.positions[-1])
-        alike = abs(result.uncovered_area - best.uncovered_area) < 1e-6
-        gap = best.gap(result.mean_distance) if alike else None
-        gaps.append({"run": each.folder.name, "mean_distance_m": result.mean_distance, "gap": gap})
-    return gaps
+        lines += ["positions       " + ", ".join(f"[{x:.3f}, {y:.3f}]" for x, y in best.positions.tolist())]
+    tell(options, answer, *lines)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,11 +12,11 @@ import tyro
 from robocov.errors import InputError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import BOLD, RIGHT, finite, print_table
+from robocov_app.terminal.output import BOLD, RIGHT, print_table, tell
 
 if TYPE_CHECKING:
     from robocov_app.replication.claims import Claim
-    from robocov_app.replication.results import Forecast, RunnerOptions
+    from robocov_app.replication.results import Forecast
 
 _MOST_WORKERS = 1024
 
@@ -67,7 +65,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
-    """Run the study and write all that comes of it."""
     from robocov_app.replication import claims, pages, results
     from robocov_app.replication.plan import FULL, QUICK
     from robocov_app.replication.results import Interrupted, RunnerOptions, forecast, open_folder
@@ -82,12 +79,12 @@ def command(options: Arguments) -> int:
     more: tuple[Claim, ...] = ()
     paper = beyond = None
     with Interruption() as stop:
-        runner = RunnerOptions(
-            options.workers or processors(), options.scheduler, quiet, stop, options.keep_versions
-        )
+        workers, scheduler = options.workers or processors(), options.scheduler
+        runner = RunnerOptions(workers, scheduler, quiet, stop, options.keep_versions)
         if not quiet:
-            expected = forecast(out, plan, runner.workers, claims=with_claims, beyond=with_beyond)
-            _announce(expected, plan.name, runner)
+            expected = forecast(out, plan, workers, claims=with_claims, beyond=with_beyond)
+            words = _forecast_words(expected, workers, scheduler)
+            print(f"paper ({plan.name}): {words}", file=sys.stderr, flush=True)
         try:
             if with_claims:
                 paper = results.run_paper(out, plan, runner)
@@ -106,55 +103,36 @@ def command(options: Arguments) -> int:
             page = pages.paper_page(plan, images, runs, first, paper, found, more)
             pages.save(out / pages.PAGE, page)
         except Interrupted:
-            if quiet:
-                print(json.dumps({"out": str(out), "interrupted": True}))
-            else:
-                again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
-                print(f"stopped; to go on: robocov paper {again}")
+            again = " ".join(["--out", str(out), *["--quick"] * options.quick, *options.parts])
+            tell(options, {"out": str(out), "interrupted": True}, f"stopped; to go on: robocov paper {again}")
             return INTERRUPTED
-    failed = sum(part.failed for part in (paper, beyond) if part)
-    if options.json:
-        answer = {
-            "out": str(out),
-            "plan": plan.name,
-            "interrupted": False,
-            "runs": (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0),
-            "failed": failed,
-            "page": str(out / "index.html"),
-            "claims": [claim.to_json() for claim in (*found, *more)],
-        }
-        print(json.dumps(finite(answer)))
-        return int(failed > 0)
-    if found or more:
-        print_claims((*found, *more))
-    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(found or more)]
-    print(f"saved in {out}/: {', '.join(written)}, figures/, studies/")
+    failed, verdicts = sum(part.failed for part in (paper, beyond) if part), (*found, *more)
+    if verdicts and not quiet:
+        fold, rows = {"overflow": "fold"}, []
+        for claim in verdicts:
+            measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
+            rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
+        print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
+    written = ["index.html", *["beyond.html"] * with_beyond, *["claims.json"] * bool(verdicts)]
+    lines = [f"saved in {out}/: {', '.join(written)}, figures/, studies/"]
     if failed:
-        print(f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why")
+        lines += [f"{counted(failed, 'run')} failed: the column error in studies/*/results.csv says why"]
+    answer = {"out": str(out), "plan": plan.name, "interrupted": False}
+    answer["runs"] = (paper.runs if paper else len(runs)) + (beyond.runs if beyond else 0)
+    answer |= {"failed": failed, "page": str(out / "index.html")}
+    tell(options, answer | {"claims": [claim.to_json() for claim in verdicts]}, *lines)
     return int(failed > 0)
 
 
-def print_claims(claims: Sequence[Claim]) -> None:
-    """Print the verdicts for people."""
-    fold, rows = {"overflow": "fold"}, []
-    for claim in claims:
-        measured = f"{claim.criteria[0].text}: {claim.criteria[0].found}" if claim.criteria else "–"
-        rows.append((claim.claim, claim.verdict, measured, str(claim.runs)))
-    print_table([("claim", fold), ("verdict", BOLD), ("measured", fold), ("runs", RIGHT)], rows)
-
-
-def _announce(forecast: Forecast, name: str, runner: RunnerOptions) -> None:
+def _forecast_words(forecast: Forecast, workers: int, scheduler: str | None) -> str:
     from robocov_app.sweep.sweeping import duration
 
     if forecast.left == 0:
-        words = f"all {forecast.runs:,} runs are there"
-    else:
-        done = forecast.runs - forecast.left
-        there = f", {done:,} of them there already" if done else ""
-        each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
-        if runner.scheduler:
-            long = f"about {duration(forecast.seconds * runner.workers)} of computing, on a Dask cluster"
-        else:
-            long = f"about {duration(forecast.seconds)} on {runner.workers} processes"
-        words = f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"
-    print(f"paper ({name}): {words}", file=sys.stderr, flush=True)
+        return f"all {forecast.runs:,} runs are there"
+    done = forecast.runs - forecast.left
+    there = f", {done:,} of them there already" if done else ""
+    each = ", ".join(f"{law} {seconds:.2f} s" for law, seconds in forecast.each.items())
+    long = f"about {duration(forecast.seconds)} on {workers} processes"
+    if scheduler:
+        long = f"about {duration(forecast.seconds * workers)} of computing, on a Dask cluster"
+    return f"{forecast.runs:,} runs{there}, {long} (measured: {each} a run); Ctrl-C keeps what is done"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -53,54 +52,44 @@ class Arguments(JsonOption, WebOptions):
         if self.headless and self.controller:
             raise ParameterError("--controller: neither --frames nor --video was wanted beside it")
         if not self.headless:
-            for name, given in (("--out", self.out is not None), ("--json", self.json)):
-                if given:
-                    raise ParameterError(f"{name}: --frames or --video was wanted beside it")
+            for name in ("out", "json"):
+                if getattr(self, name):
+                    raise ParameterError(f"--{name}: --frames or --video was wanted beside it")
             window_size(self.film.size)
 
     @property
     def headless(self) -> bool:
-        """Whether frames or a film are wanted, and no window."""
         return self.film.frames or self.film.video
 
 
 def command(options: Arguments) -> int:
-    """Open the window, or make frames and a film."""
     from robocov_app.runs.saved import load_saved
 
     options.film.layers()
     story = options.run / "session.robocov" if (options.run / "story.json").is_file() else options.run
     if story.suffix == ".robocov":
-        return play_story(options, story)
+        from robocov_app.viewer.session.file import load_session
+        from robocov_app.viewer.session.session import Session
+
+        if options.headless:
+            raise ParameterError(f"{story}: a film of a session is made by robocov run {story} --video")
+        session = Session.opened(load_session(story, options.controller))
+        session.recorded_until = session.end
+        session.look_at(0.0)
+        session.playing = True
+        return open_window(options, session, story)
     saved = load_saved(options.run)
-    return make_film(options, saved) if options.headless else play_runs(options, saved)
-
-
-def play_story(options: Arguments, path: Path) -> int:
-    """Show a session of the window from its beginning."""
-    from robocov_app.viewer.session.file import load_session
-    from robocov_app.viewer.session.session import Session
-
     if options.headless:
-        raise ParameterError(f"{path}: a film of a session is made by robocov run {path} --video")
-    session = Session.opened(load_session(path, options.controller))
-    session.recorded_until = session.end
-    session.look_at(0.0)
-    session.playing = True
-    return open_window(options, session, path)
-
-
-def play_runs(options: Arguments, saved: list[Saved]) -> int:
-    """Show saved runs in the window."""
+        return make_film(options, saved)
     from robocov.controllers import controller_kind
     from robocov_app.viewer.session.recorded import replayed_session
 
     for controller in options.controller:
         controller_kind(controller)
         kind = controller.rpartition(":")[2]
-        if not any(each.record.controller.rpartition(":")[2] == kind for each in saved):
-            names = listed([each.record.controller for each in saved])
-            wanted = f"the controller of a run was wanted: {names}"
+        names = [each.record.controller for each in saved]
+        if kind not in (name.rpartition(":")[2] for name in names):
+            wanted = f"the controller of a run was wanted: {listed(names)}"
             raise ParameterError(f"--controller: {controller}, but {wanted}")
     try:
         session = replayed_session(saved, options.controller)
@@ -111,34 +100,21 @@ def play_runs(options: Arguments, saved: list[Saved]) -> int:
 
 
 def open_window(options: Arguments, session: Session, file: Path | None = None) -> int:
-    """Open the window with a session, and the file that it is from."""
     from robocov.mapfile import bundled_maps, load_map
     from robocov_app.viewer.launch import Launcher
     from robocov_app.web import show, web_display
 
     serving = web_display(options.serve, options.host, options.port, Path())
-    laws, same = options.controller, (key for key in bundled_maps() if load_map(key) == session.environment)
-    name = next(same, session.environment.name)
-    (also, without), theme, size = options.film.layers(), options.film.theme, window_size(options.film.size)
-    opening = Launcher(
-        session,
-        name,
-        Path(),
-        theme=theme,
-        size=size,
-        also=also,
-        without=without,
-        laws=laws,
-        file=file,
-        served=serving is not None,
-    )
-    with opening.window() as window:
+    same = (key for key in bundled_maps() if load_map(key) == session.environment)
+    (also, without), film = options.film.layers(), options.film
+    look: dict[str, Any] = {"theme": film.theme, "size": window_size(film.size), "laws": options.controller}
+    look |= {"also": also, "without": without, "file": file, "served": serving is not None}
+    with Launcher(session, next(same, session.environment.name), Path(), **look).window() as window:
         show(window, serving)
     return 0
 
 
 def make_film(options: Arguments, saved: list[Saved]) -> int:
-    """Make frames and a film of saved runs."""
     import numpy as np
 
     from robocov.files.result_folder import results
@@ -147,22 +123,20 @@ def make_film(options: Arguments, saved: list[Saved]) -> int:
     from robocov_app.runs.run import Run
     from robocov_app.runs.saved import roster_of
 
+    assert options.out is not None
     out = options.out
-    assert out is not None
     for folder in (options.run, *(each.folder for each in saved)):  # no run is replaced by its own film
         if Path(os.path.realpath(folder)).is_relative_to(os.path.realpath(out)):
             raise InputError(f"--out: {out}: another folder than that of the run was wanted")
     runs = [Run(each.record, each.history or CostHistory(*np.empty((4, 0))), {}) for each in saved]
     # robots may have failed at other places in each run: distances are to one map, that without them
     bare = [replace(run, record=replace(run.record, environment=roster_of(run.record)[0])) for run in runs]
+    content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
     with results(out, "replay", overwrite=options.overwrite) as result, Interruption() as stop:
-        content = {"format": "robocov-replay", "version": 1, "of": str(options.run)}
         output.write_json(result.new / "replay.json", content)
         same = bare if len(runs) > 1 else None
         save_moving(runs, None, result.new, options.film, stop, quiet=options.json, bare=same)
-    if options.json:
-        print(json.dumps({"out": str(out), "interrupted": stop.requested}))
-    else:
-        done = "stopped; what was done is in" if stop.requested else "saved in"
-        print(f"{done} {out}/: {output.listed(out)}")
+    done = "stopped; what was done is in" if stop.requested else "saved in"
+    answer = {"out": str(out), "interrupted": stop.requested}
+    output.tell(options, answer, f"{done} {out}/: {output.listed(out)}")
     return INTERRUPTED if stop.requested else 0

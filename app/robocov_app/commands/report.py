@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -17,12 +17,10 @@ from robocov.files.atomic import writable, written
 from robocov.files.result_folder import REPORT, extended, is_report
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import Interruption
+from robocov_app.terminal.output import tell
 from robocov_app.terminal.progress import progress
 
 SESSION = ".robocov"
-
-if TYPE_CHECKING:
-    from robocov_app.report.results import Result
 
 
 @dataclass
@@ -49,7 +47,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Read, draw and write."""
     if not options.folders:
         raise ParameterError("DIR: the folder of a run, a comparison or a sweep was wanted")
     first = options.folders[0]
@@ -84,53 +81,38 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     check_target(target, overwrite=options.overwrite)
     for k, result in enumerate(results):  # reading all takes 10 ms a run
         quiet = options.json or result.kind != "sweep"
-        with progress("runs read", len(result.fine), quiet=quiet) as tell:
-            results[k] = result.readable(tell)
+        with progress("runs read", len(result.fine), quiet=quiet) as update:
+            results[k] = result.readable(update)
     damaged = [(result.folder, each) for result in results for each in result.damaged]
     if not any(result.entries for result in results):
-        folder, lost = damaged[0]
-        raise InputError(f"{folder}: {lost.folder}: {lost.reason}; no run is left to report")
-    for folder, lost in () if options.json else damaged:
-        print(f"robocov: warning: {folder}: {lost.folder} is left out: {lost.reason}", file=sys.stderr)
+        folder, each = damaged[0]
+        raise InputError(f"{folder}: {each.folder}: {each.reason}; no run is left to report")
+    for folder, each in () if options.json else damaged:
+        print(f"robocov: warning: {folder}: {each.folder} is left out: {each.reason}", file=sys.stderr)
     for k, result in enumerate(results):
         quiet, total = options.json or not options.optimum, len({entry.setting for entry in result.fine})
-        with progress("searching", total, quiet=quiet) as tell:
-            results[k] = with_references(result, search=options.optimum, tell=tell)
+        with progress("searching", total, quiet=quiet) as update:
+            results[k] = with_references(result, search=options.optimum, tell=update)
     page = report(results, title=options.title, theme=options.theme)
     data = page.html.encode("utf-8", "replace")
-    if target == options.folders[0] / REPORT and results[0].kind != "sweep":
-        with extended(options.folders[0]) as more, written(more.new / REPORT) as part:
+    with ExitStack() as stack:
+        if target == options.folders[0] / REPORT and results[0].kind != "sweep":
+            more = stack.enter_context(extended(options.folders[0]))
             more.claim(REPORT)
-            part.write_bytes(data)
-    else:
-        with written(target) as part:
-            part.write_bytes(data)
-    if options.json:
-        shown = zip(parts, results, page.shown, strict=True)
-        counts = [
-            {"folder": str(folder), **counts_of(result), "shown": count}
-            for (folder, _), result, count in shown
-        ]
-        print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
-        return
-    for result in results:
-        words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
-        words += [f"{len(result.failed)} failed"] * bool(result.failed)
-        words += [f"{len(result.damaged)} cannot be read"] * bool(result.damaged)
+            stack.enter_context(written(more.new / REPORT)).write_bytes(data)
+        else:
+            stack.enter_context(written(target)).write_bytes(data)
+    counts, lines = [], []
+    for (folder, _), result, shown in zip(parts, results, page.shown, strict=True):
+        runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
+        count = {"folder": str(folder), "kind": result.kind, "runs": runs, "failed": failed, "damaged": lost}
+        counts.append(count | {"missing": result.missing, "shown": shown})
+        words = [f"{result.folder}: {result.kind} of {counted(runs, 'run')}"]
+        words += [f"{failed} failed"] * bool(failed) + [f"{len(lost)} cannot be read"] * bool(lost)
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
-        print(", ".join(words))
-    print(f"written to {target} ({len(data) / 1e6:.2f} MB)")
-
-
-def counts_of(result: Result) -> dict[str, object]:
-    """Return what programs are told of a result."""
-    return {
-        "kind": result.kind,
-        "runs": len(result.fine),
-        "failed": len(result.failed),
-        "damaged": [each._asdict() for each in result.damaged],
-        "missing": result.missing,
-    }
+        lines.append(", ".join(words))
+    answer = {"path": str(target), "bytes": len(data), "results": counts}
+    tell(options, answer, *lines, f"written to {target} ({len(data) / 1e6:.2f} MB)")
 
 
 def check_target(target: Path, *, overwrite: bool) -> None:
@@ -139,6 +121,5 @@ def check_target(target: Path, *, overwrite: bool) -> None:
     if not target.parent.is_dir():
         raise OutputError(f"{target}: cannot be written: there is no folder {target.parent}")
     if target.exists() and not overwrite and not is_report(target):
-        raise InputError(
-            f"{target}: the file is no report of robocov; another --out, or --overwrite, was wanted"
-        )
+        wanted = "another --out, or --overwrite, was wanted"
+        raise InputError(f"{target}: the file is no report of robocov; {wanted}")

@@ -1,21 +1,14 @@
 """`robocov run`."""
 
-from __future__ import annotations
-
-import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robocov_app.runs.options import RunOptions
 from robocov_app.terminal.arguments import parsed_gains
 from robocov_app.terminal.interruption import INTERRUPTED, Interruption
-from robocov_app.terminal.output import finite, listed
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from robocov_app.runs.run import Run
+from robocov_app.terminal.output import listed, tell
 
 
 @dataclass
@@ -39,10 +32,10 @@ class Arguments(RunOptions):
 
 
 def command(options: Arguments) -> int:
-    """Simulate, evaluate, save and draw."""
     if options.map.endswith(".robocov"):
         return remade(options)
     from robocov.mapfile import load_map
+    from robocov_app.render.density import density_lines
     from robocov_app.runs.artifacts import performed
     from robocov_app.runs.saved import folder_names
 
@@ -51,30 +44,44 @@ def command(options: Arguments) -> int:
     options.film.layers()
     out = options.out or Path(f"{Path(options.map).stem}-{folder_names([options.controller])[0]}")
     runs, stopped = performed({"": spec}, out, options)
-    run = runs[""]
-    if options.json:
-        print(json.dumps(finite({"out": str(out), "interrupted": stopped, **run.summary})))
-    else:
-        print_summary(run)
-        end = f"stopped at {run.record.time[-1]:.1f} s; what was done is in"
-        print(f"{end if stopped else 'saved in'} {out}/: {listed(out)}{options.record_words}")
+    record, history, summary = runs[""].record, runs[""].history, runs[""].summary
+    lines = [
+        f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s"
+    ]
+    first = f"(at the start {history.mean_distance[0]:.3f} m)"
+    lines += [f"  mean distance   {summary['mean_distance_m']:.3f} m   {first}"]
+    if history.mean_time is not None:
+        first = f"(at the start {history.mean_time[0]:.3f} s)"
+        lines += [f"  mean time       {summary['mean_time_s']:.3f} s   {first}"]
+    lines += [f"  coverage cost   {summary['cost_m3']:.2f} m³"]
+    lines += [f"  {line}" for line in density_lines(record.environment)]
+    if summary["uncovered_area_m2"] > 0:
+        lines += [f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)"]
+    settled = summary["settled_at_s"]
+    lines += [f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}"]
+    clearance = f"(smallest clearance {summary['min_clearance_m']:.3f} m)"
+    lines += [f"  contacts        {summary['contacts']}   {clearance}"]
+    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
+    end = f"stopped at {record.time[-1]:.1f} s; what was done is in" if stopped else "saved in"
+    lines += [f"  path length     {path:.2f} m per robot"]
+    lines += [f"{end} {out}/: {listed(out)}{options.record_words}"]
+    tell(options, {"out": str(out), "interrupted": stopped, **summary}, *lines)
     return INTERRUPTED if stopped else 0
 
 
 def remade(options: Arguments) -> int:
-    """Make stories of a session again, and save them."""
     answers = []
     with Interruption() as stop:
         for answer in saved_stories(options, stop):
             answers.append(answer)
-            for row in () if options.json else answer["runs"]:
+            if options.json:
+                continue
+            for row in answer["runs"]:
                 told = answer["parts"][row["part"] - 1]
                 span = f"{told['from_s']:6.1f} to {told['to_s']:.1f} s"
                 print(f"{span}  {row['controller']}  {row['mean_distance_m']:.3f} m  {told['words']}")
-            if not options.json:
-                print(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
-    if options.json:
-        print(json.dumps(finite(answers[0] if len(answers) == 1 else {"stories": answers})))
+            print(f"saved in {answer['out']}/: {listed(Path(answer['out']))}")
+    tell(options, answers[0] if len(answers) == 1 else {"stories": answers})
     return INTERRUPTED if stop.requested else 0
 
 
@@ -103,28 +110,3 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
         yield answer
         if stop.requested:
             return
-
-
-def print_summary(run: Run) -> None:
-    """Print what is worth knowing of a run."""
-    from robocov_app.render.density import density_lines
-
-    summary, record = run.summary, run.record
-    settled = summary["settled_at_s"]
-    first = run.history.mean_distance[0]
-    path = sum(summary["path_length_m"]) / len(summary["path_length_m"])
-    print(f"{record.label} on {record.environment.name}, {len(record.team)} robots, {record.time[-1]:.1f} s")
-    print(f"  mean distance   {summary['mean_distance_m']:.3f} m   (at the start {first:.3f} m)")
-    if run.history.mean_time is not None:
-        at_first = f"(at the start {run.history.mean_time[0]:.3f} s)"
-        print(f"  mean time       {summary['mean_time_s']:.3f} s   {at_first}")
-    print(f"  coverage cost   {summary['cost_m3']:.2f} m³")
-    for line in density_lines(record.environment):
-        print(f"  {line}")
-    if summary["uncovered_area_m2"] > 0:
-        print(f"  uncovered area  {summary['uncovered_area_m2']:.2f} m²   (cut off from every robot)")
-    print(f"  settled         {'not yet' if settled is None else f'after {settled:.1f} s'}")
-    print(
-        f"  contacts        {summary['contacts']}   (smallest clearance {summary['min_clearance_m']:.3f} m)"
-    )
-    print(f"  path length     {path:.2f} m per robot")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,8 +11,11 @@ import tyro
 from robocov.errors import ParameterError, checked, counted
 from robocov_app.runs.options import JsonOption
 from robocov_app.terminal.interruption import INTERRUPTED
+from robocov_app.terminal.output import tell
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from robocov_app.sweep.sweeping import Rehearsal, Totals
 
 FAILED = 1
@@ -57,7 +59,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> int:
-    """Do the runs, or say what they would take."""
     from robocov_app.sweep.executors import Cluster, processors
     from robocov_app.sweep.study_file import read_study
     from robocov_app.sweep.sweeping import rehearsed, sweep
@@ -70,54 +71,43 @@ def command(options: Arguments) -> int:
             with Cluster(options.scheduler) as cluster:
                 workers = max(1, cluster.threads)
         rehearsal = rehearsed(study, out, workers=workers, **again)
-        if options.json:
-            print(json.dumps({"out": str(out), "workers": workers, **asdict(rehearsal)}))
-        else:
-            print_rehearsal(rehearsal, workers)
+        answer = {"out": str(out), "workers": workers, **asdict(rehearsal)}
+        tell(options, answer, *_rehearsal_lines(rehearsal, workers))
         return 0
     where: dict[str, Any] = {"workers": options.workers, "scheduler": options.scheduler}
     totals = sweep(study, out, **where, **again, quiet=options.json)
-    if options.json:
-        print(json.dumps({"out": str(out), "runs": len(study), **asdict(totals)}))
-    else:
-        print_totals(totals, len(study), out)
+    answer = {"out": str(out), "runs": len(study), **asdict(totals)}
+    tell(options, answer, *_totals_lines(totals, len(study), out))
     return INTERRUPTED if totals.interrupted else FAILED if totals.failed else 0
 
 
-def print_totals(totals: Totals, runs: int, out: Path) -> None:
-    """Print what a sweep has done."""
-    there = f", {totals.reused} were there already" if totals.reused else ""
-    print(f"{totals.done} runs done{there}")
+def _totals_lines(totals: Totals, runs: int, out: Path) -> Iterator[str]:
+    yield f"{totals.done} runs done" + f", {totals.reused} were there already" * bool(totals.reused)
     if totals.failed:
-        print(f"{totals.failed} of {runs} runs failed:")
-        for run, error in totals.errors.items():
-            print(f"  {run}: {error}")
-        print("--retry-failed does them again; the column error says why each has failed")
+        yield f"{totals.failed} of {runs} runs failed:"
+        yield from (f"  {run}: {error}" for run, error in totals.errors.items())
+        yield "--retry-failed does them again; the column error says why each has failed"
     if len(totals.versions) > 1:
-        print("the table has runs of different versions:")
-        for versions, count in totals.versions.items():
-            print(f"  {count} of {versions}")
+        yield "the table has runs of different versions:"
+        yield from (f"  {count} of {versions}" for versions, count in totals.versions.items())
     if totals.interrupted:
         rest = runs - totals.done - totals.failed - totals.reused
-        print(f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/")
+        yield f"stopped, {rest} runs are left: the same command goes on; what was done is in {out}/"
         if not totals.table_replaced:
-            print("the table stays as it was: it is replaced when all runs are done")
+            yield "the table stays as it was: it is replaced when all runs are done"
     else:
-        print(f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}")
+        yield f"the table is {out / 'results.csv'}, and as Parquet {out / 'results.parquet'}"
 
 
-def print_rehearsal(rehearsal: Rehearsal, workers: int) -> None:
-    """Print what a sweep would take."""
+def _rehearsal_lines(rehearsal: Rehearsal, workers: int) -> Iterator[str]:
     from robocov_app.sweep.sweeping import duration
 
-    for name, count in rehearsal.axes.items():
-        print(f"{name:<20} {count:>7}")
+    yield from (f"{name:<20} {count:>7}" for name, count in rehearsal.axes.items())
     done = rehearsal.runs - rehearsal.left
-    print(f"{'runs':<20} {rehearsal.runs:>7}" + (f"   ({done} of them done already)" if done else ""))
-    for note in rehearsal.notes:
-        print(note)
+    yield f"{'runs':<20} {rehearsal.runs:>7}" + f"   ({done} of them done already)" * bool(done)
+    yield from rehearsal.notes
     if rehearsal.error is not None:
-        print(f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}")
-    print(f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB")
+        yield f"the run that was tried, {rehearsal.run}, failed: {rehearsal.error}"
+    yield f"a run takes {rehearsal.seconds_a_run:.2f} s and {rehearsal.bytes_a_run / 1e3:.0f} kB"
     time, megabytes = duration(rehearsal.seconds), rehearsal.bytes / 1e6
-    print(f"all that is left: about {time} on {counted(workers, 'worker')}; {megabytes:.0f} MB in all")
+    yield f"all that is left: about {time} on {counted(workers, 'worker')}; {megabytes:.0f} MB in all"

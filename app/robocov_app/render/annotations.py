@@ -29,7 +29,6 @@ def is_small(height: float, scale: float, shown: Set[str]) -> bool:
 
 
 def draw_scale_bar(canvas: Canvas, scene: Scene | None = None) -> None:
-    """Draw a bar of a round length at the foot of a canvas, with its length."""
     height = canvas.surface.get_height()
     if not is_small(height, canvas.scale, canvas.shown):
         _draw_bar(canvas, EDGE * canvas.scale, height - 0.5 * STRIP * canvas.scale)
@@ -49,13 +48,11 @@ def _draw_bar(canvas: Canvas, left: float, y: float) -> float:
 
 
 def bar_length(canvas: Canvas) -> float:
-    """Return the length of the scale bar in metres: round, and at most an eighth of the surface wide."""
     room = min(max(canvas.surface.get_width() / 8, 30.0), 160 * canvas.scale)
     return round_length(room / canvas.camera.zoom)
 
 
 def draw_caption(canvas: Canvas, scene: Scene) -> None:
-    """Draw the controller's name and the cost above the arena, where several pictures stand side by side."""
     left, right = EDGE * canvas.scale, canvas.surface.get_width() - EDGE * canvas.scale
     y = (6.0 + 0.5 * LEGEND_ROW) * canvas.scale
     size = 1.15 * canvas.theme.text
@@ -71,13 +68,7 @@ def draw_caption(canvas: Canvas, scene: Scene) -> None:
     canvas.text(cost, (right, y), anchor="right")
 
 
-def draw_brief_status(canvas: Canvas, scene: Scene) -> None:
-    """Draw the status line without what a caption says: the controller and the cost."""
-    draw_status(canvas, replace(scene, label="", cost=""))
-
-
 def draw_status(canvas: Canvas, scene: Scene) -> None:
-    """Draw controller, time and cost in the strip below the arena."""
     bar = bar_length(canvas)
     taken = (EDGE + 8 + 16) * canvas.scale + bar * canvas.camera.zoom
     taken += canvas.text_width(length_label(bar), bold=True)
@@ -109,7 +100,6 @@ class LegendStrip:
         self._strip = Latest[pygame.Surface]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the canvas's legend at the top."""
         width, words = canvas.surface.get_width(), tuple(entry.key() for entry in canvas.legend)
         key = (words, width, canvas.theme.name, canvas.scale, canvas.hues[:1].tolist(), canvas.shown)
         strip = self._strip.of(None, key, lambda: legend_strip(canvas.legend, canvas))
@@ -134,22 +124,17 @@ def legend_strip(entries: Iterable[LegendEntry], canvas: Canvas) -> pygame.Surfa
 
 
 def legend_picture(
-    entries: Sequence[LegendEntry],
-    width: int,
-    theme: Theme,
-    scale: float,
-    shown: frozenset[str] = frozenset(),
+    entries: Sequence[LegendEntry], width: int, theme: Theme, scale: float, shown: Set[str] = frozenset()
 ) -> NDArray[np.uint8]:
     """Return entries as an RGB picture of a width, (height, width, 3), for pictures of the layers `shown`."""
     camera = Camera((0.0, 0.0), 1.0, (0.0, 0.0, float(width), 1.0))
-    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), shown)
+    canvas = Canvas(pygame.Surface((width, 1)), camera, theme, scale, robot_hues(1), frozenset(shown))
     strip = legend_strip(entries, canvas)
     pixels = np.frombuffer(pygame.image.tobytes(strip, "RGB"), dtype=np.uint8)
     return pixels.reshape(strip.get_height(), width, 3)
 
 
 def legend_rows(canvas: Canvas, entries: Iterable[LegendEntry]) -> list[list[LegendEntry]]:
-    """Break the entries into rows that fit the surface's width."""
     room = canvas.surface.get_width() - 2 * MARGIN * canvas.scale
     rows: list[list[LegendEntry]] = []
     used = 0.0

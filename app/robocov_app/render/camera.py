@@ -1,13 +1,16 @@
 """The camera: world metres, y up, to pixels, y down, and back."""
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from robocov.arrays import Array
 
-# limits of the zoom in pixels per metre: from a hundred times the largest map to a tenth of the smallest
-SMALLEST, LARGEST = 1e-4, 1e7
+SMALLEST, LARGEST = 1e-4, 1e7  # zoom, px/m: from a hundred times the largest map to a tenth of the smallest
+
+
+Box: TypeAlias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -16,15 +19,10 @@ class Camera:
 
     center: tuple[float, float]
     zoom: float
-    view: tuple[float, float, float, float]
+    view: Box
 
     @classmethod
-    def fit(
-        cls,
-        bounds: tuple[float, float, float, float],
-        view: tuple[float, float, float, float],
-        margin: float = 0.0,
-    ) -> "Camera":
+    def fit(cls, bounds: Box, view: Box, margin: float = 0.0) -> "Camera":
         """Return the camera that shows `bounds`, m, as large as possible, `margin` px from the sides."""
         low_x, low_y, high_x, high_y = bounds
         width, height = max(high_x - low_x, 1e-9), max(high_y - low_y, 1e-9)
@@ -34,21 +32,17 @@ class Camera:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """The middle of the view in pixels."""
         left, top, width, height = self.view
         return left + width / 2, top + height / 2
 
     def to_pixels(self, points: Array) -> Array:
         """Return the pixels of (..., 2) points in metres."""
-        x, y = self.middle
         scale = np.array([self.zoom, -self.zoom])
-        return np.asarray((points - np.array(self.center)) * scale + np.array([x, y]))
+        return np.asarray((points - np.array(self.center)) * scale + np.array(self.middle))
 
     def to_world(self, pixels: Array) -> Array:
-        """Return the points in metres of (..., 2) pixels."""
-        x, y = self.middle
         scale = np.array([1.0 / self.zoom, -1.0 / self.zoom])
-        return np.asarray((pixels - np.array([x, y])) * scale + np.array(self.center))
+        return np.asarray((pixels - np.array(self.middle)) * scale + np.array(self.center))
 
     def zoomed(self, factor: float, at: tuple[float, float]) -> "Camera":
         """Return the camera that magnifies by `factor` and keeps what is under pixel `at` there."""
@@ -59,37 +53,26 @@ class Camera:
         return replace(self, center=center, zoom=zoom)
 
     def panned(self, dx: float, dy: float) -> "Camera":
-        """Return the camera after the world was dragged by (`dx`, `dy`) pixels."""
         return replace(self, center=(self.center[0] - dx / self.zoom, self.center[1] + dy / self.zoom))
 
-    def within(self, view: tuple[float, float, float, float]) -> "Camera":
-        """Return the camera that shows the same middle at the same zoom in another rectangle."""
+    def within(self, view: Box) -> "Camera":
         return replace(self, view=view)
 
-    def visible(self) -> tuple[float, float, float, float]:
-        """Return the bounds of what is shown, in metres."""
+    def visible(self) -> Box:
         half_x, half_y = self.view[2] / 2 / self.zoom, self.view[3] / 2 / self.zoom
         x, y = self.center
         return x - half_x, y - half_y, x + half_x, y + half_y
 
 
 def round_length(at_most: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`.
-
-    >>> [round_length(x) for x in (0.7, 1.0, 3.9, 49.0)]
-    [0.5, 1.0, 2.0, 20.0]
-    """
+    """Return the largest of 1, 2, 5 times a power of ten that is not above `at_most`."""
     power = float(10.0 ** np.floor(np.log10(at_most) + 1e-12))
     step = max(s for s in (1.0, 2.0, 5.0) if s * power <= at_most * (1 + 1e-9))
     return float(f"{step * power:.12g}")
 
 
 def length_label(metres: float) -> str:
-    """Return a length as people write it.
-
-    >>> [length_label(x) for x in (0.05, 0.5, 2.0, 5000.0)]
-    ['5 cm', '0.5 m', '2 m', '5 km']
-    """
+    """Return a length as people write it."""
     if metres >= 1000:
         return f"{metres / 1000:g} km"
     return f"{metres * 100:g} cm" if metres < 0.1 else f"{metres:g} m"

@@ -26,11 +26,7 @@ def bounded(points: Array) -> Array:
 
 
 def clipped_polygon(corners: Array) -> list[Array]:
-    """Return the rings of what of the (k, 2) px polygon lies within `FAR`: mostly the one given.
-
-    >>> len(clipped_polygon(np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])))
-    1
-    """
+    """Return the rings of what of the (k, 2) px polygon lies within `FAR`: mostly the one given."""
     if len(corners) < 3:
         return []
     if np.abs(corners).max() <= FAR:
@@ -40,34 +36,17 @@ def clipped_polygon(corners: Array) -> list[Array]:
     return [np.asarray(part.exterior.coords)[:-1] for part in parts if not part.is_empty]
 
 
-def clipped_segment(
-    x1: float, y1: float, x2: float, y2: float
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Return the ends of what of a segment lies within `FAR`; None when nothing does.
-
-    >>> clipped_segment(0.0, 0.0, 40000.0, 20000.0)
-    ((0.0, 0.0), (20000.0, 10000.0))
-    """
-    if max(abs(x1), abs(y1), abs(x2), abs(y2)) <= FAR:
-        return (x1, y1), (x2, y2)
-    first, last = 0.0, 1.0
-    for start, step in ((x1, x2 - x1), (y1, y2 - y1)):
-        if step == 0.0:
-            if abs(start) > FAR:
-                return None
-            continue
-        enter, leave = sorted([(-FAR - start) / step, (FAR - start) / step])
-        first, last = max(first, enter), min(last, leave)
-    if first >= last:
-        return None
-    dx, dy = x2 - x1, y2 - y1
-    return (x1 + dx * first, y1 + dy * first), (x1 + dx * last, y1 + dy * last)
+def clipped_segment(start: Pixel, end: Pixel) -> Sequence[Pixel]:
+    """Return the ends of what of a segment lies within `FAR`, none when nothing does."""
+    if max(abs(start[0]), abs(start[1]), abs(end[0]), abs(end[1])) <= FAR:
+        return start, end
+    inside = shapely.clip_by_rect(shapely.LineString([start, end]), -FAR, -FAR, FAR, FAR)
+    ends: list[Pixel] = shapely.get_coordinates(inside).tolist()
+    return ends
 
 
-# gives the sprite for a shift in quarters of a pixel
-Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]
-# draws a sign around a pixel, within 22 x 14 px at scale 1
-Glyph: TypeAlias = Callable[["Canvas", float, float], None]
+Sprite: TypeAlias = Callable[[tuple[int, int]], pygame.Surface]  # for a shift in quarters of a pixel
+Glyph: TypeAlias = Callable[["Canvas", float, float], None]  # around a pixel, in 22 x 14 px at scale 1
 
 
 def premultiplied(colour: Colour, alpha: float) -> tuple[int, int, int, int]:
@@ -85,7 +64,6 @@ class LegendEntry:
     style: str = ""
 
     def key(self) -> tuple[str, str]:
-        """Return what an entry has in common with those that say and show the same."""
         return self.text, self.style
 
 
@@ -106,11 +84,9 @@ class Canvas:
         return max(1, round(pixels * self.scale))
 
     def text_size(self, pixels: float) -> int:
-        """Return a text size in whole pixels."""
         return max(7, round(pixels * self.scale))
 
     def polygon(self, corners: Array, fill: Colour | tuple[int, int, int, int]) -> None:
-        """Fill the (k, 2) px polygon; its edge is not smooth: draw an outline over it."""
         for ring in clipped_polygon(corners):
             pygame.draw.polygon(self.surface, fill, np.rint(ring).tolist())
 
@@ -118,42 +94,31 @@ class Canvas:
         self, corners: Array, ends: Sequence[int], fills: Sequence[Colour | None], edge: Colour | None = None
     ) -> None:
         """Fill polygons, one after the other in (k, 2) px corners up to each of the `ends`."""
-        begin = 0
-        if len(corners) and np.abs(corners).max() > FAR:
-            for end, fill in zip(ends, fills, strict=True):
-                if fill is not None:
-                    self.polygon(corners[begin:end], fill)
-                if edge is not None:
-                    self.outline(corners[begin:end], edge, self.width(1.0))
-                begin = end
-            return
-        surface, points, width = self.surface, np.rint(corners).tolist(), self.width(1.0)
-        draw = pygame.draw.polygon
+        far = len(corners) > 0 and np.abs(corners).max() > FAR
+        points, draw, begin = np.rint(corners).tolist(), pygame.draw.polygon, 0
         for end, fill in zip(ends, fills, strict=True):
-            if end - begin > 2:
-                ring = points[begin:end]
-                if fill is not None:
-                    draw(surface, fill, ring)
-                if edge is not None:
-                    draw(surface, edge, ring, width)
+            for colour, width in ((fill, 0), (edge, self.width(1.0))):
+                if colour is None or end - begin < 3:
+                    continue
+                if not far:
+                    draw(self.surface, colour, points[begin:end], width)
+                elif width:
+                    self.outline(corners[begin:end], colour, width)
+                else:
+                    self.polygon(corners[begin:end], colour)
             begin = end
 
     def outline(self, corners: Array, colour: Colour, width: int = 1, closed: bool = True) -> None:
-        """Draw the smooth line through the (k, 2) px points."""
         points = corners.tolist()
-        if closed and points:
-            points.append(points[0])
-        for start, end in pairwise(points):
+        for start, end in pairwise([*points, *points[:1]] if closed else points):
             self.line(start, end, colour, width)
         if width > 2:  # lines have straight ends: fill the corners' notches
             for point in points:
                 self.stamp(partial(sprites.dot, width / 2 - 0.5, colour), point)
 
     def line(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1) -> None:
-        """Draw a smooth line between two pixels."""
-        ends = clipped_segment(start[0], start[1], end[0], end[1])
-        if ends is not None:
-            pygame.draw.aaline(self.surface, colour, *ends, width)
+        if ends := clipped_segment(start, end):
+            pygame.draw.aaline(self.surface, colour, ends[0], ends[1], width)
 
     def segments(self, ends: Array, colour: Colour, width: int = 1) -> None:
         """Draw many smooth lines, (k, 4) px: x and y of one end, then of the other."""
@@ -166,11 +131,9 @@ class Canvas:
             draw(surface, colour, (x1, y1), (x2, y2), width)
 
     def dashes(self, start: Pixel, end: Pixel, colour: Colour, width: int = 1, dash: float = 5.0) -> None:
-        """Draw a dashed smooth line."""
-        ends = clipped_segment(start[0], start[1], end[0], end[1])
-        if ends is None:
+        if not (ends := clipped_segment(start, end)):
             return
-        a, b = np.array(ends[0]), np.array(ends[1])
+        a, b = map(np.array, ends)
         length = float(np.hypot(*(b - a)))
         count = max(1, round(length / (2 * dash * self.scale)))
         for k in range(count):
@@ -178,17 +141,17 @@ class Canvas:
             pygame.draw.aaline(self.surface, colour, first.tolist(), last.tolist(), width)
 
     def circle(self, center: Pixel, radius: float, colour: Colour, dashed: bool = False) -> None:
-        """Draw a large circle's line, a pixel or so wide."""
         sides = int(min(max(radius, 24), 720)) // 2 * 2
         angle = np.arange(sides + 1) * (2 * np.pi / sides)
-        points = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
-        corners = points.tolist()
-        width = self.width(1.0)
-        for k in range(0, sides, 2 if dashed else 1):
-            self.line(corners[k], corners[k + 1], colour, width)
+        corners = np.asarray(center) + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        for start, end in list(pairwise(corners.tolist()))[:: 2 if dashed else 1]:
+            self.line(start, end, colour, self.width(1.0))
+
+    def level(self, x: float, y: float, half: float) -> tuple[Pixel, Pixel]:
+        """Return the ends of a level stroke for the legend, around a pixel; `half` its length at scale 1."""
+        return (x - half * self.scale, y), (x + half * self.scale, y)
 
     def swatch(self, x: float, y: float, fill: Colour | None, edge: Colour) -> None:
-        """Draw a small square with an edge for the legend, around a pixel."""
         size = 11 * self.scale
         box = pygame.Rect(round(x - size / 2), round(y - size / 2), round(size), round(size))
         if fill is not None:
@@ -222,7 +185,6 @@ class Canvas:
         sketch.onto(self.surface)
 
     def stamp(self, sprite: Sprite, center: Pixel) -> None:
-        """Put a sprite where it belongs to a quarter of a pixel."""
         self.stamps([sprite], np.array([center], dtype=float))
 
     def stamps(self, some: Sequence[Sprite], centers: Array, which: IntArray | None = None) -> None:
@@ -271,5 +233,4 @@ class Canvas:
         return width
 
     def text_width(self, text: str, size: float | None = None, bold: bool = False) -> int:
-        """Return how wide `text` will be, in pixels."""
         return text_width(text, self.text_size(self.theme.text if size is None else size), bold)

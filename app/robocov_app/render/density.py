@@ -13,8 +13,7 @@ from robocov.environment import Environment
 from robocov_app.render.theme import Theme
 
 _SAMPLES = 96  # places along the longer side of a map at which the density is looked at for its range
-# smallest x, smallest y, largest x, largest y in metres
-Bounds: TypeAlias = tuple[float, float, float, float]
+Bounds: TypeAlias = tuple[float, float, float, float]  # smallest x and y, largest x and y in metres
 
 
 def shading(environment: Environment, most: int, theme: Theme) -> NDArray[np.uint8]:
@@ -37,9 +36,8 @@ def dots(environment: Environment, most: int) -> tuple[Array, Array]:
 
 def parts(density: Density, bounds: Bounds, x: Array, y: Array) -> Array:
     """Return how far the density at (w,) x and (h,) y, m, is from the least to the most, (h, w), 0 to 1."""
-    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
     low, high = value_range(density, bounds)
-    value = density.value(points).reshape(len(y), len(x))
+    value = density.value(_grid(x, y)).reshape(len(y), len(x))
     return np.clip((value - low) / (high - low), 0.0, 1.0) if high > low else np.zeros_like(value)
 
 
@@ -52,7 +50,6 @@ def colours(way: Array, theme: Theme) -> NDArray[np.uint8]:
 
 
 def density_range(environment: Environment) -> tuple[float, float]:
-    """Return the least and the largest value that the density has in the region."""
     if environment.density is None:
         return 1.0, 1.0
     return value_range(environment.density, environment.region.bounds)
@@ -61,39 +58,29 @@ def density_range(environment: Environment) -> tuple[float, float]:
 @lru_cache(maxsize=16)
 def value_range(density: Density, bounds: Bounds) -> tuple[float, float]:
     """Return the least and the largest value of a density within bounds."""
-    low_x, low_y, high_x, high_y = bounds
-    step = max(high_x - low_x, high_y - low_y) / _SAMPLES
-    x, y = (np.arange(low + 0.5 * step, high, step) for low, high in ((low_x, high_x), (low_y, high_y)))
-    points = np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
-    points = np.concatenate([points, _inside(density, bounds)])
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    step = (high - low).max() / _SAMPLES
+    x, y = (np.arange(first + 0.5 * step, last, step) for first, last in zip(low, high, strict=True))
+    points = _grid(x, y)
+    if isinstance(density, Gaussians):  # between samples a narrow one is missed
+        centers = np.array([peak.center for peak in density.peaks]).reshape(-1, 2)
+        points = np.concatenate([points, centers[((low <= centers) & (centers <= high)).all(axis=1)]])
     value = density.value(points)
     return float(value.min()), float(value.max())
 
 
-def _inside(density: Density, bounds: Bounds) -> Array:
-    """Return the centres of Gaussians that are within the bounds: between samples a narrow one is missed."""
-    if not isinstance(density, Gaussians) or not density.peaks:
-        return np.empty((0, 2))
-    centers = np.array([peak.center for peak in density.peaks])
-    low, high = np.array(bounds[:2]), np.array(bounds[2:])
-    return np.asarray(centers[((low <= centers) & (centers <= high)).all(axis=1)])
+def _grid(x: Array, y: Array) -> Array:
+    return np.column_stack([np.tile(x, len(y)), np.repeat(y, len(x))])
 
 
 def density_label(environment: Environment) -> str:
     """Return the words of the legend, empty where every place counts the same."""
-    if environment.density is None or environment.density.uniform:
-        return ""
-    return range_label(density_range(environment))
+    density = environment.density
+    return "" if density is None or density.uniform else range_label(density_range(environment))
 
 
 def range_label(span: tuple[float, float]) -> str:
-    """Return the words of the legend for a range of values.
-
-    >>> range_label((0.25, 10.0))
-    'density φ, 0.25 to 10'
-    """
-    low, high = span
-    return f"density φ, {low:.3g} to {high:.3g}"
+    return "density φ, {:.3g} to {:.3g}".format(*span)
 
 
 def mean_label(environment: Environment) -> str:
@@ -105,16 +92,10 @@ def cost_label(what: str, mean_distance: float, mean_time: float | None = None) 
     """Return a mean distance, m, in words, and the mean time until the first robot comes, s, if there is one.
 
     What is not finite is left out: a team of which no robot works covers nothing.
-
-    >>> cost_label("mean distance", 1.25), cost_label("mean distance by φ", 1.25, 3.0)
-    ('mean distance 1.250 m', 'mean distance by φ 1.250 m, mean time 3.000 s')
     """
-    known = [(what, mean_distance, "m"), ("mean time", mean_time, "s")]
-    return ", ".join(
-        f"{words} {value:.3f} {unit}"
-        for words, value, unit in known
-        if value is not None and np.isfinite(value)
-    )
+    told = (what, mean_distance, "m"), ("mean time", mean_time, "s")
+    known = (each for each in told if each[1] is not None and np.isfinite(each[1]))
+    return ", ".join(f"{words} {value:.3f} {unit}" for words, value, unit in known)
 
 
 def density_kind(environment: Environment) -> str | None:
@@ -124,8 +105,6 @@ def density_kind(environment: Environment) -> str | None:
 
 def density_lines(environment: Environment) -> Iterator[str]:
     """Yield the line that says by what the figures above it are weighed; none where nothing weighs them."""
-    density = environment.density
-    if density is None or density.uniform:
-        return
-    low, high = density_range(environment)
-    yield f"weighed by φ    {density.kind}, {low:.3g} to {high:.3g}"
+    if environment.density is not None and not environment.density.uniform:
+        low, high = density_range(environment)
+        yield f"weighed by φ    {environment.density.kind}, {low:.3g} to {high:.3g}"

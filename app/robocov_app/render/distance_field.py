@@ -1,8 +1,7 @@
 """Distances to the nearest robot at every pixel of a picture, and their colours."""
 
 from dataclasses import dataclass
-from itertools import product
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,7 @@ from robocov.arrays import Array, BoolArray, IntArray
 from robocov.cost import CoverageCost, CoverageResult, MomentaryCost, Sites
 from robocov_app.render.theme import Theme
 
-# least angle in radians at which two distances are taken to grow apart, so that borders stay thin
-_SHALLOW = 0.05
-
-
+_SHALLOW = 0.05  # least angle, rad, at which two distances are taken to grow apart: borders stay thin
 # the squares beside a square: rows up and columns right, and the corners that the two share
 _BESIDE = (((1, 0), (2, 3)), ((-1, 0), (0, 1)), ((0, 1), (1, 3)), ((0, -1), (0, 2)))
 _BLOCK = 4  # pixels along the side of blocks that are looked at as a whole first
@@ -46,10 +42,8 @@ class FieldLattice:
     def squares(self, x: Array, y: Array) -> tuple[IntArray, IntArray]:
         """Return the columns and the rows of the squares that hold coordinates, (w,) and (h,) m."""
         last = len(self.around) - 1
-        column, row = (
-            np.clip(np.floor((places - start) / self.spacing) + 1, 0, last).astype(np.intp)
-            for places, start in ((x, self.origin[0]), (y, self.origin[1]))
-        )
+        cells = [(at - low) / self.spacing for at, low in zip((x, y), self.origin, strict=True)]
+        column, row = (np.clip(np.floor(at) + 1, 0, last).astype(np.intp) for at in cells)
         return column, row
 
 
@@ -63,20 +57,13 @@ class Borders:
     gap: Array
 
     def within(self, gap: float) -> "Borders":
-        """Return those that are no farther from a border."""
         near = (self.gap <= gap).nonzero()[0]
         return Borders(self.row[near], self.column[near], self.owner[near], self.gap[near])
 
 
-class _Rivals(NamedTuple):
-    """Sites (k, r) whose ways a place may choose from; `number` (s, s): of each square with any, else -1.
-
-    `right` (k, 4, r): no wall is between the end of the way and a square's corner, to which none is shorter.
-    """
-
-    number: IntArray
-    site: IntArray
-    right: BoolArray
+# Squares whose places may choose from several ways: number of each (s, s), -1 for none; sites (k, r); whether
+# no wall is between a way's end and a square's corner, to which none is shorter, (k, 4, r).
+_Rivals: TypeAlias = tuple[IntArray, IntArray, BoolArray]
 
 
 class Field:
@@ -110,7 +97,7 @@ class Field:
         points = self.result.points[corner]
         length = self._distance(site[:, None], points[..., 0, None], points[..., 1, None])
         known = self.result.distances[corner][..., None]
-        return _Rivals(number, site, length >= known - 1e-9 * self.lattice.spacing)
+        return number, site, length >= known - 1e-9 * self.lattice.spacing
 
     @property
     def largest(self) -> float:
@@ -123,7 +110,7 @@ class Field:
         column, row = self.lattice.squares(x, y)
         site = self.lattice.around[..., 0][row[:, None], column]
         distance = self._distance(site, np.broadcast_to(x, site.shape), y[:, None])
-        number = self._inside.number[row[:, None], column]
+        number = self._inside[0][row[:, None], column]
         high, wide = (number >= 0).nonzero()
         distance[high, wide] = self._asked(self._inside, number[high, wide], x[wide], y[high]).min(axis=1)
         return distance
@@ -139,23 +126,20 @@ class Field:
 
     def borders(self, x: Array, y: Array, within: float) -> Borders:
         """Return the places at even (w,) x and (h,) y, at most `within` m from a change of owner."""
-        _, pixels = self._coarse_and_fine(x, y, within)
-        return pixels.within(within)
+        return self._coarse_and_fine(x, y, within)[1].within(within)
 
     def _coarse_and_fine(self, x: Array, y: Array, within: float) -> tuple[Borders, Borders]:
         """Return what is near a border by blocks, each as its middle is, then by pixels."""
         # blocks with a corner in a square with rivals
         column, row = self.lattice.squares(x, y)
-        numbered = self._around.number >= 0
-        ends = [
-            np.minimum(np.arange(0, n, _BLOCK) + more, n - 1)
-            for n in (len(y), len(x))
-            for more in (0, _BLOCK - 1)
-        ]
-        some = np.zeros((len(ends[0]), len(ends[2])), dtype=bool)
-        for high, wide in product(ends[:2], ends[2:]):
-            some |= numbered[row[high][:, None], column[wide]]
-        high, wide = some.nonzero()
+        numbered = self._around[0] >= 0
+
+        def ends(square: IntArray) -> tuple[IntArray, IntArray]:
+            first = np.arange(0, len(square), _BLOCK)
+            return square[first], square[np.minimum(first + _BLOCK - 1, len(square) - 1)]
+
+        some = [numbered[np.ix_(high, wide)] for high in ends(row) for wide in ends(column)]
+        high, wide = np.logical_or.reduce(some).nonzero()
         middle_x, middle_y = (middles(places, _BLOCK) for places in (x, y))
         column, row = self.lattice.squares(middle_x, middle_y)
         known = numbered[row[high], column[wide]]
@@ -165,28 +149,26 @@ class Field:
         near = (blocks.gap <= within + 1.5 * _BLOCK * step).nonzero()[0]
         coarse = _spread(blocks.row, blocks.column, len(y), len(x))
         coarse_owner, coarse_gap = blocks.owner[coarse[2]], blocks.gap[coarse[2]]
-        fine = _spread(
-            *(np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])),
-            *(len(y), len(x)),
-        )
-        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(*fine[:2], x, y)
+        high, wide = np.append(blocks.row[near], high[~known]), np.append(blocks.column[near], wide[~known])
+        row, column, _ = _spread(high, wide, len(y), len(x))
+        return Borders(*coarse[:2], coarse_owner, coarse_gap), self._bordering(row, column, x, y)
 
     def _bordering(self, high: IntArray, wide: IntArray, x: Array, y: Array) -> Borders:
         """Return who is nearest, and how far the border is, at chosen rows and columns; inf for no border."""
         column, row = self.lattice.squares(x, y)
-        number = self._around.number[row[high], column[wide]]
+        number = self._around[0][row[high], column[wide]]
         some = (number >= 0).nonzero()[0]
         number, high, wide = number[some], high[some], wide[some]
         px, py = x[wide], y[high]
-        around = self._around.site[number]
+        around = self._around[1][number]
         distance = self._asked(self._around, number, px, py)
         owner = self._owner[around]
         each = np.arange(len(around))
         first = distance.argmin(axis=1)
         others = np.where(owner == owner[each, first][:, None], np.inf, distance)
         second = others.argmin(axis=1)
-        (ux, uy), (vx, vy) = (self._heading(around[each, k], px, py) for k in (first, second))
-        apart = np.maximum(np.hypot(ux - vx, uy - vy), _SHALLOW)
+        u, v = (self._heading(around[each, k], px, py) for k in (first, second))
+        apart = np.maximum(np.hypot(*(u - v)), _SHALLOW)
         # between places that robots reach and such that none does, there is a wall
         with np.errstate(invalid="ignore"):
             gap = (others[each, second] - distance[each, first]) / apart
@@ -195,24 +177,22 @@ class Field:
 
     def _asked(self, rivals: _Rivals, number: IntArray, x: Array, y: Array) -> Array:
         """Return what the rivals of (k,) places in numbered squares say, (k, r), inf behind a wall."""
-        distance = self._distance(rivals.site[number], x[:, None], y[:, None])
+        _, site, right_way = rivals
+        distance = self._distance(site[number], x[:, None], y[:, None])
         # the square's corner beside the place
-        right, upper = (
-            np.floor((places - start) / self.lattice.spacing - 0.5).astype(np.intp)
-            - np.floor((places - start) / self.lattice.spacing).astype(np.intp)
-            + 1
-            for places, start in ((x, self.lattice.origin[0]), (y, self.lattice.origin[1]))
-        )
-        return np.where(rivals.right[number, 2 * upper + right], distance, np.inf)
+        cells = [
+            (at - low) / self.lattice.spacing for at, low in zip((x, y), self.lattice.origin, strict=True)
+        ]
+        right, upper = ((np.floor(at - 0.5) - np.floor(at)).astype(np.intp) + 1 for at in cells)
+        return np.where(right_way[number, 2 * upper + right], distance, np.inf)
 
     def _distance(self, site: IntArray, x: Array, y: Array) -> Array:
         dx, dy = x - self._way_x[site], y - self._way_y[site]
         return np.asarray(np.sqrt(dx * dx + dy * dy) + self._start[site])
 
-    def _heading(self, site: IntArray, x: Array, y: Array) -> tuple[Array, Array]:
-        dx, dy = x - self._way_x[site], y - self._way_y[site]
-        length = np.maximum(np.hypot(dx, dy), 1e-12)
-        return dx / length, dy / length
+    def _heading(self, site: IntArray, x: Array, y: Array) -> Array:
+        along = np.stack([x - self._way_x[site], y - self._way_y[site]])
+        return np.asarray(along / np.maximum(np.hypot(*along), 1e-12))
 
 
 class Fields:
@@ -284,27 +264,19 @@ FARTHEST = 253  # number of the colour at the limit of the scale and beyond
 
 
 def round_limit(distance: float) -> float:
-    """Return a round length not below a distance, m, to which a scale of colours may reach.
-
-    >>> [round_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
-    [1.0, 1.0, 5.0, 15.0, 1.0]
-    """
+    """Return a round length not below a distance, m, to which a scale of colours may reach."""
     if not np.isfinite(distance) or distance <= 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(distance))
     return next(float(f"{step * power:.12g}") for step in _STEPS if step * power >= distance * (1.0 - 1e-9))
 
 
-def ticks(limit: float, most: int = 5) -> list[float]:
-    """Return round lengths from zero to a limit, m, for a scale of colours.
-
-    >>> ticks(5.0), ticks(1.5), ticks(8.0)
-    ([0.0, 1.0, 2.0, 3.0, 4.0, 5.0], [0.0, 0.5, 1.0, 1.5], [0.0, 2.0, 4.0, 6.0, 8.0])
-    """
+def ticks(limit: float) -> list[float]:
+    """Return round lengths from zero to a limit, m, for a scale of colours."""
     power = 10.0 ** np.floor(np.log10(limit))
     for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         count = limit / (step * power)
-        if count <= most + 1e-9 and abs(count - round(count)) < 1e-9:
+        if count <= 5 + 1e-9 and abs(count - round(count)) < 1e-9:
             break
     return [float(f"{k * step * power:.12g}") for k in range(round(count) + 1)]
 

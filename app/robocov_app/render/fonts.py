@@ -35,18 +35,15 @@ def label(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Su
 
 def _living(size: int, bold: bool) -> pygame.font.Font:
     """Return the font; a new one where the font module was shut down in between: its fonts are dead."""
-    if not pygame.font.get_init():
-        pygame.font.init()
-        _font.cache_clear()
     try:
         _font(size, bold).get_height()
     except pygame.error:
+        pygame.font.init()
         _font.cache_clear()
     return _font(size, bold)
 
 
 def text_width(text: str, size: int, bold: bool = False) -> int:
-    """Return the width of `text` in pixels, without drawing it."""
     return _living(size, bold).size(text)[0]
 
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import pygame
@@ -20,34 +19,25 @@ from robocov_app.render.scene import Scene
 from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import Theme, border_colour
 
-# on a surface the density is looked at in at most about so many places; between them it is interpolated
-_DOTS = 60_000
+_DOTS = 60_000  # about so many places of a surface at most where the density is looked at, not interpolated
 
 
 def draw_density(canvas: Canvas, scene: Scene) -> None:
-    """Draw how much each place counts, where not all count the same; distances, in colours too, hide it."""
-    density = scene.environment.density
-    if (
-        density is not None
-        and not density.uniform
-        and not (scene.field is not None and "distances" in canvas.shown)
-    ):
+    density, hidden = scene.environment.density, scene.field is not None and "distances" in canvas.shown
+    if density is not None and not density.uniform and not hidden:
         draw_shading(canvas, density, scene.environment.region.vertices)
 
 
 def density_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of the density with its range."""
     words = density_label(scene.environment)
     return [density_entry(words)] if words else []
 
 
 def density_entry(words: str) -> LegendEntry:
-    """Return the legend's entry of a density."""
     return _strip_entry(words, lambda theme, count: colours(np.linspace(0.0, 1.0, count), theme))
 
 
 def _strip_entry(words: str, row: Callable[[Theme, int], NDArray[np.uint8]]) -> LegendEntry:
-
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         wide, high = round(20 * canvas.scale), round(11 * canvas.scale)
         strip = row(canvas.theme, wide)
@@ -67,15 +57,13 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
         return
     wide, high = canvas.surface.get_size()
     step = max(1, math.ceil(math.sqrt(wide * high / _DOTS)))
-    columns, rows = _Dots.over(box.left, box.width, step), _Dots.over(box.top, box.height, step)
-    x = canvas.camera.to_world(np.column_stack([columns.at, np.zeros(len(columns.at))]))[:, 0]
-    y = canvas.camera.to_world(np.column_stack([np.zeros(len(rows.at)), rows.at]))[:, 1]
+    columns, across = _dots(box.left, box.width, step)
+    rows, down = _dots(box.top, box.height, step)
+    x, y = _to_world(canvas, columns, rows)
     coarse = 255.0 * parts(density, (low_x, low_y, high_x, high_y), x, y)
-    fine = rows.between(columns.between(coarse.T).T)
     table = colours(np.arange(256) / 255.0, canvas.theme).astype(np.uint16)
     table[:, :3] = table[:, :3] * table[:, 3:] // 255
-    pixels = table.astype(np.uint8)[np.rint(fine).astype(np.uint8)]
-    page = _coloured(pixels)
+    page = _coloured(table.astype(np.uint8)[np.rint(down(across(coarse.T).T)).astype(np.uint8)])
     corners = canvas.camera.to_pixels(ring) - np.array(box.topleft)
     mask = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     pygame.draw.polygon(mask, (255, 255, 255, 255), np.rint(np.clip(corners, -3e4, 3e4)).tolist())
@@ -83,28 +71,21 @@ def draw_shading(canvas: Canvas, density: Density, ring: Array) -> None:
     canvas.surface.blit(page, box.topleft, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
-class _Dots(NamedTuple):
-    """Sample positions of the density along one axis, (d,) px, the same whichever pixels are wanted.
+def _dots(begin: int, count: int, step: int) -> tuple[Array, Callable[[Array], Array]]:
+    """Return where the density is looked at along an axis, (d,) px, and what interpolates (d, k) values."""
+    place = (begin + np.arange(count) + 0.5) / step - 0.5
+    first = np.floor(place).astype(np.intp)
 
-    `first` (p,) is the dot before each pixel's middle, `part` (p, 1) how far it is on the way to the next.
-    """
+    def between(values: Array) -> Array:
+        before, after = values[first - first[0]], values[first - first[0] + 1]
+        return np.asarray(before + (place - first)[:, None] * (after - before))
 
-    at: Array
-    first: IntArray
-    part: Array
+    return (np.arange(first[0], first[-1] + 2) + 0.5) * step, between
 
-    @classmethod
-    def over(cls, begin: int, count: int, step: int) -> "_Dots":
-        """Return the dots, `step` pixels apart, for `count` pixels."""
-        place = (begin + np.arange(count) + 0.5) / step - 0.5
-        first = np.floor(place).astype(np.intp)
-        dots = np.arange(first[0], first[-1] + 2)
-        return cls((dots + 0.5) * step, first - first[0], (place - first)[:, None])
 
-    def between(self, values: Array) -> Array:
-        """Return (p, k) values at the pixels from (d, k) at the dots."""
-        before = values[self.first]
-        return np.asarray(before + self.part * (values[self.first + 1] - before))
+def _to_world(canvas: Canvas, columns: Array | IntArray, rows: Array | IntArray) -> tuple[Array, Array]:
+    x = canvas.camera.to_world(np.column_stack([columns, np.zeros(len(columns))]))[:, 0]
+    return x, canvas.camera.to_world(np.column_stack([np.zeros(len(rows)), rows]))[:, 1]
 
 
 _BAR = 12.0  # width of the scale of colours in pixels at scale 1
@@ -113,30 +94,33 @@ _BORDER = 1.6  # width of the borders of geodesic cells
 _HATCH = 5  # pixels of the coarse picture from one slanted line to the next
 
 
-class FieldPicture:
-    """A picture of a field, by `draw_picture` at (w,) x and (h,) y m; kept until field or view change."""
+def field_drawing(
+    draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface],
+) -> Callable[[Canvas, Scene], None]:
+    """Return what draws a field, by `draw_picture` at (w,) x and (h,) y m, when field or view change."""
+    kept = Latest[pygame.Surface]()
 
-    def __init__(self, draw_picture: Callable[[Canvas, Scene, Field, Array, Array], pygame.Surface]) -> None:
-        self.draw_picture = draw_picture
-        self._picture = Latest[pygame.Surface]()
-
-    def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the picture within the region."""
-        field = scene.field
-        left, top, width, height = _seen(canvas, scene)
-        if field is None or width <= 0 or height <= 0:
+    def draw(canvas: Canvas, scene: Scene) -> None:
+        field, camera = scene.field, canvas.camera
+        low_x, low_y, high_x, high_y = scene.environment.region.bounds
+        begin, end = camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
+        # those of the view's pixels that show the region
+        begin = np.maximum(np.floor(begin), np.floor(camera.view[:2])).astype(int)
+        end = np.minimum(np.ceil(end), np.ceil(np.add(camera.view[:2], camera.view[2:]))).astype(int) + 1
+        if field is None or (end <= begin).any():
             return
-        view = canvas.camera, canvas.theme.name, canvas.scale, (left, top, width, height)
-        key = (scene.field_limit, *view, canvas.hues.tolist(), "distances" in canvas.shown)
+        corner = begin.tolist()
+        key = (corner, end.tolist(), scene.field_limit, camera, canvas.theme.name, canvas.scale)
 
         def picture() -> pygame.Surface:
-            across = np.column_stack([left + np.arange(width), np.full(width, top)])
-            down = np.column_stack([np.full(height, left), top + np.arange(height)])
-            x, y = canvas.camera.to_world(across)[:, 0], canvas.camera.to_world(down)[:, 1]
-            return self.draw_picture(canvas, scene, field, x, y)
+            x, y = _to_world(canvas, np.arange(begin[0], end[0]), np.arange(begin[1], end[1]))
+            return draw_picture(canvas, scene, field, x, y)
 
-        canvas.surface.blit(self._picture.of(field, key, picture), (left, top))
+        look = (*key, canvas.hues.tolist(), "distances" in canvas.shown)
+        canvas.surface.blit(kept.of(field, look, picture), corner)
         _cut_to_region(canvas, scene)
+
+    return draw
 
 
 def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
@@ -148,16 +132,15 @@ def draw_distances(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Arra
     return large.subsurface((0, 0, len(x), len(y)))
 
 
+unreached_legend = says(
+    "no robot can come",
+    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge),
+    lambda scene: scene.field is not None and bool((scene.field.result.owner < 0).any()),
+)
+
+
 def distances_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entries of the colours, and of where no robot can come."""
-
-    def closed(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.unreached, canvas.theme.obstacle_edge)
-
-    entries = [_strip_entry("distance to the nearest robot", Theme.heat_table)]
-    if scene.field is not None and (scene.field.result.owner < 0).any():
-        entries.append(LegendEntry("no robot can come", closed))
-    return entries
+    return [_strip_entry("distance to the nearest robot", Theme.heat_table), *unreached_legend(scene)]
 
 
 def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y: Array) -> pygame.Surface:
@@ -186,16 +169,15 @@ def draw_geodesic_cells(canvas: Canvas, scene: Scene, field: Field, x: Array, y:
     return cells
 
 
-def _border_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 8 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), border_colour(canvas.theme), canvas.width(_BORDER))
-
-
-geodesic_legend = says("geodesic cell border", _border_glyph)
+geodesic_legend = says(
+    "geodesic cell border",
+    lambda canvas, x, y: canvas.line(
+        *canvas.level(x, y, 8), border_colour(canvas.theme), canvas.width(_BORDER)
+    ),
+)
 
 
 def draw_colour_bar(canvas: Canvas, scene: Scene) -> None:
-    """Draw the scale of the colours of distances at the right."""
     if "distances" not in canvas.shown:
         return
     scale, theme, width = canvas.scale, canvas.theme, canvas.width(1.0)
@@ -231,28 +213,15 @@ def _marks(scene: Scene) -> list[tuple[float, str]]:
     return list(zip(marks, words, strict=True))
 
 
-def _seen(canvas: Canvas, scene: Scene) -> tuple[int, int, int, int]:
-    """Return left, top, width and height of the pixels of the view that show the region."""
-    low_x, low_y, high_x, high_y = scene.environment.region.bounds
-    corners = canvas.camera.to_pixels(np.array([[low_x, high_y], [high_x, low_y]]))
-    (left, top), (right, bottom) = np.floor(corners[0]), np.ceil(corners[1])
-    view_left, view_top, wide, high = canvas.camera.view
-    left, top = max(left, np.floor(view_left)), max(top, np.floor(view_top))
-    right, bottom = min(right, np.ceil(view_left + wide)), min(bottom, np.ceil(view_top + high))
-    return int(left), int(top), int(right - left) + 1, int(bottom - top) + 1
-
-
 def _cut_to_region(canvas: Canvas, scene: Scene) -> None:
     corners = canvas.camera.to_pixels(scene.environment.region.vertices)
     far = 4.0 * (np.ptp(corners, axis=0).sum() + sum(canvas.surface.get_size()))
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+        along = far * (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
         # pixels run downwards, so that outside is on the other hand
         outward = np.array([-along[1], along[0]])
-        start, end = start - far * along, end + far * along
-        canvas.polygon(
-            np.array([start, end, end + far * outward, start + far * outward]), canvas.theme.background
-        )
+        ring = [start - along, end + along, end + along + outward, start - along + outward]
+        canvas.polygon(np.array(ring), canvas.theme.background)
 
 
 def _paletted(numbers: NDArray[np.uint8], colours: NDArray[np.uint8]) -> pygame.Surface:

@@ -11,7 +11,7 @@ from robocov.arrays import Array
 from robocov.planning.discovered import PRESUMED, UNKNOWN, WALL, DiscoveredMap
 from robocov_app.render import sprites
 from robocov_app.render.canvas import Canvas, bounded, clipped_polygon, clipped_segment, premultiplied
-from robocov_app.render.layers import draw_blocked, draw_boundary, draw_motion, says
+from robocov_app.render.layers import draw_blocked, draw_boundary, says
 from robocov_app.render.marks import drawn_radii
 from robocov_app.render.scene import Scene
 from robocov_app.render.theme import Colour, mix
@@ -34,21 +34,15 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
     view = canvas.surface.get_clip()
     corners = np.array([view.topleft, view.bottomright], dtype=float)
     row, column = raster.cells(canvas.camera.to_world(corners))
-    first, last = (int(row.min()), int(column.min())), (int(row.max()) + 1, int(column.max()) + 1)
-    state = np.minimum(known.state[first[0] : last[0], first[1] : last[1]], WALL)
-    outside = raster.outside[first[0] : last[0], first[1] : last[1]]
+    seen = slice(row.min(), row.max() + 1), slice(column.min(), column.max() + 1)
+    state, outside = np.minimum(known.state[seen], WALL), raster.outside[seen]
     pixels = np.zeros((*state.shape, 4), dtype=np.uint8)
-    theme = canvas.theme
-    for value, colour in (
-        (UNKNOWN, theme.obstacle),
-        (PRESUMED, theme.forces["repulsion_obstacle"]),
-        (WALL, theme.forces["repulsion_obstacle"]),
-    ):
-        pixels[(state == value) & ~outside] = premultiplied(colour, _OPACITY[value])
-    x, y = raster.origin
-    low = np.array([x + first[1] * raster.cell, y + first[0] * raster.cell])
-    high = np.array([x + last[1] * raster.cell, y + last[0] * raster.cell])
-    (left, bottom), (right, top) = canvas.camera.to_pixels(np.array([low, high])).round().astype(int).tolist()
+    for value, opacity in _OPACITY.items():
+        colour = canvas.theme.obstacle if value == UNKNOWN else canvas.theme.forces["repulsion_obstacle"]
+        pixels[(state == value) & ~outside] = premultiplied(colour, opacity)
+    ends = np.array([[column.min(), row.min()], [column.max() + 1, row.max() + 1]])
+    ends = canvas.camera.to_pixels(np.array(raster.origin) + ends * raster.cell)
+    (left, bottom), (right, top) = ends.round().astype(int).tolist()
     if right <= left or bottom <= top:
         return
     # the lowest row comes first, in a picture the highest
@@ -59,8 +53,7 @@ def draw_discovered(canvas: Canvas, known: DiscoveredMap) -> None:
 
 
 _FINE = 2  # scans are drawn so many times larger and shrunk: hundreds of smooth lines would take far longer
-# least distance between rays in pixels at scale 1: nearer to the robot every second one is left out
-_RAY_GAP = 5.0
+_RAY_GAP = 5.0  # least pixels between rays at scale 1: nearer to the robot every second one is left out
 _PALE = 0.3  # how much of its colour is left of an obstacle that nobody has sensed
 _DOT = 2.1  # radius of a sensed point in pixels at scale 1
 _HIT = 1.5  # radius of the end of a ray in pixels at scale 1
@@ -76,30 +69,25 @@ def draw_scans(canvas: Canvas, scene: Scene) -> None:
     """Draw what a range sensor measures all around: what it looks over, its rays, and dots where they hit."""
     camera, colour = canvas.camera, canvas.theme.final
     scans = [(camera.to_pixels(place), camera.to_pixels(ends)) for place, ends in scene.scans]
-    corners = bounded(np.concatenate([ends for _, ends in scans]))
-    low = np.floor(corners.min(axis=0)).astype(int) - 2
-    high = np.ceil(corners.max(axis=0)).astype(int) + 3
-    box = pygame.Rect(low.tolist(), (high - low).tolist()).clip(canvas.surface.get_clip())
-    if not box.width or not box.height:
+    box = sprites.visible_box(bounded(np.concatenate([ends for _, ends in scans])), 3.0, canvas.surface)
+    if box is None:
         return
-    large = pygame.Surface((box.width * _FINE, box.height * _FINE), pygame.SRCALPHA, 32)
+    sketch = sprites.Sketch(box, _FINE)
     # drawing replaces what is there: where scans overlap nothing gets darker
     corner = np.array(box.topleft) - 0.5
     fine = [((place - corner) * _FINE, (ends - corner) * _FINE) for place, ends in scans]
     outlines = [ring for _, ends in fine for ring in clipped_polygon(ends)]
     for ring in outlines:
-        pygame.draw.polygon(large, premultiplied(colour, 0.11), np.rint(ring).tolist())
+        pygame.draw.polygon(sketch.large, premultiplied(colour, 0.11), np.rint(ring).tolist())
     for place, ends in fine:
-        _draw_rays(large, place, ends, canvas)
+        _draw_rays(sketch.large, place, ends, canvas)
     for ring in outlines:
-        pygame.draw.lines(large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
-    picture = pygame.transform.smoothscale(large, box.size)
-    canvas.surface.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        pygame.draw.lines(sketch.large, premultiplied(colour, 0.4), True, ring.tolist(), _FINE)
+    sketch.onto(canvas.surface)
     _dots(canvas, np.concatenate([_hits(*scan) for scan in scans]), _HIT * canvas.scale, colour)
 
 
 def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas) -> None:
-    """Draw hair lines, each from where it is far enough from those beside it."""
     along = ends - place
     length = np.hypot(along[:, 0], along[:, 1])
     ray = np.arange(len(ends))
@@ -111,13 +99,12 @@ def _draw_rays(large: pygame.Surface, place: Array, ends: Array, canvas: Canvas)
     first = place + along[shown] * (begin[shown] / length[shown])[:, None]
     colour = premultiplied(canvas.theme.final, 0.3)
     width = max(1, round(0.5 * canvas.scale * _FINE))
-    for line in np.hstack([first, ends[shown]]).tolist():
-        if (seen := clipped_segment(*line)) is not None:
-            pygame.draw.line(large, colour, *seen, width)
+    for line in zip(first.tolist(), ends[shown].tolist(), strict=True):
+        if seen := clipped_segment(*line):
+            pygame.draw.line(large, colour, seen[0], seen[1], width)
 
 
 def _hits(place: Array, ends: Array) -> Array:
-    """Return the ends of the rays that met something: those shorter than the longest."""
     length = np.hypot(*(ends - place).T)
     return np.asarray(ends[length < length.max() * (1.0 - 1e-6)])
 
@@ -138,56 +125,36 @@ class SensedObstacles:
     """Sensed points, of the selected robot or of all, over a paler map; and its discovered map."""
 
     def __init__(self) -> None:
-        self._page: pygame.Surface | None = None
+        self._page = pygame.Surface((0, 0))
         self._key: object = None
         self._of: tuple[object, object] = (None, None)
-        self._drawn = 0
-        self._last: list[float] = []
+        self._drawn = np.empty((0, 2))
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the page of the pale truth and the points, and a discovered map over it."""
         assert scene.sensed is not None
         points, robots = scene.sensed.until(scene.now.time)
         asked = None if scene.selected is None else scene.number(scene.selected)
-        page, begin = self._page_for(canvas, scene, points, asked)
-        if begin < len(points):
-            fresh = points[begin:]
-            if asked is not None:
-                fresh = fresh[robots[begin:] == asked]
-            colour = canvas.theme.forces["repulsion_obstacle"]
-            _dots(replace(canvas, surface=page), canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
-            self._last = points[-1].tolist()
-        self._drawn = len(points)
-        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
-        known = discovered_map(scene)
-        if known is not None:
-            draw_discovered(canvas, known)
-
-    def _page_for(
-        self, canvas: Canvas, scene: Scene, points: Array, asked: int | None
-    ) -> tuple[pygame.Surface, int]:
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
         key = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip), canvas.shown, asked
         # objects rather than their ids, which others may get when these are gone
         known = self._of[0] is scene.environment and self._of[1] is scene.sensed
-        grown = self._drawn <= len(points) and (
-            self._drawn == 0 or points[self._drawn - 1].tolist() == self._last
-        )
-        if self._page is None or not (known and grown) or self._key != key:
-            self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
+        begin = len(self._drawn)
+        if not known or self._key != key or not np.array_equal(points[begin - 1 : begin], self._drawn[-1:]):
+            self._page, begin = pygame.Surface(size, pygame.SRCALPHA, 32), 0
             self._page.set_clip(clip)
             if "obstacles" in canvas.shown:
-                _draw_pale(replace(canvas, surface=self._page), scene)
-            self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), 0
-        return self._page, self._drawn
-
-
-def _draw_pale(canvas: Canvas, scene: Scene) -> None:
-    draw_blocked(canvas, scene.environment, *_pale_colours(canvas))
-    for obstacle in scene.moving:
-        draw_motion(canvas, scene, obstacle, *_pale_colours(canvas))
-    if "boundary" in canvas.shown:  # what of it was covered
-        draw_boundary(canvas, scene)
+                fill, edge = _pale_colours(canvas)
+                draw_blocked(replace(canvas, surface=self._page), scene, fill, fill, edge)
+                if "boundary" in canvas.shown:  # what of it was covered
+                    draw_boundary(replace(canvas, surface=self._page), scene)
+        if begin < len(points):
+            fresh = points[begin:] if asked is None else points[begin:][robots[begin:] == asked]
+            page, colour = replace(canvas, surface=self._page), canvas.theme.forces["repulsion_obstacle"]
+            _dots(page, canvas.camera.to_pixels(fresh), _DOT * canvas.scale, colour)
+        self._key, self._of, self._drawn = key, (scene.environment, scene.sensed), points
+        canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        if (discovered := discovered_map(scene)) is not None:
+            draw_discovered(canvas, discovered)
 
 
 def _pale_colours(canvas: Canvas) -> tuple[Colour, Colour]:
@@ -210,12 +177,10 @@ sensed_legend = says("known obstacles", _sensed_glyph)
 
 
 def draw_path(canvas: Canvas, scene: Scene) -> None:
-    """Draw the shortest path from the cursor to its nearest robot, with its length."""
     assert scene.path is not None
     if len(scene.path) < 2:
         return
-    corners = canvas.camera.to_pixels(scene.path)
-    theme = canvas.theme
+    corners, theme = canvas.camera.to_pixels(scene.path), canvas.theme
     # the light around it parts it from whatever it crosses
     canvas.outline(corners, theme.background, canvas.width(4.5), closed=False)
     canvas.outline(corners, theme.final, canvas.width(2.0), closed=False)
@@ -236,7 +201,7 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
     box = pygame.Rect(0, 0, wide + round(12 * scale), round(20 * scale))
     x, y = corners[0].tolist()
     radii = drawn_radii(canvas, scene)
-    centers = canvas.camera.to_pixels(scene.snapshot.positions).tolist() if scene.snapshot else []
+    centers = canvas.camera.to_pixels(scene.snapshot.positions if scene.snapshot else np.empty((0, 2)))
     path = bounded(corners).tolist()
     places = []
     # not below at the right first: the arrow of the cursor is there
@@ -247,10 +212,8 @@ def _tag_box(canvas: Canvas, scene: Scene, corners: Array, wide: int) -> pygame.
         placed = box.clamp(view)
         hidden = 4 * (placed != box)
         hidden += 4 * sum(bool(placed.clipline(a, b)) for a, b in pairwise(path))
-        for (robot_x, robot_y), radius in zip(centers, radii, strict=True):
-            gap_x = max(placed.left - robot_x, 0.0, robot_x - placed.right)
-            gap_y = max(placed.top - robot_y, 0.0, robot_y - placed.bottom)
-            hidden += np.hypot(gap_x, gap_y) < radius
+        outside = np.maximum(np.maximum(placed.topleft - centers, centers - placed.bottomright), 0.0)
+        hidden += int((np.hypot(*outside.T) < radii).sum())
         places.append((hidden, placed))
     return min(places, key=lambda each: each[0])[1]
 
@@ -261,9 +224,8 @@ def _draw_path_begin(canvas: Canvas, x: float, y: float) -> None:
 
 
 def _path_glyph(canvas: Canvas, x: float, y: float) -> None:
-    half = 9 * canvas.scale
-    canvas.line((x - half, y), (x + half, y), canvas.theme.final, canvas.width(2.0))
-    _draw_path_begin(canvas, x - half + 2 * canvas.scale, y)
+    canvas.line(*canvas.level(x, y, 9), canvas.theme.final, canvas.width(2.0))
+    _draw_path_begin(canvas, x - 9 * canvas.scale + 2 * canvas.scale, y)
 
 
 path_legend = says(

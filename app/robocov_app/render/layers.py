@@ -9,16 +9,13 @@ import numpy as np
 import pygame
 import shapely
 
-from robocov.arrays import Array
-from robocov.environment import Environment
 from robocov_app.render.camera import round_length
 from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, premultiplied
 from robocov_app.render.scene import MovingObstacle, Scene
 from robocov_app.render.theme import Colour
 
 GRID_GAP = 34.0  # least distance between the lines of the grid in pixels at scale 1
-# width of cells in pixels at scale 1 below which edges between them are not smooth: they hardly show
-NARROW = 20.0
+NARROW = 20.0  # width of cells in pixels at scale 1 below which their edges are not smooth: they hardly show
 
 Legend: TypeAlias = Callable[[Scene], list[LegendEntry]]
 
@@ -45,7 +42,6 @@ class Layer:
     in_world: bool = True
 
     def has(self, scene: Scene) -> bool:
-        """Return whether there may be something of the layer in a scene."""
         values = [getattr(scene, name) for name in self.needs]
         return not any(each is None or (isinstance(each, Sequence | Mapping) and not each) for each in values)
 
@@ -55,7 +51,6 @@ def _colours_mean_distance(canvas: Canvas, scene: Scene) -> bool:
 
 
 def draw_cells(canvas: Canvas, scene: Scene) -> None:
-    """Draw the Voronoi cells, in the tint of their robots."""
     assert scene.cells is not None
     sizes = np.array([len(cell) for cell in scene.cells])
     corners = canvas.camera.to_pixels(np.concatenate(scene.cells))
@@ -86,8 +81,6 @@ def draw_cells(canvas: Canvas, scene: Scene) -> None:
 
 
 def cells_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of Voronoi cells."""
-
     def glyph(canvas: Canvas, x: float, y: float) -> None:
         fill = None if _colours_mean_distance(canvas, scene) else canvas.theme.cell(0)
         canvas.swatch(x, y, fill, canvas.theme.cell_edge)
@@ -96,71 +89,52 @@ def cells_legend(scene: Scene) -> list[LegendEntry]:
 
 
 def draw_grid(canvas: Canvas, scene: Scene) -> None:
-    """Draw lines at round distances of metres."""
-    step = grid_step(canvas.camera.zoom, canvas.scale)
+    """Draw lines within the region at the least round distance that leaves `GRID_GAP` between them."""
+    least = GRID_GAP * canvas.scale / canvas.camera.zoom
+    step = round_length(least)
+    step = step if step >= least else round_length(2.5001 * step)
     region, seen = scene.environment.region, canvas.camera.visible()
-    bounds = region.bounds
     colour, width = premultiplied(canvas.theme.grid, 0.5), canvas.width(canvas.theme.line)
-    clip = canvas.surface.get_clip()
     for axis in (0, 1):
-        low, high = max(bounds[axis], seen[axis]), min(bounds[axis + 2], seen[axis + 2])
+        low, high = max(region.bounds[axis], seen[axis]), min(region.bounds[axis + 2], seen[axis + 2])
         for place in np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step:
             line = np.full((2, 2), place)
-            # down, and to the right
-            line[:, 1 - axis] = (bounds[3], bounds[1]) if axis == 0 else (bounds[0], bounds[2])
-            (left, top), (right, bottom) = _across(canvas, region.polygon, line)
-            if axis == 0:
-                box = pygame.Rect(round(left - width / 2), round(top), width, round(bottom) - round(top))
-            else:
-                box = pygame.Rect(round(left), round(top - width / 2), round(right) - round(left), width)
-            canvas.surface.fill(colour, box.clip(clip))
+            line[:, 1 - axis] = region.bounds[1 - axis], region.bounds[3 - axis]
+            inside = shapely.get_coordinates(shapely.intersection(region.polygon, shapely.LineString(line)))
+            if len(inside) == 2:
+                ends = canvas.camera.to_pixels(inside)
+                begin, end = ends.min(axis=0), ends.max(axis=0)
+                sides = (np.rint(end) - np.rint(begin)).astype(int)
+                begin[axis], sides[axis] = begin[axis] - width / 2, width
+                box = pygame.Rect(np.rint(begin).astype(int).tolist(), sides.tolist())
+                canvas.surface.fill(colour, box.clip(canvas.surface.get_clip()))
 
 
-def _across(canvas: Canvas, region: shapely.Polygon, line: Array) -> list[list[float]]:
-    """Return the ends, in pixels, of what of `line` lies in the convex `region`; no length where nothing."""
-    inside = shapely.get_coordinates(shapely.intersection(region, shapely.LineString(line)))
-    if len(inside) != 2:
-        inside = line[[0, 0]]
-    elif np.hypot(*(inside[0] - line[0])) > np.hypot(*(inside[1] - line[0])):
-        inside = inside[::-1]
-    return canvas.camera.to_pixels(inside).tolist()  # type: ignore[no-any-return]
-
-
-def grid_step(zoom: float, scale: float) -> float:
-    """Return the distance of the grid's lines in metres: the least round one that leaves `GRID_GAP`."""
-    least = GRID_GAP * scale / zoom
-    below = round_length(least)
-    return below if below >= least else round_length(2.5001 * below)
-
-
-def draw_blocked(canvas: Canvas, environment: Environment, fill: Colour, edge: Colour) -> None:
+def draw_blocked(canvas: Canvas, scene: Scene, fill: Colour, moving: Colour, edge: Colour) -> None:
     """Draw obstacles on a transparent page: what lies below it shows in their courtyards."""
-    rings = []
+    rings, parts = [], scene.environment.blocked.geoms
     # courtyards before what stands in them
-    for part in sorted(environment.blocked.geoms, key=lambda part: -shapely.Polygon(part.exterior).area):
-        for ring, colour in (
-            (part.exterior, (*fill, 255)),
-            *((hole, (0, 0, 0, 0)) for hole in part.interiors),
-        ):
+    for part in sorted(parts, key=lambda part: -shapely.Polygon(part.exterior).area):
+        colours = [(*fill, 255), *[(0, 0, 0, 0)] * len(part.interiors)]
+        for ring, colour in zip((part.exterior, *part.interiors), colours, strict=True):
             rings.append(canvas.camera.to_pixels(np.asarray(ring.coords)[:-1]))
             canvas.polygon(rings[-1], colour)
     for corners in rings:
         canvas.outline(corners, edge, canvas.width(canvas.theme.line))
+    for obstacle in scene.moving:
+        draw_motion(canvas, scene, obstacle, moving, edge)
 
 
 def draw_obstacles(canvas: Canvas, scene: Scene) -> None:
     """Draw obstacles, and what of the robots' convex region lies outside the boundary: they know neither."""
-    page = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32)
+    page, theme = pygame.Surface(canvas.surface.get_size(), pygame.SRCALPHA, 32), canvas.theme
     page.set_clip(canvas.surface.get_clip())
     own = replace(canvas, surface=page)
-    draw_blocked(own, scene.environment, canvas.theme.obstacle, canvas.theme.obstacle_edge)
-    for obstacle in scene.moving:
-        draw_motion(own, scene, obstacle, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+    draw_blocked(own, scene, theme.obstacle, theme.moving_obstacle, theme.obstacle_edge)
     canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Colour, edge: Colour) -> None:
-    """Draw the path of a moving obstacle, its shape, and an arrow where it heads."""
     theme, camera, width = canvas.theme, canvas.camera, canvas.width(canvas.theme.line)
     for part in shapely.get_parts(shapely.intersection(obstacle.polygon, scene.environment.region.polygon)):
         if not isinstance(part, shapely.Polygon):
@@ -176,23 +150,19 @@ def draw_motion(canvas: Canvas, scene: Scene, obstacle: MovingObstacle, fill: Co
     canvas.arrow((middle - along).tolist(), (middle + along).tolist(), theme.ink, 2.0 * canvas.scale)
 
 
-def obstacles_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entries of static and of moving obstacles."""
+def _moving_glyph(canvas: Canvas, x: float, y: float) -> None:
+    canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
+    canvas.arrow(*canvas.level(x, y, 10.0), canvas.theme.ink, 1.6 * canvas.scale)
 
-    def static(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge)
 
-    def moving(canvas: Canvas, x: float, y: float) -> None:
-        canvas.swatch(x, y, canvas.theme.moving_obstacle, canvas.theme.obstacle_edge)
-        half = 10.0 * canvas.scale
-        canvas.arrow((x - half, y), (x + half, y), canvas.theme.ink, 1.6 * canvas.scale)
-
-    found = not scene.environment.blocked.is_empty
-    entries = [LegendEntry("obstacle (unknown to robots)", static)] if found else []
-    return [*entries, LegendEntry("moving obstacle and its path", moving)] if scene.moving else entries
+obstacles_legend = says(
+    "obstacle (unknown to robots)",
+    lambda canvas, x, y: canvas.swatch(x, y, canvas.theme.obstacle, canvas.theme.obstacle_edge),
+    lambda scene: not scene.environment.blocked.is_empty,
+)
+moving_legend = says("moving obstacle and its path", _moving_glyph, lambda scene: bool(scene.moving))
 
 
 def draw_boundary(canvas: Canvas, scene: Scene) -> None:
-    """Draw the outline of the convex region, all that robots know of the map."""
     corners = canvas.camera.to_pixels(scene.environment.region.vertices)
     canvas.outline(corners, canvas.theme.boundary, canvas.width(canvas.theme.boundary_line))

@@ -12,11 +12,7 @@ _FEW = 120  # up to so many points all pairs are looked at faster than a tree is
 
 
 def nearest_distance(points: Array, step: int = 1) -> Array:
-    """Return how far each of (n, 2) points is from the nearest other; of many, only each `step`-th.
-
-    >>> nearest_distance(np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])).tolist()
-    [3.0, 1.0, 1.0]
-    """
+    """Return how far each of (n, 2) points is from the nearest other; of many, only each `step`-th."""
     if len(points) < 2:
         return np.full(len(points), np.inf)
     if len(points) <= _FEW:
@@ -25,47 +21,32 @@ def nearest_distance(points: Array, step: int = 1) -> Array:
         np.fill_diagonal(square, np.inf)
         return np.asarray(np.sqrt(square.min(axis=1)))
     distances: Array = np.asarray(KDTree(points).query(points[::step], k=2)[0])
-    return np.asarray(distances[:, 1])
+    return distances[:, 1]
 
 
 def fitted_radii(centers: Array, true: Array, least: float, most: float) -> Array:
     """Return radii, (n,), for discs: `most`, but in a crowd half of the way to the nearest neighbour.
 
     They are not below the `true` radii, (n,), nor below `least`.
-
-    >>> fitted_radii(np.array([[0.0, 0.0], [8.0, 0.0], [99.0, 0.0]]), np.ones(3), 2.0, 9.0).tolist()
-    [4.0, 4.0, 9.0]
     """
     return np.asarray(np.maximum(true, np.clip(nearest_distance(centers) / 2, least, most)))
 
 
 def mark_size(points: Array, least: float, most: float) -> float:
-    """Return one size for marks at (n, 2) points: `most`, but what keeps about half apart in a crowd.
-
-    >>> mark_size(np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [90.0, 0.0]]), 2.0, 9.0)
-    5.0
-    """
+    """Return one size for marks at (n, 2) points: `most`, but what keeps about half apart in a crowd."""
     near = nearest_distance(points, 1 + len(points) // 250)
     return float(np.clip(np.median(near), least, most)) if len(points) else most
 
 
 def line_crowding(count: int) -> float:
-    """Return by what the width of lines is multiplied where `count` of them are drawn: 1 to 0.5.
-
-    >>> [line_crowding(n) for n in (6, 20, 80, 1000)]
-    [1.0, 1.0, 0.5, 0.5]
-    """
+    """Return by what the width of lines is multiplied where `count` of them are drawn: 1 to 0.5."""
     return float(np.clip(np.sqrt(20 / max(count, 1)), 0.5, 1.0))
 
 
 def columns_for(
     count: int, aspect: float, size: tuple[float, float], around: float = 0.0, beside: float = 0.0
 ) -> int:
-    """Return the columns that let `count` panels of one aspect be largest; rows need `around` px besides.
-
-    >>> columns_for(3, 1.4, (1920, 1080)), columns_for(3, 10.0, (1920, 1080))
-    (3, 1)
-    """
+    """Return the columns that let `count` panels of one aspect be largest; rows need `around` px besides."""
 
     def worth(columns: int) -> float:
         rows = -(-count // columns)
@@ -87,9 +68,9 @@ def united(legends: Iterable[Sequence[T]], key: Callable[[T], Hashable]) -> list
         for entry in legend:
             name = key(entry)
             if name in keys:
-                place = keys.index(name) + 1
+                place = keys.index(name)
             else:
                 found.insert(place, entry)
                 keys.insert(place, name)
-                place += 1
+            place += 1
     return found

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pygame
 
-from robocov.arrays import Array, BoolArray
-from robocov.observation import Snapshot
+from robocov.arrays import Array
 from robocov.voronoi import VoronoiPartition
 from robocov_app.render import sprites
 from robocov_app.render.camera import Camera
@@ -15,6 +14,7 @@ from robocov_app.render.canvas import Canvas, Glyph, LegendEntry, Sprite
 from robocov_app.render.layers import says
 from robocov_app.render.layout import fitted_radii, mark_size
 from robocov_app.render.scene import CENTROID, GOAL, Scene, are_centroids
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import mix
 
 READABLE = 9.0  # radius of a drawn robot in pixels at scale 1 where it has room: a number can be read in it
@@ -31,10 +31,9 @@ def drawn_radii(canvas: Canvas, scene: Scene) -> Array:
 def _drawn_radii(scene: Scene, camera: Camera, scale: float) -> Array:
     if scene.snapshot is None:
         return np.empty(0)
-    centers = camera.to_pixels(scene.snapshot.positions)
-    true = scene.team.radius * camera.zoom
-    radii: Array = rounded(np.minimum(fitted_radii(centers, true, SMALLEST * scale, READABLE * scale), 400.0))
-    return radii
+    centers, true = camera.to_pixels(scene.snapshot.positions), scene.team.radius * camera.zoom
+    fitted = fitted_radii(centers, true, SMALLEST * scale, READABLE * scale)
+    return np.asarray(rounded(np.minimum(fitted, 400.0)))
 
 
 def rounded(pixels: Any) -> Any:
@@ -46,17 +45,17 @@ class Starts:
     """Green rings where the robots began; their places are kept until the view changes."""
 
     def __init__(self) -> None:
-        self._kept: tuple[Array, object, list[tuple[pygame.Surface, tuple[int, int]]]] | None = None
+        self._rings = Latest[list[tuple[pygame.Surface, tuple[int, int]]]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw the rings."""
-        assert scene.starts is not None
-        view = canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size()
-        if self._kept is None or self._kept[0] is not scene.starts or self._kept[1] != view:
+        def rings() -> list[tuple[pygame.Surface, tuple[int, int]]]:
+            assert scene.starts is not None
             centers = canvas.camera.to_pixels(scene.starts)
             radius = rounded(0.5 * mark_size(centers, 5.0 * canvas.scale, 9.0 * canvas.scale))
-            self._kept = scene.starts, view, canvas.placed([_start_ring(canvas, radius)], centers)
-        canvas.surface.fblits(self._kept[2], pygame.BLEND_PREMULTIPLIED)
+            return canvas.placed([_start_ring(canvas, radius)], centers)
+
+        view = canvas.camera, canvas.scale, canvas.theme.name, canvas.surface.get_size()
+        canvas.surface.fblits(self._rings.of(scene.starts, view, rings), pygame.BLEND_PREMULTIPLIED)
 
 
 def _start_ring(canvas: Canvas, radius: float) -> Sprite:
@@ -69,10 +68,7 @@ starts_legend = says(
 
 
 def draw_robots(canvas: Canvas, scene: Scene) -> None:
-    """Draw robots as discs with numbers; in a crowd smaller ones, down to their true size, without."""
-    theme, scale = canvas.theme, canvas.scale
-    edge = mix(theme.background, theme.ink, 0.55)
-    radii = drawn_radii(canvas, scene)
+    scale, radii = canvas.scale, drawn_radii(canvas, scene)
     numbers = np.arange(len(radii)) + 1 if scene.numbers is None else np.array(scene.numbers)
     rings = np.minimum(1.6 * scale, rounded(0.3 * radii))
     sizes = sprites.number_size(radii - rings, 1 + np.digitize(numbers, [10, 100, 1000]))
@@ -81,54 +77,45 @@ def draw_robots(canvas: Canvas, scene: Scene) -> None:
     looks: dict[tuple[float, float, int, int], int] = {}
     columns = radii.tolist(), rings.tolist(), canvas.hues.tolist(), written.tolist()
     which = [looks.setdefault(look, len(looks)) for look in zip(*columns, strict=True)]
-    discs = [
-        partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, str(number or ""))
-        for radius, ring, hue, number in looks
-    ]
+    discs = [_disc(canvas, radius, ring, hue, str(number or "")) for radius, ring, hue, number in looks]
     centers = canvas.camera.to_pixels(scene.now.positions)
     if scene.now.steering is not None:
-        _draw_noses(canvas, centers, radii, scene.now.steering[:, 0], scene.team.turns)
+        turns = np.rint(scene.now.steering[:, 0] * (sprites.NOSE_TURNS / (2.0 * np.pi))).astype(int)
+        noses = [
+            partial(sprites.nose, min(radius, sprites.LARGE), canvas.theme.ink, canvas.theme.background, turn)
+            for radius, turn in zip(radii.tolist(), (turns % sprites.NOSE_TURNS).tolist(), strict=True)
+        ]
+        unicycles = np.flatnonzero(scene.team.turns)
+        canvas.stamps(noses, centers[unicycles], unicycles)
     canvas.stamps(discs, centers, np.array(which, dtype=int))
 
 
-def _draw_noses(canvas: Canvas, centers: Array, radii: Array, headings: Array, turns: BoolArray) -> None:
-    """Draw where unicycles face, under their discs."""
-    parts = np.rint(headings * (sprites.NOSE_TURNS / (2.0 * np.pi))).astype(int) % sprites.NOSE_TURNS
-    noses = [
-        partial(sprites.nose, min(radius, sprites.LARGE), canvas.theme.ink, canvas.theme.background, turn)
-        for radius, turn in zip(radii.tolist(), parts.tolist(), strict=True)
-    ]
-    rows = np.flatnonzero(turns)
-    canvas.stamps(noses, centers[rows], rows)
+def _disc(canvas: Canvas, radius: float, ring: float, hue: int, number: str) -> Sprite:
+    theme, edge = canvas.theme, mix(canvas.theme.background, canvas.theme.ink, 0.55)
+    return partial(sprites.disc, radius, theme.robots[hue], theme.robot_ring, ring, edge, number)
 
 
-def _robot_glyph(canvas: Canvas, x: float, y: float) -> None:
-    theme, scale = canvas.theme, canvas.scale
-    edge = mix(theme.background, theme.ink, 0.55)
-    canvas.stamp(
-        partial(sprites.disc, 6.5 * scale, theme.robots[0], theme.robot_ring, 1.4 * scale, edge, ""), (x, y)
-    )
-
-
-robots_legend = says("robot", _robot_glyph)
+robots_legend = says(
+    "robot",
+    lambda canvas, x, y: canvas.stamp(_disc(canvas, 6.5 * canvas.scale, 1.4 * canvas.scale, 0, ""), (x, y)),
+)
 
 
 def draw_centroids(canvas: Canvas, scene: Scene) -> None:
     """Draw a plus at each centroid, or a times sign at each goal, but not where a robot has arrived."""
-    known, goals = _aims(scene)
-    if not known:
+    kind, goals = _aims(scene)
+    if not kind:
         return
     centers = canvas.camera.to_pixels(goals)
     away = np.hypot(*(centers - canvas.camera.to_pixels(scene.now.positions)).T)
     there = np.isfinite(away)
     arm = rounded(0.5 * mark_size(centers[there], 5.0 * canvas.scale, 11.0 * canvas.scale))
-    canvas.stamps([_cross(canvas, known, arm)], centers[there & (away > drawn_radii(canvas, scene))])
+    canvas.stamps([_cross(canvas, kind, arm)], centers[there & (away > drawn_radii(canvas, scene))])
 
 
 def centroids_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of centroids, or of goals of another kind."""
-    known, _ = _aims(scene)
-    return [LegendEntry(known, _aim_glyph(known))] if known else []
+    kind, _ = _aims(scene)
+    return [LegendEntry(kind, _aim_glyph(kind))] if kind else []
 
 
 def draw_goals(canvas: Canvas, scene: Scene) -> None:
@@ -158,8 +145,7 @@ def _aims(scene: Scene) -> tuple[str, Array]:
 
 
 def _cross(canvas: Canvas, kind: str, arm: float | None = None) -> Sprite:
-    arm = 5.5 * canvas.scale if arm is None else arm
-    theme = canvas.theme
+    arm, theme = 5.5 * canvas.scale if arm is None else arm, canvas.theme
     colour, width, part = (theme.final, 1.8, 0.4) if kind == GOAL else (theme.ink, 1.3, 0.3)
     width = min(width * canvas.scale, part * arm)
     return partial(sprites.cross, arm, colour, theme.background, width, kind == GOAL)
@@ -188,7 +174,6 @@ def draw_failed(canvas: Canvas, scene: Scene) -> None:
 
 
 def _label(canvas: Canvas, text: str, at: Array, radius: float, centers: Array, around: Array) -> None:
-    """Write the number beside the disc, where it has most room."""
     size = canvas.theme.small_text
     wide, high = canvas.text_width(text, size, bold=True), canvas.text_size(size)
     gap = 3.0 * canvas.scale
@@ -208,10 +193,8 @@ def _draw_wreck(canvas: Canvas, x: float, y: float, radius: float) -> None:
     fill, edge = mix(theme.background, theme.ink, 0.3), mix(theme.background, theme.ink, 0.75)
     canvas.stamp(partial(sprites.disc, radius, fill, edge, min(1.2 * scale, 0.25 * radius), edge, ""), (x, y))
     # beyond the edge: crossed out, not a sign on a button
-    width = min(1.7 * scale, 0.35 * radius)
-    canvas.stamp(
-        partial(sprites.cross, rounded(1.1 * radius), theme.ink, theme.background, width, True), (x, y)
-    )
+    arm, width = rounded(1.1 * radius), min(1.7 * scale, 0.35 * radius)
+    canvas.stamp(partial(sprites.cross, arm, theme.ink, theme.background, width, True), (x, y))
 
 
 failed_legend = says("failed robot", lambda canvas, x, y: _draw_wreck(canvas, x, y, 6.0 * canvas.scale))
@@ -220,15 +203,23 @@ failed_legend = says("failed robot", lambda canvas, x, y: _draw_wreck(canvas, x,
 def draw_selection(canvas: Canvas, scene: Scene) -> None:
     """Draw a ring around the robot that is asked about; where messages fail, also what it believes."""
     assert scene.selected is not None
-    if scene.now.seen.reported_positions is not None:
-        _draw_belief(canvas, scene.now, scene.selected)
-    radius = drawn_radii(canvas, scene)[scene.selected] + 4.0 * canvas.scale
-    center = canvas.camera.to_pixels(scene.now.positions[scene.selected]).tolist()
-    canvas.stamp(partial(sprites.ring, radius, canvas.theme.ink, 2.2 * canvas.scale), center)
+    robot, seen, cells, theme = scene.selected, scene.now.seen, scene.now.decision.cells, canvas.theme
+    there = canvas.camera.to_pixels(scene.now.positions).tolist()
+    if seen.reported_positions is not None:
+        if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
+            corners = canvas.camera.to_pixels(cells.polygons[robot])
+            canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
+        known = [robot, *seen.neighbours.of(robot).tolist()]
+        places = np.concatenate([seen.positions[[robot]], seen.neighbour_positions(robot)])
+        for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
+            hue = int(canvas.hues[other])
+            canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
+            _stamp_belief(canvas, hue, place)
+    radius = drawn_radii(canvas, scene)[robot] + 4.0 * canvas.scale
+    canvas.stamp(partial(sprites.ring, radius, theme.ink, 2.2 * canvas.scale), there[robot])
 
 
 def belief_legend(scene: Scene) -> list[LegendEntry]:
-    """Return the entry of what the robot believes, where that is not what is so."""
     assert scene.selected is not None
     if scene.now.seen.reported_positions is None:
         return []
@@ -239,17 +230,3 @@ def belief_legend(scene: Scene) -> list[LegendEntry]:
 def _stamp_belief(canvas: Canvas, hue: int, place: list[float]) -> None:
     colour = mix(canvas.theme.robots[hue], canvas.theme.ink, 0.2)
     canvas.stamp(partial(sprites.ring, 5.0 * canvas.scale, colour, 1.6 * canvas.scale), place)
-
-
-def _draw_belief(canvas: Canvas, snapshot: Snapshot, robot: int) -> None:
-    seen, cells, theme = snapshot.seen, snapshot.decision.cells, canvas.theme
-    if isinstance(cells, VoronoiPartition) and len(cells.polygons[robot]) > 2:
-        corners = canvas.camera.to_pixels(cells.polygons[robot])
-        canvas.outline(corners, theme.ink, canvas.width(1.6 * theme.line))
-    known = [robot, *seen.neighbours.of(robot).tolist()]
-    places = np.concatenate([seen.positions[[robot]], seen.neighbour_positions(robot)])
-    there = canvas.camera.to_pixels(snapshot.positions).tolist()
-    for other, place in zip(known, canvas.camera.to_pixels(places).tolist(), strict=True):
-        hue = int(canvas.hues[other])
-        canvas.dashes(there[other], place, mix(theme.robots[hue], theme.ink, 0.2), dash=3.0)
-        _stamp_belief(canvas, hue, place)

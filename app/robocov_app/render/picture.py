@@ -29,17 +29,21 @@ _strip = partial(Layer, in_world=False)
 
 def standard_layers(trails: str = "robots") -> list[Layer]:
     """Return one of each layer, from the lowest to the topmost; `trails` are colours of `Trajectories`."""
-    distances = heatmaps.FieldPicture(heatmaps.draw_distances)
-    geodesic = heatmaps.FieldPicture(heatmaps.draw_geodesic_cells)
+    distances = heatmaps.field_drawing(heatmaps.draw_distances)
+    geodesic = heatmaps.field_drawing(heatmaps.draw_geodesic_cells)
     sensed = knowledge.SensedObstacles()
     trajectories, snapshot = Trajectories(trails), ("snapshot",)
+
+    def obstacles(scene: Scene) -> list[LegendEntry]:
+        return [*layers.obstacles_legend(scene), *layers.moving_legend(scene)]
+
     return [
-        _extra("distances", "Distance map", distances.draw, ("field",), heatmaps.distances_legend),
-        _extra("geodesic_cells", "Geodesic cells", geodesic.draw, ("field",), heatmaps.geodesic_legend),
+        _extra("distances", "Distance map", distances, ("field",), heatmaps.distances_legend),
+        _extra("geodesic_cells", "Geodesic cells", geodesic, ("field",), heatmaps.geodesic_legend),
         Layer("cells", "Voronoi cells", layers.draw_cells, ("cells",), layers.cells_legend),
         _fixed("grid", "Grid", layers.draw_grid),
         _fixed("density", "Density φ", heatmaps.draw_density, (), heatmaps.density_legend),
-        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), layers.obstacles_legend),
+        _fixed("obstacles", "Obstacles", layers.draw_obstacles, (), obstacles),
         _fixed("boundary", "Boundary", layers.draw_boundary),
         _extra("sensed", "Known obstacles", sensed.draw, ("sensed", "snapshot"), knowledge.sensed_legend),
         _extra("scan", "Ray scan", knowledge.draw_scans, ("scans",), knowledge.scans_legend),
@@ -51,7 +55,7 @@ def standard_layers(trails: str = "robots") -> list[Layer]:
         _extra("obstacle_points", "Nearest obstacle", forces.draw_points, snapshot, forces.points_legend),
         _extra("goals", "Goals", marks.draw_goals, snapshot, marks.goals_legend),
         Layer("centroids", "Centroids", marks.draw_centroids, snapshot, marks.centroids_legend),
-        _extra("velocities", "Velocities", forces.draw_velocities, snapshot, forces.velocities_legend),
+        forces.velocity_layer(),
         forces.force_layer("attraction", "Attraction", "full"),
         forces.force_layer("repulsion_robots", "Robot repulsion", "open"),
         forces.force_layer("repulsion_obstacle", "Obstacle repulsion", "dot"),
@@ -80,10 +84,14 @@ def checked_layers(option: str, names: Iterable[str]) -> frozenset[str]:
 
 def pane_layers(trails: str = "robots") -> list[Layer]:
     """Return the layers of one picture among several: a caption in place of the legend, which they share."""
+
+    def status(canvas: Canvas, scene: Scene) -> None:
+        annotations.draw_status(canvas, replace(scene, label="", cost=""))  # the caption says these
+
     return [
         *(layer for layer in standard_layers(trails) if layer.name not in ("legend", "status")),
         _strip("caption", "Caption", annotations.draw_caption),
-        _strip("status", "Status line", annotations.draw_brief_status),
+        _strip("status", "Status line", status),
     ]
 
 
@@ -118,19 +126,16 @@ class Painter:
         self.layers = list(layers) if layers is not None else standard_layers()
         self.scale = scale_for(size) if scale is None else scale
         self.visible = {layer.name for layer in self.layers if layer.default}
-        self._camera: Camera | None = None
-        self._follows = True
+        self._camera: Camera | None = None  # None shows the whole region, whatever the size
         self._hues = robot_hues(0)
         self._static = Latest[pygame.Surface]()
         self._own: pygame.Surface | None = None
-        self._room: tuple[object, int, float] = (None, 0, 0.0)
+        self._room: tuple[object, int, float] = (None, 0, 0.0)  # the most that was needed for these layers
 
     def show(self, names: Iterable[str]) -> None:
-        """Show these layers and no others. Raises ParameterError when there is no layer of that name."""
-        known = {layer.name for layer in self.layers}
-        wanted = set(names)
-        for name in sorted(wanted - known):
-            raise ParameterError(unknown_name("layer", name, known))
+        wanted, known = set(names), {layer.name for layer in self.layers}
+        if unknown := wanted - known:
+            raise ParameterError(unknown_name("layer", min(unknown), known))
         self.visible = wanted
 
     def change(self, also: Iterable[str], without: Iterable[str]) -> None:
@@ -140,42 +145,41 @@ class Painter:
 
     @property
     def needs_field(self) -> bool:
-        """Whether what is shown depends on the distances to the nearest robot."""
         return bool({"distances", "geodesic_cells"} & self.visible)
-
-    def resize(self, size: tuple[int, int], scale: float | None = None) -> None:
-        """Draw in another size from now on; what was zoomed or panned stays so."""
-        self.size = size
-        self.scale = scale_for(size) if scale is None else scale
 
     @property
     def camera(self) -> Camera:
-        """The camera; set it to zoom and pan, see `fit` for the way back."""
-        if self._camera is None:
-            self._place_view(0)
-        assert self._camera is not None
-        return self._camera
+        """The camera, with the view that strips and scale of colours leave; set it to zoom and pan."""
+        (width, height), scale, (_, rows, beside) = self.size, self.scale, self._room
+        top = (6 + LEGEND_ROW * rows + 6 if rows else MARGIN) * scale
+        small = annotations.is_small(height, scale, self.visible)
+        below = bool({"scale_bar", "status"} & self.visible) and not small
+        bottom = (STRIP if below else MARGIN) * scale
+        view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
+        if self._camera is not None:
+            return self._camera.within(view)
+        side = MARGIN * scale
+        inner = (side, top, max(view[2] - (1 if beside else 2) * side, 1.0), view[3])
+        return Camera.fit(self.environment.region.bounds, inner, margin=2 * scale).within(view)
 
     @camera.setter
     def camera(self, camera: Camera) -> None:
-        self._camera, self._follows = camera, False
+        self._camera = camera
 
     def fit(self) -> None:
         """Show the whole region again, also after changes of the size."""
-        self._camera, self._follows = None, True
+        self._camera = None
 
     def legend(self, scene: Scene) -> list[str]:
         """Return the words of the legend: exactly those of the layers that draw something of `scene`."""
         return [entry.text for entry in self.legend_entries(scene)]
 
     def legend_entries(self, scene: Scene) -> list[LegendEntry]:
-        """Return the legend's entries for what is drawn of `scene`."""
         return [entry for layer in self._shown() if layer.has(scene) for entry in layer.legend(scene)]
 
     def draw(self, surface: pygame.Surface, scene: Scene) -> None:
-        """Draw `scene` on the whole of `surface`, which has this painter's size."""
-        if surface.get_size() != self.size:
-            self.resize(surface.get_size(), self.scale)
+        """Draw a scene on all of a surface; what was zoomed or panned stays so in another size."""
+        self.size = surface.get_size()
         self._hues = _hues(scene, self._hues)
         entries, shown = self.legend_entries(scene), frozenset(self.visible)
         canvas = Canvas(surface, self.camera, self.theme, self.scale, self._hues, shown, entries)
@@ -183,17 +187,21 @@ class Painter:
         rows = int("caption" in names)
         if not rows and "legend" in names:
             rows = len(annotations.legend_rows(canvas, entries))
-        self._place_view(*self._steady(rows, heatmaps.bar_room(canvas, scene)))
+        beside = heatmaps.bar_room(canvas, scene)
+        if self._room[0] == (key := (self.size, self.scale, shown)):  # maps do not jump as words change
+            rows, beside = max(rows, self._room[1]), max(beside, self._room[2])
+        self._room = key, rows, beside
         canvas = replace(canvas, camera=self.camera)
+        clip = pygame.Rect([round(side) for side in canvas.camera.view])
         surface.fill(self.theme.background)
         for static, group in groupby(self._shown(), key=lambda layer: layer.static):
             if static:
-                page = self._page(canvas, scene, list(group))
+                page = self._page(canvas, scene, list(group), clip)
                 surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
                 continue
             for layer in group:
                 if layer.has(scene):
-                    surface.set_clip(self._clip() if layer.in_world else None)
+                    surface.set_clip(clip if layer.in_world else None)
                     layer.draw(canvas, scene)
         surface.set_clip(None)
 
@@ -209,37 +217,7 @@ class Painter:
     def _shown(self) -> list[Layer]:
         return [layer for layer in self.layers if layer.name in self.visible]
 
-    def _place_view(self, rows: int, beside: float = 0.0) -> None:
-        """Give the world what the strips above and below, and `beside` pixels at the right, leave."""
-        width, height = self.size
-        top = MARGIN * self.scale
-        if rows:
-            top = (6 + LEGEND_ROW * rows + 6) * self.scale
-        small = annotations.is_small(height, self.scale, self.visible)
-        below = bool({"scale_bar", "status"} & self.visible) and not small
-        bottom = (STRIP if below else MARGIN) * self.scale
-        view = (0.0, top, max(width - beside, 1.0), max(height - top - bottom, 1.0))
-        if self._camera is None or self._follows:
-            bounds = self.environment.region.bounds
-            side = MARGIN * self.scale
-            inner = (side, top, max(view[2] - (1 if beside else 2) * side, 1.0), view[3])
-            self._camera = Camera.fit(bounds, inner, margin=2 * self.scale).within(view)
-        elif self._camera.view != view:
-            self._camera = self._camera.within(view)
-
-    def _steady(self, rows: int, beside: float) -> tuple[int, float]:
-        """Return the most room that legend and colour bar needed for these layers: maps do not jump."""
-        key = self.size, self.scale, frozenset(self.visible)
-        if self._room[0] == key:
-            rows, beside = max(rows, self._room[1]), max(beside, self._room[2])
-        self._room = key, rows, beside
-        return rows, beside
-
-    def _clip(self) -> pygame.Rect:
-        left, top, width, height = self.camera.view
-        return pygame.Rect(round(left), round(top), round(width), round(height))
-
-    def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer]) -> pygame.Surface:
+    def _page(self, canvas: Canvas, scene: Scene, layers: list[Layer], clip: pygame.Rect) -> pygame.Surface:
         """Return the page of neighbouring static layers, drawn anew only when something changed."""
         # distances, in colours too, hide the density
         coloured = scene.field is not None and "distances" in canvas.shown
@@ -248,7 +226,7 @@ class Painter:
 
         def drawn() -> pygame.Surface:
             page = pygame.Surface(self.size, pygame.SRCALPHA, 32)
-            page.set_clip(self._clip())
+            page.set_clip(clip)
             for layer in layers:
                 if layer.has(scene):
                     layer.draw(replace(canvas, surface=page), scene)

@@ -20,9 +20,7 @@ from robocov.voronoi import VoronoiPartition, partition
 from robocov.voronoi.weighted_cells import WeightedCells, weighted_partition
 from robocov_app.render.distance_field import Field, Fields
 
-# metres within which a goal is the centroid: a record's goals are those of a moment before its end
-SAME = 0.05
-
+SAME = 0.05  # metres within which a goal is the centroid: a record's are those of a moment before its end
 CENTROID, GOAL = "cell centroid", "goal"
 
 
@@ -51,12 +49,11 @@ class Sensed:
         """Add what robots of these numbers sense now, (n, 2) m, nan for nothing."""
         if len(self) + len(numbers) > MOST:
             return
-        fresh = []
-        for row, key in enumerate(zip(numbers, *np.floor(points / CELL).T.tolist(), strict=True)):
-            if key[1] == key[1] and key not in self._known:  # nan is not equal to itself
-                self._known.add(key)
-                fresh.append(row)
+        keys = list(zip(numbers, *np.floor(points / CELL).T.tolist(), strict=True))
+        # nan is not equal to itself
+        fresh = [row for row, key in enumerate(keys) if key[1] == key[1] and key not in self._known]
         if fresh:
+            self._known.update(keys[row] for row in fresh)
             self._times = np.append(self._times, np.full(len(fresh), time))
             self._robots = np.append(self._robots, np.asarray(numbers, dtype=np.intp)[fresh])
             self._points = np.concatenate([self._points, points[fresh]])
@@ -67,13 +64,11 @@ class Sensed:
         return self._points[:count], self._robots[:count]
 
     def copy(self) -> "Sensed":
-        """Return a set of its own with the same points."""
         twin = copy(self)  # arrays are replaced, never changed
         twin._known = set(self._known)
         return twin
 
     def cut(self, time: float) -> None:
-        """Forget what was sensed after a time."""
         self._points, self._robots = self.until(time)
         self._times = self._times[: len(self._points)]
         x, y = np.floor(self._points / CELL).T.tolist()
@@ -97,16 +92,11 @@ def moving_obstacles(environment: Environment, time: float) -> list[MovingObstac
             continue
         shift = path.shift(time)
         ahead = path.shift(time + 1e-3 * min(path.period, 1.0)) - shift
+        ahead /= max(float(np.hypot(*ahead)), 1e-12)
         middle = np.array(obstacle.polygon.envelope.centroid.coords[0])
+        polygon = shapely.affinity.translate(obstacle.polygon, *shift.tolist())
         points = [*path.points, *(path.points[:1] if path.repeat == "loop" else ())]
-        found.append(
-            MovingObstacle(
-                shapely.affinity.translate(obstacle.polygon, *shift.tolist()),
-                middle + shift,
-                np.array(points) - points[0] + middle,
-                ahead / max(float(np.hypot(*ahead)), 1e-12),
-            )
-        )
+        found.append(MovingObstacle(polygon, middle + shift, np.array(points) - points[0] + middle, ahead))
     return found
 
 
@@ -141,16 +131,13 @@ class Scene:
     failed_radii: Mapping[int, float] = dataclass_field(default_factory=dict)  # m, by number
 
     def failed_radius(self, number: int) -> float:
-        """Return the radius of a robot that failed, m."""
         return self.failed_radii.get(number, float(self.team.radius[0]))
 
     def number(self, robot: int) -> int:
-        """Return what people call the robot of a row."""
         return robot + 1 if self.numbers is None else self.numbers[robot]
 
     @property
     def now(self) -> Snapshot:
-        """The snapshot of a scene that has one."""
         assert self.snapshot is not None
         return self.snapshot
 
@@ -214,22 +201,15 @@ def snapshot_of(snapshot: Snapshot, rows: IntArray) -> Snapshot:
     if not seen.neighbours.complete:
         ranges = None if seen.neighbours.ranges is None else seen.neighbours.ranges[rows]
         neighbours = Neighbours.of_pairs(len(rows), number[robot[kept]], number[neighbour[kept]], ranges)
-    seen = replace(
-        seen,
-        positions=seen.positions[rows],
-        velocities=seen.velocities[rows],
-        neighbours=neighbours,
-        obstacle_points=seen.obstacle_points[rows],
-        max_speeds=None if seen.max_speeds is None else seen.max_speeds[rows],
-        scans=None,
-        steering=None if seen.steering is None else seen.steering[rows],
-        reported_positions=None if seen.reported_positions is None else seen.reported_positions[kept],
-        report_ages=None if seen.report_ages is None else seen.report_ages[kept],
+
+    def chosen(of: Any, which: Any, *names: str) -> dict[str, Any]:
+        return {name: value[which] for name in names if (value := getattr(of, name)) is not None}
+
+    own = chosen(seen, rows, "positions", "velocities", "obstacle_points", "max_speeds", "steering")
+    told = chosen(seen, kept, "reported_positions", "report_ages")
+    terms = {name: term[rows] for name, term in decision.terms.items()}
+    return Snapshot(
+        replace(seen, neighbours=neighbours, scans=None, **own, **told),
+        replace(decision, terms=terms, **chosen(decision, rows, "forces", "goals")),
+        None if snapshot.truth is None else snapshot.truth[rows],
     )
-    decision = replace(
-        decision,
-        forces=decision.forces[rows],
-        goals=None if decision.goals is None else decision.goals[rows],
-        terms={name: term[rows] for name, term in decision.terms.items()},
-    )
-    return Snapshot(seen, decision, None if snapshot.truth is None else snapshot.truth[rows])

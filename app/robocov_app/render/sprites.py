@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pygame
 
+from robocov.arrays import Array
 from robocov_app.render.fonts import label
 from robocov_app.render.surface_cache import kept
 from robocov_app.render.theme import Colour, readable_on
@@ -22,12 +23,23 @@ Shift: TypeAlias = tuple[int, int]  # quarters of a pixel to the right and down
 Pixel: TypeAlias = Sequence[float]  # x to the right and y down from the surface's corner
 
 
-class Sketch:
-    """A part of a surface, drawn `STROKE_FINE` times larger and shrunk: pieces that overlap show no seams."""
+def visible_box(points: Array, margin: float, surface: pygame.Surface) -> pygame.Rect | None:
+    """Return what of the surroundings of (..., 2) px points can be seen on a surface; None for nothing."""
+    flat = points.reshape(-1, 2)
+    flat = flat[np.isfinite(flat[:, 0])]
+    if not len(flat):
+        return None
+    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
+    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(surface.get_clip())
+    return box if box.width and box.height else None
 
-    def __init__(self, box: pygame.Rect) -> None:
-        self._box = box
-        self._large = pygame.Surface((box.width * STROKE_FINE, box.height * STROKE_FINE), pygame.SRCALPHA, 32)
+
+class Sketch:
+    """A `box` of a surface, drawn larger, `fine` times, and shrunk: pieces that overlap show no seams."""
+
+    def __init__(self, box: pygame.Rect, fine: int = STROKE_FINE) -> None:
+        self.box = box
+        self.large = pygame.Surface((box.width * fine, box.height * fine), pygame.SRCALPHA, 32)
 
     @classmethod
     def around(cls, points: Sequence[Pixel], margin: float) -> "Sketch | None":
@@ -39,29 +51,26 @@ class Sketch:
 
     def _large_points(self, points: Sequence[Pixel]) -> list[tuple[float, float]]:
         # pixels are squares around their whole numbers: their middle is not at a corner of the large ones
-        x, y = self._box.x - 0.5, self._box.y - 0.5
+        x, y = self.box.x - 0.5, self.box.y - 0.5
         return [((point[0] - x) * STROKE_FINE, (point[1] - y) * STROKE_FINE) for point in points]
 
     def path(self, points: Sequence[Pixel], colour: Colour, width: float) -> None:
         """Draw a line of `width` pixels with round joints and ends."""
         wide = max(width * STROKE_FINE, 1.0)
         large = self._large_points(points)
-        pygame.draw.lines(self._large, colour, False, large, round(wide))
+        pygame.draw.lines(self.large, colour, False, large, round(wide))
         for point in large:
-            pygame.draw.circle(self._large, colour, point, wide / 2)
+            pygame.draw.circle(self.large, colour, point, wide / 2)
 
     def polygon(self, corners: Sequence[Pixel], colour: Colour) -> None:
-        """Fill a polygon."""
-        pygame.draw.polygon(self._large, colour, self._large_points(corners))
+        pygame.draw.polygon(self.large, colour, self._large_points(corners))
 
     def dot(self, center: Pixel, radius: float, colour: Colour) -> None:
-        """Fill a circle."""
-        pygame.draw.circle(self._large, colour, self._large_points([center])[0], radius * STROKE_FINE)
+        pygame.draw.circle(self.large, colour, self._large_points([center])[0], radius * STROKE_FINE)
 
     def onto(self, surface: pygame.Surface) -> None:
-        """Blend the shrunk sketch onto `surface`."""
-        picture = pygame.transform.smoothscale(self._large, self._box.size)
-        surface.blit(picture, self._box, special_flags=pygame.BLEND_PREMULTIPLIED)
+        picture = pygame.transform.smoothscale(self.large, self.box.size)
+        surface.blit(picture, self.box, special_flags=pygame.BLEND_PREMULTIPLIED)
 
 
 def _blank(radius: float, shift: Shift, fine: int = FINE) -> tuple[pygame.Surface, tuple[int, int]]:
@@ -123,7 +132,6 @@ def nose(radius: float, fill: Colour, edge: Colour, turn: int, shift: Shift) -> 
 
 
 def ring(radius: float, colour: Colour, width: float, shift: Shift) -> pygame.Surface:
-    """Return a circle's line, its middle at `radius` pixels."""
     return _ring(radius, colour, width, shift if radius <= LARGE else (0, 0))
 
 
@@ -142,7 +150,6 @@ def _fineness(radius: float) -> int:
 
 @kept(4_000_000)
 def dot(radius: float, colour: Colour, shift: Shift) -> pygame.Surface:
-    """Return a filled circle."""
     large, center = _blank(radius, shift)
     pygame.draw.circle(large, colour, center, radius * FINE)
     return _shrunk(large)

@@ -2,7 +2,6 @@
 
 from collections import OrderedDict
 from collections.abc import Callable
-from functools import wraps
 from typing import Generic, ParamSpec, TypeVar
 
 import pygame
@@ -11,51 +10,37 @@ Arguments = ParamSpec("Arguments")
 _Made = TypeVar("_Made")
 
 
-def kept(
-    most_bytes: int,
-) -> Callable[[Callable[Arguments, pygame.Surface]], Callable[Arguments, pygame.Surface]]:
-    """Let a function draw each picture once, and forget the least recently used beyond `most_bytes`.
+class Kept(Generic[Arguments]):
+    """A function that draws each picture once, and forgets those that were not used for the longest time."""
+
+    def __init__(self, draw: Callable[Arguments, pygame.Surface], most_bytes: int) -> None:
+        self._draw, self._most_bytes, self._taken = draw, most_bytes, 0
+        self.pictures: OrderedDict[object, pygame.Surface] = OrderedDict()
+
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> pygame.Surface:
+        key = (args, tuple(kwargs.items())) if kwargs else args
+        if (picture := self.pictures.get(key)) is not None:
+            self.pictures.move_to_end(key)
+            return picture
+        picture = self._draw(*args, **kwargs)
+        if _bytes(picture) <= self._most_bytes:
+            self.pictures[key] = picture
+            self._taken += _bytes(picture)
+            while self._taken > self._most_bytes:
+                self._taken -= _bytes(self.pictures.popitem(last=False)[1])
+        return picture
+
+    def cache_clear(self) -> None:
+        self.pictures.clear()
+        self._taken = 0
+
+
+def kept(most_bytes: int) -> Callable[[Callable[Arguments, pygame.Surface]], Kept[Arguments]]:
+    """Let a function keep pictures of up to so many bytes together.
 
     A count of pictures would not do: at a high magnification a single disc takes megabytes.
-
-    >>> @kept(1000)
-    ... def page(side):
-    ...     return pygame.Surface((side, side), 0, 32)
-    >>> page(9) is page(9), page(99) is page(99)
-    (True, False)
     """
-
-    def decorate(draw: Callable[Arguments, pygame.Surface]) -> Callable[Arguments, pygame.Surface]:
-        pictures: OrderedDict[object, pygame.Surface] = OrderedDict()
-        taken = 0
-
-        @wraps(draw)
-        def drawn(*args: Arguments.args, **kwargs: Arguments.kwargs) -> pygame.Surface:
-            nonlocal taken
-            key = (args, tuple(kwargs.items())) if kwargs else args
-            picture = pictures.get(key)
-            if picture is not None:
-                pictures.move_to_end(key)
-                return picture
-            picture = draw(*args, **kwargs)
-            size = _bytes(picture)
-            if size <= most_bytes:
-                pictures[key] = picture
-                taken += size
-                while taken > most_bytes:
-                    taken -= _bytes(pictures.popitem(last=False)[1])
-            return picture
-
-        def cache_clear() -> None:
-            nonlocal taken
-            pictures.clear()
-            taken = 0
-
-        drawn.cache_clear = cache_clear  # type: ignore[attr-defined]
-        drawn.pictures = pictures  # type: ignore[attr-defined]
-        return drawn
-
-    return decorate
+    return lambda draw: Kept(draw, most_bytes)
 
 
 def _bytes(picture: pygame.Surface) -> int:
@@ -63,12 +48,7 @@ def _bytes(picture: pygame.Surface) -> int:
 
 
 class Latest(Generic[_Made]):
-    """Keeps what was made last.
-
-    >>> page, size = Latest(), [1, 2]
-    >>> page.of(size, "light", lambda: object()) is page.of(size, "light", lambda: object())
-    True
-    """
+    """Keeps what was made last."""
 
     def __init__(self) -> None:
         self._kept: tuple[object, object, _Made] | None = None

@@ -17,20 +17,12 @@ MAP_COLOURS = 6  # hues for larger teams, where only cells that share an edge mu
 
 
 def rgb(code: str) -> Colour:
-    """Return the colour that is written as ``RRGGBB``.
-
-    >>> rgb("88CCEE")
-    (136, 204, 238)
-    """
+    """Return the colour that is written as ``RRGGBB``."""
     return int(code[0:2], 16), int(code[2:4], 16), int(code[4:6], 16)
 
 
 def mix(first: Colour, second: Colour, part: float) -> Colour:
-    """Return `first` with `part` (0 to 1) of `second` mixed in.
-
-    >>> mix((0, 0, 0), (200, 100, 50), 0.5)
-    (100, 50, 25)
-    """
+    """Return `first` with `part` (0 to 1) of `second` mixed in."""
     red, green, blue = (round(a + (b - a) * part) for a, b in zip(first, second, strict=True))
     return red, green, blue
 
@@ -105,19 +97,17 @@ class Theme:
 
     @property
     def moving_obstacle(self) -> Colour:
-        """The fill of obstacles that move: paler than that of static ones."""
         return mix(self.obstacle, self.background, 0.5)
 
     def cell(self, hue: int) -> Colour:
-        """Return the fill of a cell of the hue with index `hue`."""
         return mix(self.background, self.robots[hue], self.tint)
 
     def heat_table(self, count: int) -> NDArray[np.uint8]:
         """Return colours from near to far, (count, 3)."""
         anchors = np.array(self.heat, dtype=float)
         place = np.linspace(0.0, len(anchors) - 1.0, count)
-        columns = [np.interp(place, np.arange(len(anchors)), anchors[:, k]) for k in range(3)]
-        return np.asarray(np.rint(np.column_stack(columns)), dtype=np.uint8)
+        channels = [np.interp(place, np.arange(len(anchors)), channel) for channel in anchors.T]
+        return np.asarray(np.rint(np.column_stack(channels)), dtype=np.uint8)
 
     @property
     def quiet_heat(self) -> list[Colour]:
@@ -127,7 +117,6 @@ class Theme:
         return [(int(r), int(g), int(b)) for r, g, b in table[rows]]
 
     def controller(self, name: str) -> Colour:
-        """Return the colour of a controller's curves and labels, that of others where it has none."""
         return self.controllers.get(name, self.others[0])
 
     def trail(self, hue: int) -> Colour:
@@ -138,8 +127,7 @@ class Theme:
         return colour
 
 
-# codes of the light look and of the dark one
-_COLOURS = {
+_COLOURS = {  # codes of the light look and of the dark one
     "background": ("FFFFFF", "13181F"),
     "panel": ("F4F6FA", "1B212B"),
     "ink": ("1B2330", "E8ECF2"),
@@ -206,20 +194,11 @@ def robot_hues(n: int, adjacency: IntArray | None = None, previous: IntArray | N
     """
     if n <= ONE_HUE_EACH:
         return np.arange(n, dtype=np.intp)
+    known = previous if previous is not None and len(previous) == n else None
     if adjacency is None:
-        return previous if previous is not None and len(previous) == n else np.arange(n, dtype=np.intp) % 6
-    if previous is not None and len(previous) == n:
-        pairs = previous[adjacency]
-        if (pairs[:, 0] != pairs[:, 1]).all():
-            return previous
-    hues = None if previous is None or len(previous) != n else _repaired(previous.copy(), adjacency)
-    if hues is None:
-        neighbours: list[list[int]] = [[] for _ in range(n)]
-        for first, second in adjacency.tolist():
-            neighbours[first].append(second)
-            neighbours[second].append(first)
-        hues = np.array(_dsatur(neighbours), dtype=np.intp)
-    return hues
+        return np.arange(n, dtype=np.intp) % MAP_COLOURS if known is None else known
+    hues = None if known is None else _repaired(known.copy(), adjacency)
+    return _dsatur(n, adjacency) if hues is None else hues
 
 
 def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
@@ -242,9 +221,12 @@ def _repaired(hues: IntArray, adjacency: IntArray) -> IntArray | None:
     return hues
 
 
-def _dsatur(neighbours: list[list[int]]) -> list[int]:
+def _dsatur(n: int, adjacency: IntArray) -> IntArray:
     """Colour a graph by DSATUR, all colours used alike; where neighbours show all, the rarest of them."""
-    n = len(neighbours)
+    neighbours: list[list[int]] = [[] for _ in range(n)]
+    for first, second in adjacency.tolist():
+        neighbours[first].append(second)
+        neighbours[second].append(first)
     hues = [-1] * n
     uses = [0] * MAP_COLOURS
     seen: list[set[int]] = [set() for _ in range(n)]
@@ -263,9 +245,8 @@ def _dsatur(neighbours: list[list[int]]) -> list[int]:
             if hues[other] < 0 and hue not in seen[other]:
                 seen[other].add(hue)
                 heappush(waiting, (-len(seen[other]), -len(neighbours[other]), other))
-    return hues
+    return np.array(hues, dtype=np.intp)
 
 
 def border_colour(theme: Theme) -> Colour:
-    """Return the colour of the borders of geodesic cells."""
     return mix(theme.ink, theme.background, 0.1)

@@ -1,6 +1,7 @@
 """The trajectories layer: what is old is kept on a page of its own, only new pieces are drawn."""
 
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 import pygame
@@ -9,16 +10,18 @@ from robocov.arrays import Array, IntArray
 from robocov_app.render.canvas import Canvas, LegendEntry, bounded, premultiplied
 from robocov_app.render.layout import line_crowding
 from robocov_app.render.scene import Scene
-from robocov_app.render.sprites import Sketch
+from robocov_app.render.sprites import Sketch, visible_box
+from robocov_app.render.surface_cache import Latest
 from robocov_app.render.theme import ONE_HUE_EACH, Colour, mix
 
 PIECE = 2.0  # pixels between the corners of a drawn trajectory
 SECTION = 16.0  # pixels of path that are added to the page at once; what is newer is drawn anew each time
 CROWD = 400  # from so many robots on what is drawn anew is not smooth
 FADE_STEPS = 24  # shades of a trajectory that fades; its page is drawn anew as often while it fades
-# pixels at scale 1 that the fastest robot goes between the corners of trajectories that fade
-FADE_PIECE = 4.0
+FADE_PIECE = 4.0  # pixels at scale 1 that the fastest robot goes between the corners of those that fade
 _FADE_FINE = 2  # they are drawn so many times larger, and shrunk
+
+Pen: TypeAlias = tuple[list[Colour], float]  # colours of robots, width in pixels
 
 
 class Trajectories:
@@ -26,26 +29,25 @@ class Trajectories:
 
     def __init__(self, colours: str = "robots") -> None:
         self.colours = colours
-        self._page: pygame.Surface | None = None
+        self._page = pygame.Surface((0, 0))
         self._key: object = None
         self._drawn = 0
         self._last_row = np.empty((0, 2))
         self._open: list[list[list[float]]] = []
         self._ended: list[tuple[int, list[list[float]]]] = []
-        self._colours: tuple[object, list[Colour]] | None = None
+        self._trail_colours = Latest[list[Colour]]()
 
     def draw(self, canvas: Canvas, scene: Scene) -> None:
-        """Draw old sections from the page, and what is new over it."""
         trail = scene.trail
         if trail is None or len(trail) == 0:
             return
         colours = self._of_robots(canvas)
         width = canvas.scale * canvas.theme.trajectory_line * line_crowding(trail.shape[1])
-        page, continues = self._page_for(canvas, scene, trail, colours, width)
+        continues = self._continued(canvas, scene, trail, (colours, width))
         self._lengthen(bounded(canvas.camera.to_pixels(trail[self._drawn :])))
         self._drawn, self._last_row = len(trail), trail[-1].copy()
-        self._finish_sections(page, colours, width, together=not continues)
-        canvas.surface.blit(page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
+        self._finish_sections((colours, width), together=not continues)
+        canvas.surface.blit(self._page, (0, 0), special_flags=pygame.BLEND_PREMULTIPLIED)
         ends = bounded(canvas.camera.to_pixels(trail[-1])).tolist()
         whole = canvas.width(width / canvas.scale)
         # mostly below the robot's disc, where seams do not show, nor steps in a crowd
@@ -60,12 +62,15 @@ class Trajectories:
                 canvas.outline(np.array([*path, end]), colour, whole, closed=False)
 
     def _lengthen(self, rows: Array) -> None:
-        """Add the corners that lie far enough from the last of each path."""
         last = np.array([path[-1] for path in self._open])
         gaps = bool(np.isnan(last).any() or np.isnan(rows).any())
         for row in rows:
-            if gaps:
-                self._come_and_go(row, last)
+            if gaps:  # a robot that comes begins a path, and ends it when it goes
+                changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
+                for robot in np.nonzero(changed)[0].tolist():
+                    self._ended.append((robot, self._open[robot]))
+                    self._open[robot] = [row[robot].tolist()]
+                last[changed] = row[changed]
             delta = row - last
             far = delta[:, 0] ** 2 + delta[:, 1] ** 2 >= PIECE * PIECE
             if far.any():
@@ -73,64 +78,44 @@ class Trajectories:
                     self._open[robot].append(row[robot].tolist())
                 last[far] = row[far]
 
-    def _come_and_go(self, row: Array, last: Array) -> None:
-        """Begin the paths of robots that were not there before, and end those of robots that go."""
-        changed = np.isnan(last[:, 0]) != np.isnan(row[:, 0])
-        for robot in np.nonzero(changed)[0].tolist():
-            self._ended.append((robot, self._open[robot]))
-            self._open[robot] = [row[robot].tolist()]
-        last[changed] = row[changed]
-
-    def _finish_sections(
-        self, page: pygame.Surface, colours: list[Colour], width: float, together: bool
-    ) -> None:
+    def _finish_sections(self, pen: Pen, together: bool) -> None:
         """Draw what is long enough on the page, and begin anew at its end."""
-        whole = self._sketch_of_all(page) if together else None
+        colours, width = pen
         corners = 2 if together else 1 + SECTION / PIECE
-        long = [(robot, path) for robot, path in enumerate(self._open) if len(path) >= corners]
-        for robot, path in [*self._ended, *long]:
-            if len(path) < 2:
-                continue
-            sketch = whole if whole is not None else Sketch.around(path, width)
-            if sketch is not None:
-                sketch.path(path, colours[robot], width)
-                if sketch is not whole:
-                    sketch.onto(page)
-            if path is self._open[robot]:
-                self._open[robot] = path[-1:]
+        done = [(robot, path) for robot, path in self._ended if len(path) > 1]
         self._ended.clear()
-        if whole is not None:
-            whole.onto(page)
+        for robot, path in enumerate(self._open):
+            if len(path) >= corners:
+                done.append((robot, path))
+                self._open[robot] = path[-1:]
+        for group in [done] * bool(done) if together else [[each] for each in done]:
+            box = visible_box(np.concatenate([path for _, path in group]), 5.0 + width, self._page)
+            if box is not None:
+                sketch = Sketch(box)
+                for robot, path in group:
+                    sketch.path(path, colours[robot], width)
+                sketch.onto(self._page)
 
-    def _sketch_of_all(self, page: pygame.Surface) -> Sketch | None:
-        """Return a sketch that holds all of the paths that can be seen, None when nothing moved."""
-        paths = [*self._open, *(path for _, path in self._ended)]
-        moved = [np.array(path) for path in paths if len(path) > 1]
-        box = _box_of(np.concatenate(moved), 5.0, page) if moved else None
-        return Sketch(box) if box is not None else None
-
-    def _page_for(
-        self, canvas: Canvas, scene: Scene, trail: Array, colours: list[Colour], width: float
-    ) -> tuple[pygame.Surface, bool]:
-        """Return the page of old sections and whether `trail` continues them; if not, the page is fresh."""
+    def _continued(self, canvas: Canvas, scene: Scene, trail: Array, pen: Pen) -> bool:
+        """Return whether a trail continues the page of old sections; if not, that is fresh from now on."""
         size, clip = canvas.surface.get_size(), canvas.surface.get_clip()
         fade, time, step = scene.trail_fade, scene.trail_time, None
         if fade and time is not None:
             step = fade, int(np.floor(time[-1] / fade * FADE_STEPS))
         view = canvas.camera, canvas.theme.name, canvas.scale, size, tuple(clip)
-        key = *view, tuple(colours), trail.shape[1], step
+        key = *view, tuple(pen[0]), trail.shape[1], step
         continues = key == self._key and self._drawn > 0 and self._found(trail)
-        if self._page is None or not continues:
+        if not continues:
             self._page = pygame.Surface(size, pygame.SRCALPHA, 32)
             self._page.set_clip(clip)
             self._key, self._drawn = key, 0
             self._ended.clear()
             if fade and time is not None:
-                _fade_onto(self._page, canvas, trail, time, fade, colours, width)
+                _fade_onto(self._page, canvas, trail, time, fade, pen)
                 self._drawn, continues = len(trail), True
             row = trail[self._drawn - 1 if self._drawn else 0]
             self._open = [[point] for point in bounded(canvas.camera.to_pixels(row)).tolist()]
-        return self._page, continues
+        return continues
 
     def _found(self, trail: Array) -> bool:
         """Look for the row that was drawn last; where old rows were thinned it has come forward."""
@@ -147,14 +132,10 @@ class Trajectories:
             return [theme.trajectory] * n
         if n > ONE_HUE_EACH:
             return [mix(theme.trajectory, theme.background, 0.25)] * n
-        key = theme.name, tuple(canvas.hues.tolist())
-        if self._colours is None or self._colours[0] != key:
-            self._colours = key, [theme.trail(hue) for hue in canvas.hues.tolist()]
-        return self._colours[1]
+        hues = canvas.hues.tolist()
+        return self._trail_colours.of(None, (theme.name, hues), lambda: [theme.trail(hue) for hue in hues])
 
     def legend(self, scene: Scene) -> list[LegendEntry]:
-        """Return the entry of trajectories."""
-
         def glyph(canvas: Canvas, x: float, y: float) -> None:
             angle = np.linspace(-np.pi, np.pi, 24)
             wave = np.column_stack([x + angle * 2.9 * canvas.scale, y - 3 * canvas.scale * np.sin(angle)])
@@ -168,18 +149,11 @@ class Trajectories:
 
 
 def _fade_onto(
-    page: pygame.Surface,
-    canvas: Canvas,
-    trail: Array,
-    time: Array,
-    fade: float,
-    colours: list[Colour],
-    width: float,
+    page: pygame.Surface, canvas: Canvas, trail: Array, time: Array, fade: float, pen: Pen
 ) -> None:
-    """Draw the last seconds, ever more transparent into the past."""
-    begin = int(np.searchsorted(time, time[-1] - fade))
+    begin, (colours, width) = int(np.searchsorted(time, time[-1] - fade)), pen
     points = bounded(canvas.camera.to_pixels(trail[begin:]))
-    box = _box_of(points, 5.0 + width, page)
+    box = visible_box(points, 5.0 + width, page)
     if box is None:
         return
     shade = np.ceil((time[-1] - time[begin:]) / fade * FADE_STEPS)
@@ -187,9 +161,9 @@ def _fade_onto(
     rows = _corners(points, shade, FADE_PIECE * canvas.scale)
     points = (points[rows] - np.array(box.topleft) + 0.5) * _FADE_FINE
     shade = shade[rows]
-    large = pygame.Surface((box.width * _FADE_FINE, box.height * _FADE_FINE), pygame.SRCALPHA, 32)
+    sketch = Sketch(box, _FADE_FINE)
     wide = max(1, round(width * _FADE_FINE))
-    pens = np.full((len(colours), 2), np.nan)
+    tips = np.full((len(colours), 2), np.nan)
     edges = [0, *(np.flatnonzero(np.diff(shade)) + 1).tolist(), len(rows) - 1]
     # the older ones first: where paths cross, the newer ones are on top
     for first, last in pairwise(edges):
@@ -197,29 +171,21 @@ def _fade_onto(
         part = (1.0 - max(float(shade[first]) - 0.5, 0.0) / FADE_STEPS) ** 0.7
         shades = {colour: premultiplied(colour, part) for colour in set(colours)}
         paths = points[first : last + 1]
-        moves = ~(np.abs(paths - pens).max(axis=(0, 2)) < _FADE_FINE)
+        moves = ~(np.abs(paths - tips).max(axis=(0, 2)) < _FADE_FINE)
         gone = np.isnan(paths).any(axis=(0, 2)).tolist()
-        pen, lines = pens.tolist(), paths.swapaxes(0, 1).tolist()
+        tip, lines = tips.tolist(), paths.swapaxes(0, 1).tolist()
         for robot in np.flatnonzero(moves).tolist():
             colour = shades[colours[robot]]
-            if pen[robot][0] == pen[robot][0]:  # not nan
-                lines[robot][0] = pen[robot]
+            if tip[robot][0] == tip[robot][0]:  # not nan
+                lines[robot][0] = tip[robot]
             for run in _runs(paths[:, robot]) if gone[robot] else [lines[robot]]:
-                _stroke(large, run, colour, wide)
-        pens[moves] = paths[-1, moves]
-    picture = pygame.transform.smoothscale(large, box.size)
-    page.blit(picture, box, special_flags=pygame.BLEND_PREMULTIPLIED)
-
-
-def _box_of(points: Array, margin: float, page: pygame.Surface) -> pygame.Rect | None:
-    """Return what of the surroundings of (..., 2) px points can be seen on a page; None for nothing."""
-    flat = points.reshape(-1, 2)
-    flat = flat[np.isfinite(flat[:, 0])]
-    if not len(flat):
-        return None
-    low, high = np.floor(flat.min(axis=0) - margin), np.ceil(flat.max(axis=0) + margin)
-    box = pygame.Rect(low.astype(int).tolist(), (high - low).astype(int).tolist()).clip(page.get_clip())
-    return box if box.width and box.height else None
+                if len(run) > 1:
+                    pygame.draw.lines(sketch.large, colour, False, run, wide)
+                # lines have straight ends: fill the corners' notches
+                for point in run if len(run) > 1 and wide > 2.5 * _FADE_FINE else ():
+                    pygame.draw.circle(sketch.large, colour, point, wide / 2)
+        tips[moves] = paths[-1, moves]
+    sketch.onto(page)
 
 
 def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
@@ -227,36 +193,18 @@ def _corners(points: Array, shade: IntArray, piece: float) -> IntArray:
     gone = np.isnan(points[..., 0])
     steps = np.hypot(*np.moveaxis(np.diff(points, axis=0), -1, 0))
     way = np.floor(np.cumsum(np.where(np.isnan(steps), 0.0, steps).max(axis=1)) / piece)
-    needed = np.zeros(len(points), dtype=bool)
-    needed[0] = needed[-1] = True
-    needed[1:] |= np.diff(way, prepend=0.0) > 0
-    needed[1:] |= np.diff(shade) != 0
     changes = (gone[1:] != gone[:-1]).any(axis=1)
-    needed[1:] |= changes
+    needed = np.append(True, (np.diff(way, prepend=0.0) > 0) | (np.diff(shade) != 0) | changes)
     needed[:-1] |= changes
+    needed[-1] = True
     return np.flatnonzero(needed)
 
 
 def _runs(path: Array) -> list[list[list[float]]]:
-    there = np.isfinite(path[:, 0])
-    if there.all():
-        return [path.tolist()]
-    pieces = np.split(path, np.flatnonzero(np.diff(there)) + 1)
+    """Return the pieces of (k, 2) between those where the robot is not there."""
+    pieces = np.split(path, np.flatnonzero(np.diff(np.isfinite(path[:, 0]))) + 1)
     return [piece.tolist() for piece in pieces if np.isfinite(piece[0, 0])]
 
 
-def _stroke(
-    surface: pygame.Surface, path: list[list[float]], colour: tuple[int, int, int, int], width: int
-) -> None:
-    if len(path) < 2:
-        return
-    pygame.draw.lines(surface, colour, False, path, width)
-    if width > 2.5 * _FADE_FINE:  # lines have straight ends: fill the corners' notches
-        for point in path:
-            pygame.draw.circle(surface, colour, point, width / 2)
-
-
 def _same_rows(rows: Array, other: Array) -> Array:
-    if rows.shape[1:] != other.shape:
-        return np.zeros(len(rows), dtype=bool)
     return np.asarray(((rows == other) | (np.isnan(rows) & np.isnan(other))).all(axis=(1, 2)))

@@ -15,10 +15,7 @@ from robocov.errors import InputError, ParameterError, checked, shown
 T = TypeVar("T")
 
 _WORDING: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (
-        r"^Error parsing (\S+): invalid literal for int\(\) with base 10: (.*)$",
-        r"\1: \2, but a whole number was wanted",
-    ),
+    (r"^Error parsing (\S+): invalid literal for int.* 10: (.*)$", r"\1: \2, but a whole number was wanted"),
     (r"^Error parsing (\S+): could not convert string to float: (.*)$", r"\1: \2, but a number was wanted"),
     (
         r"^Error parsing (\S+): no type matching (INT|FLOAT) could be .* from \[(.*?)\]\. .*$",
@@ -70,20 +67,15 @@ def _for_readers(kind: type[T]) -> type[T]:
     hint = tyro.conf.arg(help_behavior_hint=_default_hint)
     for each in (kind, *groups_of(kind)):
         own: Any = each
-        hints = get_type_hints(own, include_extras=True)
+        hints, known = get_type_hints(own, include_extras=True), own.__dataclass_fields__
         own.__annotations__ = {name: Annotated[hints[name], hint] for name in hints}
-        order = [*_FIRST, *(name for name in own.__dataclass_fields__ if name not in _LAST), *_LAST]
-        known = own.__dataclass_fields__
+        order = [*_FIRST, *(name for name in known if name not in _LAST), *_LAST]
         own.__dataclass_fields__ = {name: known[name] for name in order if name in known}
     return kind
 
 
 def _default_hint(label: str) -> str:
-    """Return what the help says of a default value.
-
-    >>> _default_hint("0.016666666666666666"), _default_hint("None")
-    ('(default: 0.01667)', '')
-    """
+    """Return what the help says of a default value."""
     with contextlib.suppress(ValueError):
         label = f"{float(label):.4g}" if "." in label else label
     return "" if label in ("", "None", "False") else f"(default: {label})"
@@ -95,12 +87,7 @@ def groups_of(kind: Any) -> list[Any]:
 
 
 def by_option(kind: Any, message: str) -> str:
-    """Return a message on a value with the option that gives it in the place of the value's path.
-
-    >>> from dataclasses import make_dataclass
-    >>> by_option(make_dataclass("Arguments", ["fail"]), "conditions.failures[0]: robot 9, but 1 was wanted")
-    '--fail: robot 9, but 1 was wanted'
-    """
+    """Return a message on a value with the option that gives it in the place of the value's path."""
     groups = [kind, *groups_of(kind)]
     found = re.match(r"(?:conditions\.|team\.)?(\w+)(?:\[\d+\])?(?=: )", message)
     name = {"failures": "fail", "joins": "join"}.get(found[1], found[1]) if found else ""
@@ -134,9 +121,8 @@ def parsed_size(option: str, text: str, least: tuple[int, int], most: tuple[int,
     """Return width and height from a text like ``1280x720``; raises ParameterError."""
     match = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", text)
     if not match:
-        raise ParameterError(
-            f"{option}: {shown(text)}, but WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
-        )
+        wanted = "WIDTHxHEIGHT in pixels, as in 1280x720, was wanted"
+        raise ParameterError(f"{option}: {shown(text)}, but {wanted}")
     width, height = int(match[1]), int(match[2])
     checked(option, width, least[0], most[0], "pixels wide")
     checked(option, height, least[1], most[1], "pixels high")
@@ -149,11 +135,7 @@ def window_size(text: str | None) -> tuple[int, int] | None:
 
 
 def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
-    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word.
-
-    >>> parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
-    {'k_rep': 0.3, 'attraction_limit': None, 'target': 'median'}
-    """
+    """Return gains from texts like ``k_rep=0.3``; the value is JSON, ``null`` for no limit, or a word."""
     gains: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
@@ -167,7 +149,6 @@ def parsed_gains(texts: tuple[str, ...]) -> dict[str, Any]:
         try:
             gains[name] = json.loads(value)
         except (ValueError, RecursionError) as error:  # also of thousands of digits, or brackets
-            raise ParameterError(
-                f"--set {name}: {shown(value)}, but a number (or null), or a word, was wanted"
-            ) from error
+            wanted = "a number (or null), or a word, was wanted"
+            raise ParameterError(f"--set {name}: {shown(value)}, but {wanted}") from error
     return gains

@@ -7,6 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,27 +18,34 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
+def tell(options: Any, answer: Any, *lines: str, indent: int | None = None) -> None:
+    """Print an answer: with --json as one JSON object, with null for what is not finite; else as lines."""
+    if options.json:
+        print(json.dumps(finite(answer), indent=indent))  # noqa: T201 - it is the answer
+    else:
+        print(*lines, sep="\n", end="\n" if lines else "")  # noqa: T201
+
+
 def free_name(folder: Path, stem: str, suffix: str) -> Path:
     """Return a path that is not there yet: ``stem-1.suffix``, ``stem-2.suffix``, ..."""
     stem = stem.rstrip("0123456789").rstrip("-") or stem
-    k = 1
-    while os.path.lexists(folder / f"{stem}-{k}{suffix}"):  # a link to nothing is there, too
-        k += 1
-    return folder / f"{stem}-{k}{suffix}"
+    paths = (folder / f"{stem}-{k}{suffix}" for k in count(1))
+    return next(path for path in paths if not os.path.lexists(path))  # a link to nothing is there, too
 
 
-def require_fresh(path: Path, other: str, *, overwrite: bool, source: Path | None = None) -> None:
+def require_fresh(
+    path: Path, other: str, *, overwrite: bool, source: Path | None = None, read: str = "file"
+) -> None:
     """Raise InputError where `path` may not be written: it is the source, or there is a file already."""
     if not writable(path).exists():
         return
     if source is not None and source.exists() and path.samefile(source):
-        raise InputError(f"{path}: the file that is read; {other} was wanted")
+        raise InputError(f"{path}: the {read} that is read; {other} was wanted")
     if not overwrite:
         raise InputError(f"{path}: exists already; {other}, or --overwrite, was wanted")
 
 
 def listed(folder: Path) -> str:
-    """Return the names of what a result consists of, for people."""
     return ", ".join(sorted(path.name for path in folder.iterdir() if not path.name.startswith(".")))
 
 
@@ -48,7 +56,6 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def json_text(content: Any) -> str:
-    """Return what `write_json` writes."""
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
@@ -59,8 +66,7 @@ def write_csv(path: Path, header: str, rows: Iterable[Iterable[object]]) -> None
 
 
 def csv_text(header: str, rows: Iterable[Iterable[object]]) -> str:
-    """Return what `write_csv` writes."""
-    lines = [header, *(",".join(str(cell) for cell in row) for row in rows)]
+    lines = [header, *(",".join(map(str, row)) for row in rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -70,9 +76,7 @@ def finite(content: Any) -> Any:
         return {key: finite(value) for key, value in content.items()}
     if isinstance(content, list):
         return [finite(value) for value in content]
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
-    return content
+    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 PIPED_WIDTH = 140  # columns of a table that goes to a file or a pipe

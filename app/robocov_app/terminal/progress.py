@@ -18,8 +18,7 @@ def progress(label: str, total: int, *, quiet: bool = False) -> Iterator[Callabl
         with _bar(label, total) as update:
             yield update
     else:
-        began = time.perf_counter()
-        reached = 0
+        began, reached = time.perf_counter(), 0
 
         def note(done: int) -> None:
             nonlocal reached
@@ -59,19 +58,13 @@ def _bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (
-        TextColumn(f"{label:<12}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
+    words, left = TextColumn(f"{label:<12}", markup=False), TimeRemainingColumn(elapsed_when_finished=True)
+    with Progress(words, BarColumn(), MofNCompleteColumn(), left, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total)
         yield lambda done: bar.update(task, completed=done)
 
 
 def tell_of_compiling() -> None:
-    """Tell when kernels are compiled for the first time."""
     from robocov import compiled
 
     if _tell not in compiled.on_compile:

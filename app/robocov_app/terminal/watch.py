@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeAlias
 
 INTERVAL = 0.25
 """Seconds between two looks at the files. A look costs microseconds, and a save is noticed at once."""
@@ -13,35 +12,30 @@ SETTLED = 0.1
 
 LONGEST = 2.0  # seconds after which a file that never settles counts as changed all the same
 
-_State: TypeAlias = tuple[int, int, int, int] | None
-
 
 def changes(
     paths: Sequence[Path], *, sleep: Callable[[float], None] = time.sleep
 ) -> Iterator[tuple[Path, ...]]:
     """Yield the files, or links to them, that were written, removed or replaced; at first all; for ever."""
-    seen = {path: _state(path) for path in paths}
+    seen = list(map(_state, paths))
     yield tuple(paths)
     while True:
         sleep(INTERVAL)
-        changed = [path for path in paths if _state(path) != seen[path]]
-        if not changed:
+        first = now = list(map(_state, paths))
+        if now == seen:
             continue
-        waited = 0.0
-        while waited < LONGEST:
-            now = {path: _state(path) for path in paths}
+        waited, before = 0.0, None
+        while waited < LONGEST and now != before:
             sleep(SETTLED)
             waited += SETTLED
-            if all(_state(path) == now[path] for path in paths):
-                break
-        # noted before anything is read: what is written from now on is another change
-        now = {path: _state(path) for path in paths}
-        changed = [path for path in paths if path in changed or now[path] != seen[path]]
+            # noted before anything is read: what is written from now on is another change
+            before, now = now, list(map(_state, paths))
+        states = zip(paths, seen, first, now, strict=True)
         seen = now
-        yield tuple(changed)
+        yield tuple(path for path, old, *new in states if new != [old, old])
 
 
-def _state(path: Path) -> _State:
+def _state(path: Path) -> tuple[int, int, int, int] | None:
     try:
         found = path.stat()
     except (OSError, ValueError):

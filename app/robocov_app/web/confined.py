@@ -6,6 +6,7 @@ import sysconfig
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,12 @@ from robocov.files.array_files import ArrayCache
 from robocov.mapfile import bundled_maps
 
 # Python's audit events, and which of their arguments are paths
+_READING = ("os.listdir", "os.scandir")
 _EVENTS = {
-    **dict.fromkeys(("open", "os.listdir", "os.scandir", "os.mkdir", "os.rmdir", "os.remove"), 1),
+    **dict.fromkeys((*_READING, "open", "os.mkdir", "os.rmdir", "os.remove"), 1),
     **dict.fromkeys(("os.truncate", "os.chmod", "os.utime"), 1),
     **dict.fromkeys(("os.rename", "os.link", "os.symlink"), 2),
 }
-_READING = ("os.listdir", "os.scandir")
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 _read: tuple[Path, ...] | None = None  # None: everything is allowed
@@ -46,27 +47,22 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
             raise OutsideError(f"{os.fsdecode(given)}: outside of the folder that is served")
 
 
+@cache
+def _add_hook() -> None:
+    sys.addaudithook(_audit)  # for the rest of the process
+
+
 @contextmanager
 def confined(folder: Path) -> Iterator[None]:
     """Let the process read and write files only below a folder, and read those that programs consist of.
 
-    Also what is typed into the palette, named in a session or linked to is held to this, since Python itself
-    asks; OutsideError, which is an InputError and a PermissionError, says no.
+    Python itself asks: what is typed, named in a session or linked to is held to this. Raises OutsideError.
     """
     global _read, _written
-    if _audit not in _hooked:
-        sys.addaudithook(_audit)
-        _hooked.append(_audit)
-    places: list[str | Path] = [
-        *sysconfig.get_paths().values(),
-        sys.prefix,
-        sys.base_prefix,
-        "/dev",
-        "/proc",
-        "/usr/share",
-    ]
-    places += [Path(str(module.__file__)).parent for module in (robocov, robocov_app)]
-    places += [path.parent for path in bundled_maps().values()]
+    _add_hook()
+    programs = *sysconfig.get_paths().values(), sys.prefix, sys.base_prefix, "/dev", "/proc", "/usr/share"
+    packages = (Path(str(module.__file__)).parent for module in (robocov, robocov_app))
+    places: tuple[str | Path, ...] = *programs, *packages, *(path.parent for path in bundled_maps().values())
     arrays = ArrayCache.of_user()
     caches = [each for each in (cache_folder(), arrays and arrays.folder) if each]
     before = tempfile.tempdir
@@ -79,6 +75,3 @@ def confined(folder: Path) -> Iterator[None]:
             yield
         finally:
             _read, tempfile.tempdir = None, before
-
-
-_hooked: list[object] = []

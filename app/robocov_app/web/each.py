@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import asyncio
-import hmac
 import multiprocessing
 import secrets
 from _thread import interrupt_main
 from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, replace
-from http.cookies import CookieError, SimpleCookie
 from io import TextIOBase
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from threading import Thread
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from robocov.errors import InputError
+from robocov_app.web.access import cookies_of, link_to, same, token_in
 
 LONGEST_HEAD = 1 << 14  # bytes of a request's head
 PATIENCE = 20.0  # seconds that a request's head may take
@@ -72,15 +71,12 @@ class Sessions:
         self._starting = asyncio.Lock()
 
     async def serve(self, tell: Callable[[str], object]) -> None:
-        """Listen until the process is stopped; InputError where that cannot be."""
         host, port = self._options.host, self._options.port
         try:
             server = await asyncio.start_server(self._carry, host, port, limit=LONGEST_HEAD)
         except OSError as error:
             raise InputError(f"--port: {host}:{port} cannot be listened to: {error.strerror}") from None
-        shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
-        shown = f"[{shown}]" if ":" in shown else shown
-        tell(f"open http://{shown}:{server.sockets[0].getsockname()[1]}/?token={self.token}")
+        tell(f"open {link_to(host, server.sockets[0].getsockname()[1], self.token)}")
         try:
             async with server:
                 await server.serve_forever()
@@ -91,7 +87,6 @@ class Sessions:
                 each.process.join(5.0)
 
     async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Carry one connection to the window of who makes it."""
         with suppress(OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
             head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), PATIENCE)
             found = await self._session_of(head)
@@ -108,18 +103,15 @@ class Sessions:
     async def _session_of(self, head: bytes) -> _Session | str:
         """Return the window that a request is for, or an answer."""
         first, *lines = head.decode("latin-1").split("\r\n")
-        path = first.partition(" ")[2].partition(" ")[0]
-        given = (parse_qs(urlsplit(path).query).get("token") or [""])[0]
-        cookies: SimpleCookie = SimpleCookie()
-        with suppress(CookieError):
-            cookies.load("; ".join(line[7:].strip() for line in lines if line[:7].lower() == "cookie:"))
+        given = token_in(first.partition(" ")[2].partition(" ")[0])
+        cookies = cookies_of(line[7:].strip() for line in lines if line[:7].lower() == "cookie:")
         self._sessions = [each for each in self._sessions if each.process.is_alive()]
-        for token in (given, *(each.value for each in cookies.values())):
+        for token in (given, *cookies.values()):
             for each in self._sessions:
-                if _same(token, each.token):
+                if same(token, each.token):
                     # with the link of all in the address: to the own window
-                    return _answer("303 See Other", each.token) if _same(given, self.token) else each
-        if not _same(given, self.token):
+                    return _answer("303 See Other", each.token) if same(given, self.token) else each
+        if not same(given, self.token):
             return _answer("403 Forbidden")
         async with self._starting:
             if len(self._sessions) >= self._most:
@@ -138,14 +130,12 @@ class Sessions:
         process = context.Process(target=_session, args=(self._command, own, says), daemon=False)
         process.start()
         says.close()
-        if not said.poll(_START):
-            process.terminate()
-            raise OSError("the window did not open")
-        try:
-            link = urlsplit(said.recv().removeprefix("open ").strip())
-        except EOFError:
-            raise OSError("the window did not open") from None
-        return _Session(process, link.port or 0, parse_qs(link.query)["token"][0])
+        with suppress(EOFError):
+            if said.poll(_START):
+                link = said.recv().removeprefix("open ").strip()
+                return _Session(process, urlsplit(link).port or 0, token_in(link))
+        process.terminate()
+        raise OSError("the window did not open")
 
 
 def _answer(status: str, token: str = "") -> str:
@@ -164,7 +154,3 @@ async def _copied(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) ->
             await writer.drain()
     with suppress(OSError):
         writer.close()
-
-
-def _same(token: str, other: str) -> bool:
-    return hmac.compare_digest(token.encode(errors="replace"), other.encode())

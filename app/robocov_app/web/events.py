@@ -24,31 +24,30 @@ class _OfHands(_Message):
     held: int = Field(default=0, ge=0, le=15)  # Shift 1, Ctrl 2, Alt 4, Meta 8
 
 
-class PointerMoved(_OfHands):
+class _OfPointer(_OfHands):
+    x: _Pixel
+    y: _Pixel
+
+
+class PointerMoved(_OfPointer):
     """The pointer is elsewhere; `button` is held meanwhile, 0 for none."""
 
     kind: Literal["move"]
-    x: _Pixel
-    y: _Pixel
     button: int = Field(default=0, ge=0, le=3)
 
 
-class ButtonChanged(_OfHands):
+class ButtonChanged(_OfPointer):
     """A button of the mouse is pressed, or let go."""
 
     kind: Literal["button"]
-    x: _Pixel
-    y: _Pixel
     button: int = Field(ge=1, le=3)
     down: bool
 
 
-class WheelTurned(_OfHands):
+class WheelTurned(_OfPointer):
     """The wheel is turned by notches."""
 
     kind: Literal["wheel"]
-    x: _Pixel
-    y: _Pixel
     right: _Turn = 0.0
     up: _Turn
 
@@ -132,20 +131,13 @@ def message_of(text: str) -> Message:
     return _MESSAGES.validate_json(text)
 
 
-_KEYS = {
-    "Enter": pygame.K_RETURN,
-    "Shift": pygame.K_LSHIFT,
-    "Control": pygame.K_LCTRL,
-    "Alt": pygame.K_LALT,
-    "Meta": pygame.K_LMETA,
-    **{
-        name: getattr(pygame, f"K_{name.removeprefix('Arrow').upper()}")
-        for name in (
-            *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
-            *("Escape", "Backspace", "Tab", "Delete", "Insert", *(f"F{k}" for k in range(1, 13))),
-        )
-    },
-}
+_NAMED_ALIKE = [
+    *("ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"),
+    *("Escape", "Backspace", "Tab", "Delete", "Insert", *(f"F{k}" for k in range(1, 13))),
+]
+_KEYS = {name: getattr(pygame, f"K_{name.removeprefix('Arrow').upper()}") for name in _NAMED_ALIKE}
+_KEYS |= {"Enter": pygame.K_RETURN, "Shift": pygame.K_LSHIFT, "Control": pygame.K_LCTRL}
+_KEYS |= {"Alt": pygame.K_LALT, "Meta": pygame.K_LMETA}
 # pygame names keys by what they are without Shift, browsers by what they write
 _UNSHIFTED = str.maketrans('!@#$%^&*()_+{}|:"<>?~', "1234567890-=[]\\;',./`")
 _MODIFIERS = (pygame.KMOD_LSHIFT, pygame.KMOD_LCTRL, pygame.KMOD_LALT, pygame.KMOD_LMETA)
@@ -158,7 +150,6 @@ class Hands:
         self._at = (0, 0)
 
     def events(self, message: OfHands | Uploaded) -> Iterator[Event]:
-        """Yield the events of a message."""
         match message:
             case PointerMoved():
                 yield self._moved(message.x, message.y, message.button)
@@ -169,12 +160,8 @@ class Hands:
             case WheelTurned():
                 yield self._moved(message.x, message.y, 0)
                 right, up = message.right, message.up
-                turned: dict[str, Any] = {
-                    "x": round(right),
-                    "y": round(up),
-                    "precise_x": right,
-                    "precise_y": up,
-                }
+                turned: dict[str, Any] = {"x": round(right), "y": round(up)}
+                turned |= {"precise_x": right, "precise_y": up}
                 yield Event(pygame.MOUSEWHEEL, **turned, flipped=False, touch=False)
             case KeyChanged():
                 yield from _key(message)

@@ -27,7 +27,7 @@ class LiveWindow:
         call = [sys.executable, "-m", "robocov_app", *arguments, "--serve", "--port", "0"]
         pipe, none = subprocess.PIPE, subprocess.DEVNULL
         self._process = subprocess.Popen(call, stdin=none, stdout=pipe, stderr=pipe, text=True)
-        self._end = weakref.finalize(self, _ended, self._process)
+        self.close = weakref.finalize(self, _ended, self._process)
         assert self._process.stdout is not None
         self.height = height
         found = re.match(r"open (\S+)", self._process.stdout.readline())
@@ -35,10 +35,6 @@ class LiveWindow:
             _, words = self._process.communicate()
             raise RobocovError(words.strip().removeprefix("robocov: error: ") or "the window did not open")
         self.link = found[1]
-
-    def close(self) -> None:
-        """End the window."""
-        self._end()
 
     def _repr_html_(self) -> str:
         link = self.link
@@ -51,12 +47,9 @@ class LiveWindow:
 
 
 def _ended(process: subprocess.Popen[str]) -> None:
-    process.terminate()
-    try:
-        process.wait(5)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-    for stream in (process.stdout, process.stderr):
-        if stream is not None:
-            stream.close()
+    with process:  # which closes its streams, and waits
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()

@@ -22,7 +22,6 @@ class Picture:
 
     @classmethod
     def of(cls, surface: Surface, number: int) -> "Picture":
-        """Copy what is on a surface."""
         high, wide = surface.get_height(), surface.get_pitch() // 4
         buffer: Any = surface.get_buffer()
         view = np.frombuffer(buffer, np.uint32).reshape(high, wide)

@@ -1,30 +1,27 @@
 """The server of a window: one page, its pictures and what hands do there, behind a token.
 
 The window's loop stays in the main thread and knows a `Remote` and nothing of browsers; the server has a
-thread of its own. Only ``websockets`` is needed. (rendercanvas' ``http`` backend, looked at in 2.7.2, has
-one canvas for a process, neither tokens nor origins checked, no control handed over, no text and no
-clipboard, and sends whole pictures as JPEG: all that is here would have come on top of it.)
+thread of its own. (rendercanvas' ``http`` backend has none of tokens, origins, control, text and clipboard.)
 """
 
 from __future__ import annotations
 
 import asyncio
-import hmac
 import json
-import os
 import secrets
 import threading
 from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
 from hashlib import sha256
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from importlib.resources import files
 from io import BytesIO
 from itertools import count, islice
 from pathlib import Path
 from time import monotonic, time
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, quote, unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
@@ -37,20 +34,8 @@ from robocov_app.terminal.output import free_name
 from robocov_app.toolkit import clipboard
 from robocov_app.toolkit.dialogs import MOST_LISTED
 from robocov_app.toolkit.input import shown_cursor
-from robocov_app.web.events import (
-    MOST_PIXELS,
-    Control,
-    Hands,
-    Left,
-    Message,
-    Named,
-    OfHands,
-    PageChanged,
-    PictureShown,
-    Uploaded,
-    message_of,
-    modifiers,
-)
+from robocov_app.web import events
+from robocov_app.web.access import cookies_of, link_to, same, token_in
 from robocov_app.web.pictures import Picture, encoded
 
 if TYPE_CHECKING:
@@ -61,25 +46,9 @@ if TYPE_CHECKING:
 
 LONGEST = 1 << 17  # letters of a message that comes in
 LARGEST_UPLOAD = 1 << 24  # bytes of a file
-PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".webp", ".tif", ".tiff", ".pgm")
-MAPS = (
-    *(
-        ".json",
-        ".geojson",
-        ".wkt",
-        ".svg",
-        ".dxf",
-        ".yaml",
-        ".yml",
-        ".tmx",
-        ".osm",
-        ".map",
-        ".scen",
-        ".world",
-    ),
-    *(".argos", ".xml"),
-)
-UPLOADS = frozenset((".robocov", *PICTURES, *MAPS))
+_PICTURES = "png jpg jpeg bmp gif webp tif tiff pgm"
+_MAPS = "json geojson wkt svg dxf yaml yml tmx osm map scen world argos xml"
+UPLOADS = frozenset(f".{suffix}" for suffix in f"robocov {_PICTURES} {_MAPS}".split())
 _OFFERED = UPLOADS | {".mp4", ".csv", ".html", ".pdf", ".zip"}  # what is saved is offered for download
 _MOST_COPIED = 100_000
 MOST_EVENTS = 400.0  # messages a second that are taken from one page; what is more waits in the line
@@ -102,20 +71,20 @@ _CURSORS = {
 }
 
 
+@dataclass(eq=False)
 class Page:
     """A browser that shows the window."""
 
-    def __init__(self, line: ServerConnection, number: int, teacher: bool) -> None:
-        self.line = line
-        self.number = number
-        self.teacher = teacher  # may take control at any time
-        self.name = f"{'Teacher' if teacher else 'Viewer'} {number}"
-        self.asks = False  # for control
-        self.shown: Picture | None = None  # the picture that it has, or will have
-        self.sent: deque[int] = deque()  # numbers of pictures on their way
-        self.told: dict[str, Any] = {}
-        self.size: PageChanged | None = None
-        self.changed = asyncio.Event()
+    line: ServerConnection
+    number: int
+    teacher: bool  # may take control at any time
+    name: str
+    asks: bool = False  # for control
+    shown: Picture | None = None  # the picture that it has, or will have
+    sent: deque[int] = field(default_factory=deque)  # numbers of pictures on their way
+    told: dict[str, Any] = field(default_factory=dict)
+    size: events.PageChanged | None = None
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
 
 
 class WebDisplay:
@@ -135,55 +104,39 @@ class WebDisplay:
         self._looked, self._since = 0.0, time()
         # browsers share cookies among all ports of a machine
         self._cookie = f"robocov-{sha256(self.token.encode()).hexdigest()[:12]}"
-        self._waiting: deque[OfHands | Uploaded] = deque()
-        self._wanted: PageChanged | None = None
-        self._given: PageChanged | None = None
-        self._hands = Hands()
+        self._waiting: deque[events.OfHands | events.Uploaded] = deque()
+        self._wanted: events.PageChanged | None = None
+        self._given: events.PageChanged | None = None
+        self._hands = events.Hands()
         self._held, self._narrow = 0, False
         self._picture: Picture | None = None
         # also a page that is there before the first picture is told all of it
         self._told: dict[str, Any] = {"cursor": "default", "title": "robocov", "saved": ()}
         self._pages: list[Page] = []
         self._encoded: dict[tuple[int, int], bytes] = {}
-        self._loop = asyncio.new_event_loop()
+        self._loop: asyncio.AbstractEventLoop
         self._ended = asyncio.Event()
-        self._thread = threading.Thread(target=self._serve, name="web", daemon=True)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="web", daemon=True)
         self._begun, self._called = threading.Event(), threading.Event()
         self._trouble: OSError | None = None
 
     # the window's side
 
     def __enter__(self) -> WebDisplay:
-        """Listen; InputError where that cannot be."""
         self._thread.start()
         self._begun.wait()
         if self._trouble is not None:
             why = self._trouble.strerror or self._trouble
             raise InputError(f"--port: {self.host}:{self.port} cannot be listened to: {why}")
+        self.link = link_to(self.host, self.port, self.token)
+        self.watch_link = link_to(self.host, self.port, self.watch_token)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let all pages go."""
         self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join(5.0)
 
-    @property
-    def link(self) -> str:
-        """The address of who controls."""
-        return f"{self._address}?token={self.token}"
-
-    @property
-    def watch_link(self) -> str:
-        """The address of those who watch."""
-        return f"{self._address}?token={self.watch_token}"
-
-    @property
-    def _address(self) -> str:
-        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
-
     def wait(self, seconds: float) -> None:
-        """Wait until something comes in, and so many seconds at most."""
         if self._called.wait(max(seconds, 0.001)):  # other threads get their turn in any case
             self._called.clear()
 
@@ -206,13 +159,12 @@ class WebDisplay:
                     self._called.set()
                     return
                 self._held = held
-                pygame.key.set_mods(modifiers(held))
+                pygame.key.set_mods(events.modifiers(held))
             for event in self._hands.events(self._waiting.popleft()):
                 pygame.event.post(event)
                 posted = True
 
     def send(self, surface: pygame.Surface) -> None:
-        """Show a picture where it is another than the last one."""
         before = self._picture
         picture = Picture.of(surface, 1 if before is None else before.number + 1)
         title = next(iter(pygame.display.get_caption()), "robocov")
@@ -231,47 +183,33 @@ class WebDisplay:
         for page in self._pages:
             page.changed.set()
 
-    def _serve(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        try:
-            self._loop.run_until_complete(self._listen())
-        finally:
-            self._begun.set()
-            self._loop.close()
-
-    async def _listen(self) -> None:
+    async def _serve(self) -> None:
         from websockets.asyncio.server import serve
 
+        self._loop = asyncio.get_running_loop()
+        how: dict[str, Any] = {"process_request": self._answer, "compression": None, "server_header": None}
+        how |= {"max_size": LARGEST_UPLOAD, "max_queue": 16, "write_limit": 1 << 16}
         try:
-            server = await serve(
-                self._talk,
-                self.host,
-                self.port,
-                process_request=self._answer,
-                compression=None,
-                max_size=LARGEST_UPLOAD,
-                max_queue=16,
-                write_limit=1 << 16,
-                server_header=None,
-            )
+            async with serve(self._talk, self.host, self.port, **how) as server:
+                self.port = server.sockets[0].getsockname()[1]
+                self._begun.set()
+                await self._ended.wait()
         except OSError as error:
             self._trouble = error
-            return
-        async with server:
-            self.port = server.sockets[0].getsockname()[1]
+        finally:
             self._begun.set()
-            await self._ended.wait()
 
     async def _answer(self, line: ServerConnection, request: Request) -> Response | None:
         """Answer a request for the page; None lets a socket be opened."""
         place = urlsplit(request.path)
-        given = (parse_qs(place.query).get("token") or [""])[0]
         if not self._known(self._secret(request)):
-            return line.respond(
-                HTTPStatus.FORBIDDEN, "This needs the whole link that robocov printed, with its token.\n"
-            )
+            words = "This needs the whole link that robocov printed, with its token.\n"
+            return line.respond(HTTPStatus.FORBIDDEN, words)
         if place.path.endswith("/socket"):
-            if not _own_origin(request):
+            # our own page opens it; what is no browser names no origin
+            origins, headers = request.headers.get_all("Origin"), request.headers
+            hosts = headers.get_all("Host") + headers.get_all("X-Forwarded-Host")
+            if len(origins) > 1 or any(urlsplit(origin).netloc not in hosts for origin in origins):
                 return line.respond(HTTPStatus.FORBIDDEN, "Another page may not drive this window.\n")
             if len(self._pages) >= MOST_PAGES:
                 return line.respond(HTTPStatus.SERVICE_UNAVAILABLE, "Too many pages show this window.\n")
@@ -281,56 +219,47 @@ class WebDisplay:
             return await asyncio.to_thread(self._download, line, unquote(name))
         if not place.path.endswith("/"):
             return line.respond(HTTPStatus.NOT_FOUND, "Nothing is there.\n")
-        return self._page(line, given)
+        return self._page(line, token_in(request.path))
 
     def _page(self, line: ServerConnection, given: str) -> Response:
         nonce = secrets.token_urlsafe(12)
         page = files("robocov_app.web").joinpath("page.html").read_text("utf-8").replace("{nonce}", nonce)
-        answer = line.respond(HTTPStatus.OK, page)
-        headers = answer.headers
-        del headers["Content-Type"]
-        headers["Content-Type"] = "text/html; charset=utf-8"
         framed = "*" if self._known(given) else "'none'"  # notebooks frame it: who does knows the token
-        headers["Content-Security-Policy"] = (
+        policy = (
             f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; img-src data:; "
-            "connect-src 'self'; base-uri 'none'; form-action 'none'; "
-            f"frame-ancestors {framed}"
+            f"connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {framed}"
         )
-        headers["Referrer-Policy"] = "no-referrer"
-        headers["X-Content-Type-Options"] = "nosniff"
-        headers["Cache-Control"] = "no-store"
+        headers = {
+            "Content-Security-Policy": policy,
+            "Referrer-Policy": "no-referrer",
+            "Cache-Control": "no-store",
+        }
         if self._known(given):  # of no path: it is that of the page, also behind a proxy
             headers["Set-Cookie"] = f"{self._cookie}={given}; HttpOnly; SameSite=Strict"
-        return answer
+        return _answer(line, page.encode(), "text/html; charset=utf-8", headers)
 
     def _download(self, line: ServerConnection, name: str) -> Response:
-        """Answer with a file that was saved, or with a folder as a zip."""
-        answer, path = line.respond(HTTPStatus.OK, ""), self.folder / name
+        path = self.folder / name
         try:
-            answer.body = zipped(path) if path.is_dir() else path.read_bytes()
+            body = zipped(path) if path.is_dir() else path.read_bytes()
         except OSError:
             return line.respond(HTTPStatus.NOT_FOUND, "It is not there any more.\n")
         name += ".zip" * path.is_dir()
-        for header in ("Content-Type", "Content-Length"):
-            del answer.headers[header]
-        answer.headers["Content-Type"] = "application/octet-stream"
-        answer.headers["Content-Length"] = str(len(answer.body))
-        answer.headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(name)}"
-        answer.headers["X-Content-Type-Options"] = "nosniff"
-        return answer
+        headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(name)}"}
+        return _answer(line, body, "application/octet-stream", headers)
 
     def _secret(self, request: Request) -> str:
         """Return the token that came with a request: in its address, else as a cookie."""
-        given = (parse_qs(urlsplit(request.path).query).get("token") or [""])[0]
-        return given or _cookie(request, self._cookie)
+        cookies = cookies_of(request.headers.get_all("Cookie"))
+        return token_in(request.path) or cookies.get(self._cookie, "")
 
     def _known(self, token: str) -> bool:
-        return _same(token, self.token) or _same(token, self.watch_token)
+        return same(token, self.token) or same(token, self.watch_token)
 
     async def _talk(self, line: ServerConnection) -> None:
-        """Show a page the window for as long as it is there, and take what it tells."""
         assert line.request is not None
-        page = Page(line, next(self._numbers), _same(self._secret(line.request), self.token))
+        number, teacher = next(self._numbers), same(self._secret(line.request), self.token)
+        page = Page(line, number, teacher, f"{'Teacher' if teacher else 'Viewer'} {number}")
         self._pages.append(page)
         self._give_control(self._control)
         sender = asyncio.ensure_future(self._send_all(page))
@@ -352,14 +281,14 @@ class WebDisplay:
                 self._wanted = page.size or self._wanted
                 self._called.set()
             if self._held:  # keys that the one before has held
-                self._waiting.append(Left(kind="blur"))
+                self._waiting.append(events.Left(kind="blur"))
         self._wake()
 
     async def _take_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
 
         allowed, before = MOST_EVENTS, monotonic()
-        try:
+        with suppress(ConnectionClosed):
             async for text in page.line:
                 now = monotonic()
                 allowed, before = min(allowed + (now - before) * MOST_EVENTS, MOST_EVENTS) - 1.0, now
@@ -372,26 +301,27 @@ class WebDisplay:
                     elif len(text) > LONGEST:
                         raise ValueError
                     else:
-                        self._take(page, message_of(text))
+                        self._take(page, events.message_of(text))
                 except ValueError:
                     await page.line.close(1008, "not understood")
-        except ConnectionClosed:
-            pass
 
-    def _take(self, page: Page, message: Message) -> None:
-        if isinstance(message, PictureShown):
-            while page.sent and page.sent[0] != message.number:
-                page.sent.popleft()
-            if page.sent:
-                page.sent.popleft()
+    def _take(self, page: Page, message: events.Message) -> None:
+        if isinstance(message, events.PictureShown):
+            while page.sent and page.sent.popleft() != message.number:
+                pass
             page.changed.set()
-        elif isinstance(message, Control):
-            self._hand_over(page, message.to)
-        elif isinstance(message, Named):
+        elif isinstance(message, events.Control):
+            if message.to == 0:
+                page.asks = not page.asks and page is not self._control
+                self._wake()
+            elif page is self._control or page.teacher:
+                named = (each for each in self._pages if each.number == message.to)
+                self._give_control(next(named, self._control))
+        elif isinstance(message, events.Named):
             page.name = "".join(filter(str.isprintable, message.name)).strip() or page.name
             self._wake()
-        elif isinstance(message, PageChanged):
-            if message.width * message.height > MOST_PIXELS:
+        elif isinstance(message, events.PageChanged):
+            if message.width * message.height > events.MOST_PIXELS:
                 raise ValueError
             page.size = message
             if page is self._control:
@@ -401,14 +331,6 @@ class WebDisplay:
             self._waiting.append(message)
             self._called.set()
 
-    def _hand_over(self, page: Page, to: int) -> None:
-        """Let another page control, or note that one asks for it."""
-        if to == 0:
-            page.asks = not page.asks and page is not self._control
-            self._wake()
-        elif page is self._control or page.teacher:
-            self._give_control(next((each for each in self._pages if each.number == to), self._control))
-
     def _upload(self, page: Page, data: bytes) -> None:
         """Put a file into the folder, under a name that is free, and let the window open it."""
         name, _, content = data.partition(b"\n")
@@ -417,22 +339,33 @@ class WebDisplay:
             raise ValueError
         if len(path.name) > 100 or not path.name.isprintable() or path.name.startswith("."):
             raise ValueError
-        target = self.folder / path.name
+        target = self.folder / path
         if target.exists():
             target = free_name(self.folder, path.stem, path.suffix)
         with written(target) as part:
             part.write_bytes(content)
-        self._waiting.append(Uploaded(path=str(target)))
+        self._waiting.append(events.Uploaded(path=str(target)))
         self._called.set()
 
     async def _send_all(self, page: Page) -> None:
         from websockets.exceptions import ConnectionClosed
 
-        try:
+        with suppress(ConnectionClosed):
             while True:
                 await page.changed.wait()
                 page.changed.clear()
-                told = self._told_to(page)
+                people = [
+                    {
+                        "number": one.number,
+                        "name": one.name,
+                        "asks": one.asks,
+                        "controls": one is self._control,
+                    }
+                    for one in self._pages
+                ]
+                told = self._told | {"people": people, "you": page.number, "teacher": page.teacher}
+                if page is not self._control:
+                    told.pop("copied", None)  # the clipboard is of the one who controls alone
                 if told != page.told:
                     page.told = told
                     await page.line.send(json.dumps(told))
@@ -441,68 +374,41 @@ class WebDisplay:
                     before, page.shown = page.shown, picture
                     page.sent.append(picture.number)
                     await page.line.send(await self._bytes(picture, before))
-        except ConnectionClosed:
-            pass
-
-    def _told_to(self, page: Page) -> dict[str, Any]:
-        """Return what a page is told beside pictures: the clipboard is of the one who controls alone."""
-        told = dict(self._told)
-        if page is not self._control:
-            told.pop("copied", None)
-        told["people"] = [
-            {"number": each.number, "name": each.name, "asks": each.asks, "controls": each is self._control}
-            for each in self._pages
-        ]
-        return {**told, "you": page.number, "teacher": page.teacher}
 
     async def _bytes(self, picture: Picture, before: Picture | None) -> bytes:
         """Return a picture as a page needs it that shows another; those who watch in step share it."""
         key = picture.number, 0 if before is None else before.number
-        found = self._encoded.get(key)
-        if found is None:
-            found = await asyncio.to_thread(encoded, picture, before)
-            if len(self._encoded) >= 8:
-                self._encoded.pop(next(iter(self._encoded)))
-            self._encoded[key] = found
-        return found
+        if key not in self._encoded:
+            self._encoded[key] = await asyncio.to_thread(encoded, picture, before)
+            for old in list(self._encoded)[:-8]:
+                del self._encoded[old]
+        return self._encoded[key]
 
 
-def _cookie(request: Request, name: str) -> str:
-    """Return a cookie that came with a request."""
-    try:
-        cookies = SimpleCookie("; ".join(request.headers.get_all("Cookie")))
-    except CookieError:
-        return ""
-    return cookies[name].value if name in cookies else ""
-
-
-def _own_origin(request: Request) -> bool:
-    """Return whether a socket is opened by our own page; what is no browser names no origin."""
-    origins = request.headers.get_all("Origin")
-    hosts = request.headers.get_all("Host") + request.headers.get_all("X-Forwarded-Host")
-    return all(urlsplit(origin).netloc in hosts for origin in origins) and len(origins) < 2
-
-
-def _same(token: str, other: str) -> bool:
-    return hmac.compare_digest(token.encode(errors="replace"), other.encode())
+def _answer(line: ServerConnection, body: bytes, kind: str, headers: dict[str, str]) -> Response:
+    answer = line.respond(HTTPStatus.OK, "")
+    answer.body = body
+    for name in ("Content-Type", "Content-Length"):
+        del answer.headers[name]
+    answer.headers.update({"Content-Type": kind, "Content-Length": str(len(body)), **headers})
+    answer.headers["X-Content-Type-Options"] = "nosniff"
+    return answer
 
 
 def saved_since(folder: Path, since: float) -> tuple[str, ...]:
     """Return the names of what windows save that was written to a folder since a time, the newest first."""
     try:
-        with os.scandir(folder) as there:
-            seen = [each for each in islice(there, MOST_LISTED) if _is_saved(each)]
+        seen = [each for each in islice(folder.iterdir(), MOST_LISTED) if _is_saved(each)]
         found = [(changed, each.name) for each in seen if (changed := each.stat().st_mtime) >= since]
     except OSError:
         return ()
     return tuple(name for _, name in sorted(found, reverse=True)[:20])
 
 
-def _is_saved(entry: os.DirEntry[str]) -> bool:
-    """Return whether it looks like a file that windows save, or a folder of results."""
-    if entry.name.startswith("."):
+def _is_saved(path: Path) -> bool:
+    if path.name.startswith("."):
         return False
-    return Path(entry, MANIFEST).exists() if entry.is_dir() else Path(entry).suffix.lower() in _OFFERED
+    return (path / MANIFEST).exists() if path.is_dir() else path.suffix.lower() in _OFFERED
 
 
 def zipped(folder: Path) -> bytes:

@@ -244,3 +244,9 @@ def test_every_word_of_the_plot_is_inside_and_alone(rows, tmp_path, monkeypatch)
         for other in boxes[:k]:
             apart = one.x1 <= other.x0 or other.x1 <= one.x0 or one.y1 <= other.y0 or other.y1 <= one.y0
             assert apart, (texts[k].get_text(), texts[boxes.index(other)].get_text())
+
+
+def test_times_are_told_in_the_unit_that_suits_them():
+    from robocov_app.commands.bench import duration
+
+    assert [duration(each) for each in (0.00031, 0.012, 2.5, None)] == ["310 µs", "12.0 ms", "2.50 s", ""]

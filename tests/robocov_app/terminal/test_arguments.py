@@ -1,10 +1,10 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from typing import Literal
 
 import pytest
 
 from robocov.errors import InputError
-from robocov_app.terminal.arguments import one_line, parsed
+from robocov_app.terminal.arguments import _default_hint, by_option, one_line, parsed, parsed_gains
 
 
 @dataclass
@@ -51,3 +51,19 @@ def test_a_box_in_either_drawing() -> None:
     lines = "╭─ Oh ─╮\n│ no   │\n│ more │\n│ ──── │\n│ rest │\n╰──────╯"
     dashes = " Oh \n ---- \n  no  \n  more \n  ---- \n  rest \n"
     assert one_line(lines) == one_line(dashes) == "no more"
+
+
+def test_defaults_that_say_something_are_in_the_help() -> None:
+    assert _default_hint("0.016666666666666666") == "(default: 0.01667)"
+    assert _default_hint("None") == ""
+
+
+def test_a_message_names_the_option() -> None:
+    kind = make_dataclass("Arguments", ["fail"])
+    said = by_option(kind, "conditions.failures[0]: robot 9, but 1 was wanted")
+    assert said == "--fail: robot 9, but 1 was wanted"
+
+
+def test_gains_are_json_or_words() -> None:
+    gains = parsed_gains(("k_rep=0.3", "attraction_limit=null", "target=median"))
+    assert gains == {"k_rep": 0.3, "attraction_limit": None, "target": "median"}

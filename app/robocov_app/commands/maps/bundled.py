@@ -1,12 +1,12 @@
 """`robocov maps`."""
 
-import json
 from dataclasses import dataclass
+from typing import Any
 
 from robocov.mapfile import bundled_maps, load_map
 from robocov_app.render.density import density_kind
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.output import BOLD, print_table
+from robocov_app.terminal.output import BOLD, print_table, tell
 
 
 @dataclass
@@ -18,30 +18,18 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Print the list."""
     rows, cells = [], []
     for name in bundled_maps():
         environment = load_map(name)
         low_x, low_y, high_x, high_y = environment.region.bounds
-        starts, description = list(environment.starts), environment.description
-        density = density_kind(environment)
-        rows.append(
-            {
-                "name": name,
-                "title": environment.name,
-                "description": description,
-                "width_m": high_x - low_x,
-                "height_m": high_y - low_y,
-                "free_area_m2": environment.free_area,
-                "starts": starts,
-                "density": density,
-            }
-        )
-        size = f"{high_x - low_x:.3g} x {high_y - low_y:.3g}"
+        width, height, starts = high_x - low_x, high_y - low_y, list(environment.starts)
+        description, density = environment.description, density_kind(environment)
+        row: dict[str, Any] = {"name": name, "title": environment.name, "description": description}
+        row |= {"width_m": width, "height_m": height, "free_area_m2": environment.free_area}
+        rows.append(row | {"starts": starts, "density": density})
         told = f"{description} Density: {density}." if density else description
-        cells.append((name, size, ", ".join(starts), told))
-    if options.json:
-        print(json.dumps({"maps": rows}, indent=1))
-        return
-    columns = [("map", BOLD), ("size in m", {"no_wrap": True}), ("starts, the default first", {})]
-    print_table([*columns, ("what it is", {})], cells)
+        cells.append((name, f"{width:.3g} x {height:.3g}", ", ".join(starts), told))
+    tell(options, {"maps": rows}, indent=1)
+    if not options.json:
+        columns = [("map", BOLD), ("size in m", {"no_wrap": True}), ("starts, the default first", {})]
+        print_table([*columns, ("what it is", {})], cells)

@@ -1,6 +1,5 @@
 """`robocov export`."""
 
-import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,10 +8,10 @@ from typing import Annotated
 import tyro
 
 from robocov.errors import InputError, one_line
-from robocov.files.atomic import writable
 from robocov.mapfile import load_map
 from robocov_app.formats import EXPORTERS, WriteOptions, export_map, exporter
 from robocov_app.runs.options import JsonOption
+from robocov_app.terminal.output import require_fresh, tell
 
 
 @dataclass
@@ -43,21 +42,13 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Export and report."""
     if options.format is not None and options.format not in EXPORTERS:
         known = ", ".join(EXPORTERS)
         raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
     chosen = exporter(options.out, options.format)
     for file in chosen.files(options.out, options.write):
-        if writable(file).exists() and Path(options.map).exists() and file.samefile(options.map):
-            raise InputError(f"{file}: the map that is read; another -o was wanted")
-        if file.exists() and not options.overwrite:
-            raise InputError(f"{file}: exists already; another -o, or --overwrite, was wanted")
+        require_fresh(file, "another -o", overwrite=options.overwrite, source=Path(options.map), read="map")
     report = export_map(load_map(options.map), options.out, format=options.format, options=options.write)
     for line in report.warnings:
         print(f"robocov: warning: {line}", file=sys.stderr)
-    if options.json:
-        print(json.dumps(report.to_dict()))
-        return
-    for line in report.lines():
-        print(line)
+    tell(options, report.to_dict(), *report.lines())

@@ -1,11 +1,10 @@
 """`robocov generate`."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import tyro
 
@@ -15,7 +14,7 @@ from robocov.files.atomic import writable
 from robocov.mapfile import bundled_maps, dump_map, load_map, save_map
 from robocov.mapfile.check import check_map
 from robocov_app.runs.options import PlotOptions
-from robocov_app.terminal.output import require_fresh
+from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import progress
 
 KindName: TypeAlias = Literal["polygons", "blocks", "rooms", "mazes", "caves"]
@@ -84,7 +83,6 @@ class Arguments(PlotOptions):
 
 
 def command(options: Arguments) -> None:
-    """Generate, save, draw and tell."""
     out, several = options.out, bool(options.count or options.study)
     check_out(out, folder=several, overwrite=options.overwrite)
     jobs, rows = jobs_of(options), []
@@ -107,16 +105,15 @@ def command(options: Arguments) -> None:
         from robocov_app.figures.map_sheet import plot_maps
 
         save_figure(plot_maps(made, options.theme), options.plot)
-    if options.json and out is not None:
-        print(json.dumps({"out": str(out), "maps": rows}, indent=1))
-        return
-    for row in rows:
-        gap = row["narrowest_gap_m"]
-        narrowest = "no passage" if gap is None else f"narrowest gap {gap:.3f} m"
-        print(
-            f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free, {narrowest}, "
-            f"{counted(row['obstacles'], 'obstacle')}, {row['vertices']} vertices"
-        )
+    if out is not None:
+        tell(options, {"out": str(out), "maps": rows}, *map(_facts, rows), indent=1)
+
+
+def _facts(row: dict[str, Any]) -> str:
+    gap = row["narrowest_gap_m"]
+    facts = [f"{row['file']}: {row['free_area_m2']:.4g} of {row['area_m2']:.4g} m² free"]
+    facts += ["no passage" if gap is None else f"narrowest gap {gap:.3f} m"]
+    return ", ".join([*facts, counted(row["obstacles"], "obstacle"), f"{row['vertices']} vertices"])
 
 
 def check_out(out: Path | None, *, folder: bool, overwrite: bool) -> None:
@@ -143,9 +140,8 @@ def _require_map(path: Path) -> None:
         try:
             load_map(path)
         except MapError:
-            raise InputError(
-                f"{path}: is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
-            ) from None
+            why = "is no map of robocov, so --overwrite leaves it alone; another --out was wanted"
+            raise InputError(f"{path}: {why}") from None
 
 
 def jobs_of(options: Arguments) -> list[tuple[str, Callable[[], Environment]]]:

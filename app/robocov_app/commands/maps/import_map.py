@@ -1,6 +1,5 @@
 """`robocov import`."""
 
-import json
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ from robocov.mapfile import save_map
 from robocov_app.figures.files import check_figure_path
 from robocov_app.formats import IMPORTERS, ReadOptions, Shaping, import_map
 from robocov_app.runs.options import JsonOption
-from robocov_app.terminal.output import require_fresh
+from robocov_app.terminal.output import require_fresh, tell
 from robocov_app.terminal.progress import progress
 
 
@@ -54,7 +53,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Import, save and report."""
     if options.format is not None and options.format not in IMPORTERS:
         known = ", ".join(IMPORTERS)
         raise InputError(f"--format: {one_line(options.format)!r}, but one of {known} was wanted")
@@ -77,9 +75,4 @@ def command(options: Arguments) -> None:
             preview(foreign, environment, report, options.preview)
         done(3)
     files = {"out": str(out)} | ({} if options.preview is None else {"preview": str(options.preview)})
-    if options.json:
-        print(json.dumps({**files, **report.to_dict()}))
-        return
-    for line in report.lines():
-        print(line)
-    print(f"saved in {' and '.join(files.values())}")
+    tell(options, files | report.to_dict(), *report.lines(), f"saved in {' and '.join(files.values())}")

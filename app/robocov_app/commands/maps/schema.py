@@ -21,7 +21,6 @@ class Arguments(JsonOption):
 
 
 def command(options: Arguments) -> None:
-    """Print the schema."""
     if options.of == "map":
         from robocov.mapfile import map_schema as schema
     else:

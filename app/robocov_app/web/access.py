@@ -1,0 +1,28 @@
+"""Who may see a served window: tokens in links and cookies."""
+
+import hmac
+from collections.abc import Iterable
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, urlsplit
+
+
+def link_to(host: str, port: int, token: str) -> str:
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/?token={token}"
+
+
+def token_in(address: str) -> str:
+    """Return the token of a link, empty for none."""
+    return (parse_qs(urlsplit(address).query).get("token") or [""])[0]
+
+
+def cookies_of(headers: Iterable[str]) -> dict[str, str]:
+    try:
+        return {name: each.value for name, each in SimpleCookie("; ".join(headers)).items()}
+    except CookieError:
+        return {}
+
+
+def same(token: str, other: str) -> bool:
+    """Compare in a time that tells nothing of where they differ."""
+    return hmac.compare_digest(token.encode(errors="replace"), other.encode())

@@ -1,0 +1,68 @@
+"""Small functions of drawing, by example."""
+
+import numpy as np
+import pygame
+import pytest
+
+from robocov_app.render.camera import length_label, round_length
+from robocov_app.render.canvas import clipped_polygon, clipped_segment
+from robocov_app.render.density import cost_label
+from robocov_app.render.distance_field import round_limit, ticks
+from robocov_app.render.layout import columns_for, fitted_radii, line_crowding, mark_size, nearest_distance
+from robocov_app.render.surface_cache import Latest, kept
+from robocov_app.render.theme import mix, rgb
+
+
+def test_colours() -> None:
+    assert rgb("88CCEE") == (136, 204, 238)
+    assert mix((0, 0, 0), (200, 100, 50), 0.5) == (100, 50, 25)
+
+
+def test_round_lengths() -> None:
+    assert [round_length(x) for x in (0.7, 1.0, 3.9, 49.0)] == [0.5, 1.0, 2.0, 20.0]
+    assert [length_label(x) for x in (0.05, 0.5, 2.0, 5000.0)] == ["5 cm", "0.5 m", "2 m", "5 km"]
+    limits = [round_limit(x) for x in (0.93, 1.0, 4.2, 13.0, float("nan"))]
+    assert limits == [1.0, 1.0, 5.0, 15.0, 1.0]
+    assert ticks(5.0) == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert ticks(1.5) == [0.0, 0.5, 1.0, 1.5]
+    assert ticks(8.0) == [0.0, 2.0, 4.0, 6.0, 8.0]
+
+
+def test_what_is_far_away_is_clipped() -> None:
+    assert len(clipped_polygon(np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]]))) == 1
+    assert clipped_segment((0.0, 0.0), (40000.0, 20000.0)) == [[0.0, 0.0], [20000.0, 10000.0]]
+    assert clipped_segment((40000.0, 20000.0), (0.0, 0.0)) == [[20000.0, 10000.0], [0.0, 0.0]]
+    assert clipped_segment((0.0, 30000.0), (9.0, 30000.0)) == []
+    assert clipped_segment((1.0, 2.0), (3.0, 4.0)) == ((1.0, 2.0), (3.0, 4.0))
+
+
+def test_costs_in_words() -> None:
+    assert cost_label("mean distance", 1.25) == "mean distance 1.250 m"
+    words = "mean distance by φ 1.250 m, mean time 3.000 s"
+    assert cost_label("mean distance by φ", 1.25, 3.0) == words
+
+
+def test_sizes_in_a_crowd() -> None:
+    three = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 1.0]])
+    assert nearest_distance(three).tolist() == [3.0, 1.0, 1.0]
+    centers = np.array([[0.0, 0.0], [8.0, 0.0], [99.0, 0.0]])
+    assert fitted_radii(centers, np.ones(3), 2.0, 9.0).tolist() == [4.0, 4.0, 9.0]
+    assert mark_size(np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [90.0, 0.0]]), 2.0, 9.0) == 5.0
+    assert [line_crowding(n) for n in (6, 20, 80, 1000)] == [1.0, 1.0, 0.5, 0.5]
+
+
+@pytest.mark.parametrize(("aspect", "columns"), [(1.4, 3), (10.0, 1)])
+def test_columns(aspect: float, columns: int) -> None:
+    assert columns_for(3, aspect, (1920, 1080)) == columns
+
+
+def test_what_is_kept() -> None:
+    @kept(1000)
+    def page(side: int) -> pygame.Surface:
+        return pygame.Surface((side, side), 0, 32)
+
+    assert page(9) is page(9)
+    assert page(99) is not page(99)
+    made, size = Latest[object](), [1, 2]
+    assert made.of(size, "light", object) is made.of(size, "light", object)
+    assert made.of(size, "light", object) is not made.of(size, "dark", object)
