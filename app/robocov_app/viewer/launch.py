@@ -72,7 +72,7 @@ class Launcher:
                 window = self._opened(settings)
                 window.viewer.say(trouble)
                 if not self._alone and (left := recoverable(autosave_folder())):
-                    window.viewer.say(f"{left[0].words}: Ctrl K, “recover” opens it")
+                    window.offer_recovery(left)
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)

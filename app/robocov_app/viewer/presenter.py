@@ -18,7 +18,7 @@ from robocov_app.viewer.session.file import SUFFIX
 from robocov_app.viewer.session.pane import Pane
 from robocov_app.viewer.session.scenario import ControllerChoice
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import Workspace, opened, recoverable, recovered
+from robocov_app.viewer.session.workspace import Recovered, Workspace, opened, recoverable, recovered
 from robocov_app.viewer.tools import Brush, Hand, Tool, Wall, toolbox
 
 SAID_FOR = 5.0  # seconds for which a message stays
@@ -351,9 +351,9 @@ class Presenter:
         self._note_recent(path)
         self.say(f"session opened: {path}")
 
-    def recover(self) -> None:
-        """Go on with the newest session that was left behind."""
-        found = recoverable(self._kept_in)
+    def recover(self, work: Recovered | None = None) -> None:
+        """Go on with a session that was left behind, by default the newest."""
+        found = recoverable(self._kept_in) if work is None else (work,)
         if not found:
             self.say("nothing was left behind")
             return

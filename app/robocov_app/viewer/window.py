@@ -1,6 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.autosave import discard
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.input import OF_THE_MOUSE
@@ -30,6 +31,7 @@ from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.saving import RunSaver
 from robocov_app.viewer.session.curves import speeds_of
 from robocov_app.viewer.session.file import SUFFIX
+from robocov_app.viewer.session.workspace import Recovered
 from robocov_app.viewer.status import HINT, facts, suggestion
 
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
@@ -356,6 +358,34 @@ class Window(BaseWindow):
         )
         answers = [Answer("Lesson 1", begin_lesson), Answer("Just let me play", go_on)]
         self.dialogs.ask(Question("Welcome to robocov", words, answers, go_on))
+
+    def offer_recovery(self, found: Sequence[Recovered]) -> None:
+        """Ask whether to go on with what windows left behind, the newest first; until then the team waits."""
+        viewer, session, newest = self.viewer, self.viewer.session, found[0]
+        playing, session.playing = session.playing, False
+
+        def later() -> None:
+            session.playing = playing
+
+        def recover() -> None:
+            later()
+            viewer.attempt(lambda: viewer.recover(newest))
+
+        def throw_away() -> None:
+            discard(newest.folder)
+            later()
+            if found[1:]:
+                self.offer_recovery(found[1:])
+
+        words = f"A window ended without saving: {newest.words}."
+        if more := len(found) - 1:
+            words += f"\n{more} more {'are' if more > 1 else 'is'} kept besides."
+        answers = [
+            Answer("Recover", recover, "r"),
+            Answer("Discard", throw_away, "d"),
+            Answer("Later", later, "l"),
+        ]
+        self.dialogs.ask(Question("Recover unsaved work?", words, answers, later))
 
     def _toggle_help(self) -> None:
         self.help = not self.help

@@ -8,17 +8,19 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, opened
-from touched_run import HALL, RAPF, begun
+from touched_run import HALL, RAPF, begun, stepped
 
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher
 from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.workspace import Workspace, recoverable
 from robocov_app.viewer.settings import Settings
 from robocov_app.viewer.status import cursor_words, facts, suggestion
 
@@ -163,6 +165,35 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
             assert window.viewer.session.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.asked is None
+
+
+def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
+    for _ in range(2):
+        workspace = Workspace(stepped(begun(), 5), tmp_path / "drafts")
+        workspace.session.fail_robot(2)
+        workspace.keep({})
+        workspace.close()
+    everybody = (1, 2, 3)
+    for chosen, left, numbers in (
+        (pygame.K_l, 2, everybody),
+        (pygame.K_d, 1, everybody),
+        (pygame.K_r, 0, (1, 3)),
+    ):
+        launcher = opened_for_a_person(monkeypatch, tmp_path, offers_lesson=True)
+        launcher.session.playing = True
+        with launcher.window() as window:
+            assert isinstance(window.dialogs.asked, Question)
+            assert "1 touch, never saved" in window.dialogs.asked.words
+            window.frame(0.5)
+            assert window.viewer.session.time == 0.0
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))
+            window.frame(0.0)
+            assert window.viewer.session.numbers == numbers
+            assert (window.dialogs.asked is not None) is (left == 1)  # the next one is offered
+            assert len(recoverable(tmp_path / "drafts")) == left
 
 
 def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
