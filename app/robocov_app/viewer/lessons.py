@@ -130,8 +130,6 @@ class LessonPlayer:
     def asks(self) -> list[str]:
         """Question or task of now, line by line."""
         chapter = self.chapter
-        if self.state == "left":
-            return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
         question, lines = chapter.question, []
         if question is not None and self.state == "asks":
             lines = [question.text, *(f"{k}  {each}" for k, each in enumerate(question.answers, 1))]
@@ -197,9 +195,9 @@ class LessonPlayer:
         else:
             self._begin(max(self.number + by, 0))
 
-    def leave(self) -> None:
-        """Let whoever watches play with what is there."""
-        if self.state != "task":
+    def leave(self, *, task: bool = False) -> None:
+        """Let whoever watches play with what is there; a `task` is left only where that is asked for."""
+        if task or self.state != "task":
             self._turn("left")
 
     def come_back(self) -> None:

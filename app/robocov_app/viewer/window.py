@@ -84,6 +84,7 @@ class Window(BaseWindow):
         self._reported: tuple[object, float] = None, 0.0
         self._now = self._unfilmed = self._steps_rate = 0.0
         self._answers, self._serial = 0, -1
+        self._spots: list[tuple[pygame.Rect, Callable[[], object]]] = []
         self._arrange()
         self.draw()
 
@@ -204,9 +205,12 @@ class Window(BaseWindow):
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
-        draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
+        waits = self.tour is not None and not self._lesson_shown
+        hint = "F2 back to the lesson · Esc ends it" if waits else self.hint
+        draw_status(self.screen, layout.status, theme, layout.scale, line, hint)
+        self._spots = []
         if layout.panel[2] and self.tour is not None and self._lesson_shown:
-            draw_tour(self.screen, layout, theme, self.tour)
+            self._spots = draw_tour(self.screen, layout, theme, self.tour)
         elif layout.panel[2]:
             self.panel.draw(self.screen)
         if self.tour is not None and self._lesson_shown and not layout.panel[2]:
@@ -243,6 +247,9 @@ class Window(BaseWindow):
         """Do the action of this name."""
         if self.tour is not None and self.tour.state != "left" and name in ("back", "forward"):
             self.tour.skip(1 if name == "forward" else -1)
+            return
+        if name == "pause" and self._asked():
+            self.viewer.say("first say what you expect: press its number, or click it")
             return
         if name == "cancel" and self._end_tour():
             return
@@ -399,7 +406,7 @@ class Window(BaseWindow):
         elif self.tour.state == "left":
             self.tour.come_back()
         else:
-            self.tour.leave()
+            self.tour.leave(task=True)
 
     def start_lesson(self, path: Path) -> None:
         """Play a lesson of a file; MapError as `load_lesson`."""
@@ -412,6 +419,10 @@ class Window(BaseWindow):
 
     def _asked(self) -> bool:
         return self.tour is not None and self.tour.state == "asks"
+
+    def _spot(self, at: tuple[int, int]) -> Callable[[], object] | None:
+        """What a click does on the page of a lesson."""
+        return next((do for box, do in self._spots if box.collidepoint(at)), None)
 
     def _leave_lesson(self) -> None:
         """Let whoever touches something play; the lesson waits."""
@@ -456,6 +467,8 @@ class Window(BaseWindow):
             self._press(event)
         elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1 and (spot := self._spot(event.pos)):
+            spot()
         elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:

@@ -107,6 +107,28 @@ def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
         assert lesson.number == 0
 
 
+def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path))
+        lesson = driver.window.tour
+        assert lesson is not None
+        driver.settle()
+        driver.click(*driver.window._spots[1][0].center)
+        assert (lesson.number, lesson.state) == (1, "asks")
+        driver.key("space")
+        driver.frames(10)
+        assert driver.session.time == 0.0 and "what you expect" in driver.viewer.message
+        driver.click(*driver.window._spots[1][0].center)
+        assert (lesson.answer, lesson.state) == (2, "plays")
+        driver.frames(30)
+        assert lesson.state == "task"
+        driver.key("f2")
+        assert lesson.state == "left" and not driver.window._spots
+        driver.key("f2")
+        assert lesson.state == "asks"
+
+
 def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lessons, "READING", 0.1)
     with opened(tmp_path) as driver:
