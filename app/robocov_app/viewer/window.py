@@ -91,7 +91,8 @@ class Window(BaseWindow):
     # frames
 
     def close(self) -> None:
-        """End what is going on beside the window."""
+        """End what is going on beside the window, and a lesson, so that what was before it is kept."""
+        self._end_tour()
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
         self.viewer.costs.close()

@@ -129,6 +129,20 @@ def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_
         assert lesson.state == "asks"
 
 
+def test_closing_ends_it_and_what_was_before_is_what_is_kept(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        session, shown = driver.session, set(driver.viewer.shown)
+        driver.window.start_lesson(short(tmp_path, show=["distances"]))
+        driver.key("right")
+        driver.window.close()
+        assert driver.window.tour is None and driver.session is session and driver.viewer.shown == shown
+
+
+def test_controllers_have_the_names_of_the_window_in_the_lesson() -> None:
+    told = {answer for each in LESSON.chapters if each.question for answer in each.question.answers}
+    assert "LA" not in told and told >= {"RAPF", "RPF", "Lloyd"}
+
+
 def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lessons, "READING", 0.1)
     with opened(tmp_path) as driver:
