@@ -82,9 +82,10 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
             box = pygame.Rect(round(x), round(first - 5 * scale), round(wide), round(y - first + 8 * scale))
             pygame.draw.rect(screen, theme.final, box, 1, border_radius=round(5 * scale))
             spots.append((box, partial(tour.reply, k)))
-        y += 12 * scale * (tour.state == "asks")
-    row = 23 * scale
-    y = max(y + 24 * scale, top + height - 62 * scale - row * len(tour.chapters))
+        y += 11 * scale * (tour.state == "asks")
+    y, bottom = y + 6 * scale, top + height - 62 * scale
+    row = min(23 * scale, max((bottom - y) / len(tour.chapters), 15 * scale))
+    y = max(y, bottom - row * len(tour.chapters))
     small = round(12 * scale)
     for k, title in enumerate(tour.chapters):
         now = k == tour.number

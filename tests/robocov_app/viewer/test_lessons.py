@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -127,6 +128,21 @@ def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_
         assert lesson.state == "left" and not driver.window._spots
         driver.key("f2")
         assert lesson.state == "asks"
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
+def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
+    with opened(tmp_path, size=size) as driver:
+        driver.window._patient = False
+        driver.key("f2")
+        lesson = driver.window.tour
+        assert lesson is not None
+        for _ in LESSON.chapters:
+            driver.settle()
+            boxes = [box for box, _ in driver.window._spots]
+            assert all(above.bottom <= below.top + 1 for above, below in itertools.pairwise(boxes))
+            assert boxes[-1].bottom <= size[1] - 46
+            driver.key("right")
 
 
 def test_closing_ends_it_and_what_was_before_is_what_is_kept(tmp_path: Path) -> None:
