@@ -105,6 +105,17 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         )
 
 
+def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
+    tmp_path: Path, words: list[str]
+) -> None:
+    with opened(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
+        for pane, value in zip(driver.session.panes, (1.856, 4.023), strict=True):
+            pane.curve.add(0.0, value)
+        words.clear()
+        driver.window.draw()
+        assert "RAPF  4.023  +117 %" in words
+
+
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
