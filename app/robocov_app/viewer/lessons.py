@@ -177,8 +177,13 @@ class LessonPlayer:
                 session.playing = False
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
-        elif self.state == "ended" and self._waited >= READING:
+        elif self.state == "ended" and self._waited >= self._reading:
             self.skip(1)
+
+    @property
+    def _reading(self) -> float:
+        """Seconds until the next chapter: longer where somebody has an answer to read."""
+        return READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
 
     def reply(self, answer: int) -> None:
         """Answer the question; the chapter goes on."""

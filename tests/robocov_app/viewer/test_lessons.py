@@ -85,6 +85,8 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
+        lesson.advance(lessons.READING)
+        assert lesson.state == "ended" and not lesson.done, "there is something to read"
         driver.key("escape")
         assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
 
