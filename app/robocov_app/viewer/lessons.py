@@ -103,6 +103,7 @@ class LessonPlayer:
         self.lesson: LessonModel = saved.lesson
         self._viewer, self._fit, self.alone = viewer, fit, alone
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
+        self._asked_before = viewer.hand.selected
         self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
@@ -215,6 +216,8 @@ class LessonPlayer:
         self._workspace.close()
         viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before
         viewer.show_session(viewer.workspace.session)
+        viewer.hand.selected = self._asked_before
+        viewer.say("the lesson has ended; what was before it is there again")
         self._fit()
         self.done = True
 

@@ -307,7 +307,6 @@ class Window(BaseWindow):
             return False
         self.tour.end()
         self.tour = None
-        self.viewer.say("the lesson has ended; what was before it is there again")
         return True
 
     def _middle(self) -> tuple[float, float]:

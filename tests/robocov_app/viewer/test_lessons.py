@@ -91,6 +91,18 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
 
 
+def test_its_end_is_told_and_nobody_is_asked_who_was_not(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path, robot=1))
+        driver.key("right")
+        assert driver.viewer.selected == 1
+        driver.key("right")
+        driver.frames(1)
+        assert driver.window.tour is None and driver.viewer.selected is None
+        assert driver.viewer.message.startswith("the lesson has ended")
+
+
 def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.window._patient = False
