@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
-from robocov.errors import ParameterError
+from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session.changes import Change, Restart
 from robocov_app.viewer.session.curves import Curve
 from robocov_app.viewer.session.history import Moment
@@ -64,10 +64,13 @@ class Node:
         return self.at if self.scenario is None else 0
 
     def carry_out(self, run: Lockstep) -> None:
-        """Change a run that goes on from one step to the next as was done at this step."""
+        """Change a run that goes on from one step to the next as was done here; InputError names it."""
         for change in self.changes:
             if change.step == run.step and not isinstance(change, Restart):
-                run.apply(change)
+                try:
+                    run.apply(change)
+                except InputError as error:
+                    raise InputError(f"touches[{self.number}], “{self.words}”: {error}") from None
 
     def keep(self, moments: list[Moment]) -> None:
         """Remember some of the moments, the last among them."""
