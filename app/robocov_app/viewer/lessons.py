@@ -214,8 +214,9 @@ class LessonPlayer:
         """End; the session from before is there again."""
         viewer = self._viewer
         self._workspace.close()
-        viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before
+        viewer.workspace, map_name, viewer.shown, viewer.tool, viewer.active = self._before
         viewer.show_session(viewer.workspace.session)
+        viewer.map_name = map_name
         viewer.hand.selected = self._asked_before
         viewer.say("the lesson has ended; what was before it is there again")
         self._fit()

@@ -49,7 +49,7 @@ class Presenter:
         file: Path | None = None,
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
-        self.map_name, self._kept_in = map_name, kept_in
+        self._map_names, self._kept_in = {session.environment.name: map_name}, kept_in
         self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
         self.tools = toolbox()
         self.tool: Tool = self.tools["hand"]
@@ -65,6 +65,16 @@ class Presenter:
         self.look_at_map()
 
     # what there is
+
+    @property
+    def map_name(self) -> str:
+        """Bundled name or path of the map of the present, also where undo has led to another one."""
+        name = self.session.environment.name
+        return self._map_names.get(name, name)
+
+    @map_name.setter
+    def map_name(self, name: str) -> None:
+        self._map_names[self.session.environment.name] = name
 
     @property
     def hand(self) -> Hand:
@@ -250,8 +260,11 @@ class Presenter:
 
     def undo(self) -> None:
         """Take the last edit back."""
+        nothing = "nothing to undo" + (
+            "; Alt ← leads to other branches" if self.session.document.nodes[1:] else ""
+        )
         words = self.session.undo()
-        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else "nothing to undo")
+        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else nothing)
 
     def redo(self) -> None:
         """Do again what was taken back."""
