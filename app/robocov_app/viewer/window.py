@@ -35,6 +35,7 @@ from robocov_app.viewer.session.workspace import Recovered
 from robocov_app.viewer.status import HINT, facts, suggestion
 
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
+_GAP = 0.3  # seconds at the beginning of a curve that are not missed
 _PAN = 60  # pixels that a key pans
 
 _GOES_ON_WITH = {
@@ -168,6 +169,7 @@ class Window(BaseWindow):
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
             if not (fresh and known is not None and np.array_equal(known.result.positions, positions)):
                 viewer.costs.ask(pane.number, session.time, positions, point, speeds_of(session, pane))
+        self._ask_beginning()
         for number, known in viewer.costs.poll():
             self._answers += 1
             for pane in session.panes:
@@ -175,6 +177,20 @@ class Window(BaseWindow):
                     pane.curve.add(known.time, known.result.mean_distance)
                     if known.travel_time is not None:
                         pane.curves["time"].add(known.time, known.travel_time)
+
+    def _ask_beginning(self) -> None:
+        """Ask in turn with the present for the costs of the time in which nobody answered yet."""
+        session, costs = self.viewer.session, self.viewer.costs
+        if session.head.kind != "begin" or not session.live or (session.playing and self._answers % 2):
+            return
+        for pane in session.panes:
+            first = min(pane.curve.time, default=0.0)
+            if first <= _GAP:
+                continue
+            k = session.history.at(first - _GAP if first > 2 * _GAP else 0.0)
+            state, speeds = session.history[k].states[pane.number], speeds_of(session, pane)
+            if speeds is None or len(speeds) == len(state.positions):
+                costs.ask(pane.number, session.history.time(k), state.positions, speeds=speeds, aside=True)
 
     def _arrange(self) -> None:
         """Lay the window out anew when its size, look or number of panes is another."""

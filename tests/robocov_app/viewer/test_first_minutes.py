@@ -57,6 +57,25 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
             assert caption in words and any(value in each and each != caption for each in words)
 
 
+def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+        session, window = driver.session, driver.window
+        wanted = {pane.number: pane.curve.at(0.0) for pane in session.panes}
+        for pane in session.panes:
+            pane.curves["distance"].__init__()  # as if the worker had not begun yet
+        for _ in range(90):
+            session.step()
+        window.update(0.0)
+        for playing in (True, False):
+            session.playing = playing
+            for _ in range(12):
+                window.update(1 / 50)
+                assert all(abs(each.time - session.time) < 0.1 for each in window.viewer.costs.known.values())
+        for pane in session.panes:
+            times, values = pane.curve.time, pane.curve.value
+            assert times[0] == 0.0 and np.diff(times).max() < 0.7 and values[0] == wanted[pane.number]
+
+
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
     with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
         other = driver.session.panes[1]
