@@ -271,6 +271,26 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         assert asked.text == "nothing.robocov"
 
 
+def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        viewer = driver.viewer
+        save_map(HALL, tmp_path / "other.json")
+        viewer.session.fail_robot(2)
+        viewer.save_session(tmp_path / "story.robocov")
+        (tmp_path / "bad.robocov").write_text("{}")
+
+        def dropped(name: str) -> None:
+            pygame.event.post(pygame.event.Event(pygame.DROPFILE, file=str(tmp_path / name)))
+            driver.settle()
+
+        dropped("other.json")
+        assert viewer.map_name == str(tmp_path / "other.json") and viewer.session.numbers == (1, 2, 3)
+        dropped("story.robocov")
+        assert viewer.session.numbers == (1, 3) and viewer.workspace.path == tmp_path / "story.robocov"
+        dropped("bad.robocov")
+        assert viewer.trouble and "bad.robocov" in viewer.message and viewer.session.numbers == (1, 3)
+
+
 def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with opened_for_a_person(monkeypatch, tmp_path).window() as window:
         window.viewer.save_session(tmp_path / "mine.robocov")
