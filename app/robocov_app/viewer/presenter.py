@@ -61,6 +61,7 @@ class Presenter:
         self.cursor: Point | None = None
         self.cursor_pane = 0
         self._mapped: object = None
+        self.rested: object = None  # the touch after which the team has settled, though it may sway again
         self.workspace = Workspace(session, kept_in, file)
         self.look_at_map()
 

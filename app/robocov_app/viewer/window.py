@@ -147,6 +147,8 @@ class Window(BaseWindow):
         except RobocovError as error:
             steps = 0
             viewer.say(plain(str(error)), trouble=True)
+        if session.settled:
+            viewer.rested = session.head
         if session.playing != playing:
             viewer.version += 1
             if session.settled:

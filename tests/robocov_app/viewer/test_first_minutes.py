@@ -155,6 +155,8 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         driver.window._patient = False
         driver.settle()
         assert not driver.same(before)
+        session.settled = False
+        assert suggestion(viewer), "it does not blink while somebody sways"
         session.fail_robot(2)
         assert suggestion(viewer) == ""  # something is going on again
         session.settled = True
