@@ -58,7 +58,7 @@ def command(options: Arguments) -> None:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
         parts = [part for path in options.folders for part in parts_of(path, Path(temporary))]
-        write_report(options, parts, target)
+        write_report(options, parts, target, Path(temporary))
 
 
 def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
@@ -75,8 +75,17 @@ def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
     return [part for story in stories for part in story_folders(story)]
 
 
-def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: Path) -> None:
-    """Gather the results of folders, and write the page; words tell which part of a story one is."""
+def write_report(
+    options: Arguments, parts: Sequence[tuple[Path, str]], target: Path, temporary: Path
+) -> None:
+    """Gather the results of folders, and write the page; words tell which part of a story one is.
+
+    Results in the `temporary` folder are called by their path in it: they are gone afterwards.
+    """
+
+    def called(folder: Path) -> str:
+        return str(folder.relative_to(temporary) if folder.is_relative_to(temporary) else folder)
+
     from robocov_app.report.document import report
     from robocov_app.report.results import gathered, with_references
 
@@ -108,13 +117,13 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     if options.json:
         shown = zip(parts, results, page.shown, strict=True)
         counts = [
-            {"folder": str(folder), **counts_of(result), "shown": count}
+            {"folder": called(folder), **counts_of(result), "shown": count}
             for (folder, _), result, count in shown
         ]
         print(json.dumps({"path": str(target), "bytes": len(data), "results": counts}))
         return
     for result in results:
-        words = [f"{result.folder}: {result.kind} of {counted(len(result.fine), 'run')}"]
+        words = [f"{called(result.folder)}: {result.kind} of {counted(len(result.fine), 'run')}"]
         words += [f"{len(result.failed)} failed"] * bool(result.failed)
         words += [f"{len(result.damaged)} cannot be read"] * bool(result.damaged)
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
