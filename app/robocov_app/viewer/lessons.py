@@ -110,6 +110,7 @@ class LessonPlayer:
         self.number, self.state, self.done = 0, "plays", False
         self.answer: int | None = None
         self._waited = 0.0
+        self.held = False
         self._begin(0)
 
     @property
@@ -178,7 +179,7 @@ class LessonPlayer:
                 session.playing = False
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
-        elif self.state == "ended" and self._waited >= self._reading:
+        elif self.state == "ended" and self._waited >= self._reading and not self.held:
             self.skip(1)
 
     @property
@@ -222,8 +223,13 @@ class LessonPlayer:
         self._fit()
         self.done = True
 
+    def hold(self) -> str:
+        """Let a chapter that has ended stay, or let the next one come; return words for it."""
+        self.held, self.session.playing = not self.held, False
+        return "this chapter stays until Space or →" if self.held else "on to the next chapter"
+
     def _turn(self, state: str) -> None:
-        self.state, self._waited = state, 0.0
+        self.state, self._waited, self.held = state, 0.0, False
         self._viewer.version += 1
 
     def _begin(self, number: int) -> None:

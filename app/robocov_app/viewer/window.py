@@ -270,6 +270,9 @@ class Window(BaseWindow):
         if name == "pause" and self._asked():
             self.viewer.say("first say what you expect: press its number, or click it")
             return
+        if name == "pause" and self.tour is not None and self.tour.state == "ended":
+            self.viewer.say(self.tour.hold())
+            return
         if name == "cancel" and self._end_tour():
             return
         if name not in _GOES_ON_WITH and name != "tour":

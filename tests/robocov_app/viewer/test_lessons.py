@@ -87,6 +87,11 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
         lesson.advance(lessons.READING)
         assert lesson.state == "ended" and not lesson.done, "there is something to read"
+        driver.key("space")
+        lesson.advance(100.0)
+        assert lesson.state == "ended" and not viewer.session.playing, "it is paused between chapters too"
+        driver.key("space")
+        assert not lesson.held
         driver.key("escape")
         assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
 
