@@ -55,7 +55,7 @@ def command(options: Arguments) -> None:
         check_target(target, overwrite=options.overwrite)
     with TemporaryDirectory(prefix="robocov-") as temporary:
         parts = [part for path in options.folders for part in parts_of(path, Path(temporary))]
-        write_report(options, parts, target)
+        write_report(options, parts, target, Path(temporary))
 
 
 def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
@@ -72,8 +72,17 @@ def parts_of(path: Path, temporary: Path) -> list[tuple[Path, str]]:
     return [part for story in stories for part in story_folders(story)]
 
 
-def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: Path) -> None:
-    """Gather the results of folders, and write the page; words tell which part of a story one is."""
+def write_report(
+    options: Arguments, parts: Sequence[tuple[Path, str]], target: Path, temporary: Path
+) -> None:
+    """Gather the results of folders, and write the page; words tell which part of a story one is.
+
+    Results in the `temporary` folder are called by their path in it: they are gone afterwards.
+    """
+
+    def called(folder: Path) -> str:
+        return str(folder.relative_to(temporary) if folder.is_relative_to(temporary) else folder)
+
     from robocov_app.report.document import report
     from robocov_app.report.results import gathered, with_references
 
@@ -105,9 +114,15 @@ def write_report(options: Arguments, parts: Sequence[tuple[Path, str]], target: 
     counts, lines = [], []
     for (folder, _), result, shown in zip(parts, results, page.shown, strict=True):
         runs, failed, lost = len(result.fine), len(result.failed), [each._asdict() for each in result.damaged]
-        count = {"folder": str(folder), "kind": result.kind, "runs": runs, "failed": failed, "damaged": lost}
+        count = {
+            "folder": called(folder),
+            "kind": result.kind,
+            "runs": runs,
+            "failed": failed,
+            "damaged": lost,
+        }
         counts.append(count | {"missing": result.missing, "shown": shown})
-        words = [f"{result.folder}: {result.kind} of {counted(runs, 'run')}"]
+        words = [f"{called(result.folder)}: {result.kind} of {counted(runs, 'run')}"]
         words += [f"{failed} failed"] * bool(failed) + [f"{len(lost)} cannot be read"] * bool(lost)
         words += [f"{result.missing} of {result.wanted} missing"] * bool(result.missing)
         lines.append(", ".join(words))

@@ -88,6 +88,7 @@ def remade(options: Arguments) -> int:
 def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, Any]]:
     """Make the stories of a session that the options name again, each in its folder; yield what was saved."""
     from robocov.compiled import compile_kernels
+    from robocov.errors import InputError
     from robocov.files.result_folder import results
     from robocov_app.viewer.headless import save_story
     from robocov_app.viewer.session.file import load_session, save_session
@@ -105,7 +106,10 @@ def saved_stories(options: Arguments, stop: Interruption) -> Iterator[dict[str, 
         out = Path(f"{options.out or path.stem}{suffix}")
         with results(out, "story", overwrite=options.overwrite) as result:
             save_session(result.new / f"session{path.suffix}", document, node, step, saved.view)
-            answer = {"out": str(out), **save_story(document, node, step, result, options, stop)}
+            try:
+                answer = {"out": str(out), **save_story(document, node, step, result, options, stop)}
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
             result.keep()
         yield answer
         if stop.requested:

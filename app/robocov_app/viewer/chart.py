@@ -234,7 +234,8 @@ class Chart:
         for y, pane, value in zip(rows, panes, values.tolist(), strict=True):
             words = f"{value:.3f}"
             if len(known) > 1:
-                gap = f"  +{100 * (value / best - 1):.1f} %" if value > best else "  best"
+                more = 100 * (value / best - 1)
+                gap = f"  +{more:.{1 if more < 99.95 else 0}f} %" if value > best else "  best"
                 room = chart.get_width() - right - 15 * scale
                 room -= canvas.text_width(f"  {words}{gap}", theme.small_text, bold=True)
                 name = shortened(pane.law.label, canvas.text_size(theme.small_text), room, True)

@@ -66,13 +66,24 @@ class Costs:
         self._waiting, self.known, self._pane = {}, {}, None
 
     def ask(
-        self, pane: int, time: float, at: Array, point: Array | None = None, speeds: Array | None = None
+        self,
+        pane: int,
+        time: float,
+        at: Array,
+        point: Array | None = None,
+        speeds: Array | None = None,
+        *,
+        aside: bool = False,
     ) -> None:
-        """Ask for the cost at (n, 2) m, a path from a point and, with (n,) m/s, the mean time."""
+        """Ask for the cost at (n, 2) m, a path from a point and, with (n,) m/s, the mean time.
+
+        What was asked about the pane before and is not yet on its way is forgotten. `aside`: for a curve; it
+        does not become what is known of the pane.
+        """
         # it keeps its place among the panes that wait, so that each has its turn
         if self._map is not None:
             asked = replace(self._map, time=time, positions=np.array(at), point=point, speeds=speeds)
-            self._waiting[pane] = asked
+            self._waiting[pane] = replace(asked, aside=aside)
 
     def poll(self) -> list[tuple[int, Known]]:
         answers, worker = [], self._worker
@@ -92,7 +103,8 @@ class Costs:
                 if not worker.lives:
                     self._prepare()  # it is started again; not if it dies of that too
             elif self._pane is not None and isinstance(answer, Known):
-                self.known[self._pane] = answer
+                if asked is None or not asked.aside:
+                    self.known[self._pane] = answer
                 answers.append((self._pane, answer))
         return answers
 
@@ -125,6 +137,7 @@ class CostQuestion:
     positions: Array | None = None
     point: Array | None = None
     speeds: Array | None = None
+    aside: bool = False
 
 
 class _Answer(NamedTuple):

@@ -268,15 +268,14 @@ def _verdict(case: _Case, motion: str) -> str:
         return f"setting off {_compass(case.resultant)}" + (f" to {aim.name}" if aim and ahead else "")
     if case.stuck:
         return f"at rest, stuck: {where}"
-    if aim and abs(aim.offset) <= FAR and not case.balanced and not held:
+    if not case.balanced and not held:
         pushed = f"a force of {_force(abs(case.resultant))} {_compass(case.resultant)} acts on it"
-        return f"{_length(abs(aim.offset))} from {aim.name}, not at rest: {pushed}"
+        return f"{_length(abs(aim.offset))} from {aim.name}, not at rest: {pushed}" if aim else pushed
     if aim and abs(aim.offset) <= FAR:
         near = "on" if abs(aim.offset) <= SETTLED_DISTANCE else f"{_length(abs(aim.offset))} from"
         return f"arrived: at rest {near} {aim.name}" + (f", which is {aim.hidden}" if aim.hidden else "")
     loaded = any(abs(vector) >= NOTHING for vector in case.forces.values())
-    balance = "the forces balance" if case.balanced else "the forces almost balance"
-    why = f"held by {held}" if held else balance if loaded else "no force acts on it"
+    why = f"held by {held}" if held else "the forces balance" if loaded else "no force acts on it"
     return f"at rest {_length(abs(aim.offset))} short of {aim.name}: {why}" if aim else f"at rest, {why}"
 
 

@@ -19,7 +19,7 @@ from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.presenter import Presenter
 from robocov_app.viewer.session.clock import FRAME_BUDGET
 from robocov_app.viewer.session.session import Session
-from robocov_app.viewer.session.workspace import offer, recoverable
+from robocov_app.viewer.session.workspace import recoverable
 from robocov_app.viewer.window import Window
 
 NO_DISPLAY = (
@@ -76,7 +76,7 @@ class Launcher:
                 window = self._opened(settings)
                 window.viewer.say(trouble)
                 if not self._alone and (left := recoverable(autosave_folder())):
-                    window.viewer.say(f"{offer(left[0])}: Ctrl K, “recover” opens it")
+                    window.offer_recovery(left)
                 elif self.offers_lesson and file is not None and not file.exists():
                     window.offer_lesson()
                 keeper, begun = window.keeper, self._settings_of(window, settings)

@@ -1,5 +1,6 @@
 """The lesson over the window: its page in the place of the panel, or its caption."""
 
+from collections.abc import Callable
 from functools import partial
 
 import pygame
@@ -10,6 +11,8 @@ from robocov_app.render.theme import Theme, mix
 from robocov_app.toolkit.layout import Layout
 from robocov_app.toolkit.overlay import card, flat_canvas, wrapped
 from robocov_app.viewer.lessons import LessonPlayer
+
+Spot = tuple[pygame.Rect, Callable[[], object]]
 
 
 def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
@@ -32,8 +35,10 @@ def draw_caption(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Les
     screen.fill(theme.final, bar)
 
 
-def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> None:
+def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: LessonPlayer) -> list[Spot]:
+    """Show a lesson in place of the panel; return where a click answers, or goes to a chapter."""
     scale = layout.scale
+    spots: list[Spot] = []
     left, top, width, height = layout.panel
     screen.fill(theme.panel, pygame.Rect(layout.panel))
     canvas = flat_canvas(screen, theme, scale)
@@ -49,13 +54,20 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
         screen.blit(label(line, size, theme.ink), (round(x), round(y)))
         y += 21 * scale
     y += 8 * scale
-    for asked in tour.asks:
-        for line in wrapped(asked, size, wide):
-            screen.blit(label(line, size, theme.final), (round(x), round(y)))
+    for k, asked in enumerate(tour.asks):
+        first, answers = y, tour.state == "asks" and k > 0
+        for line in wrapped(asked, size, wide - 24 * scale * answers):
+            screen.blit(label(line, size, theme.final), (round(x + 12 * scale * answers), round(y)))
             y += 21 * scale
-    row = 23 * scale
+        if answers:
+            box = pygame.Rect(round(x), round(first - 5 * scale), round(wide), round(y - first + 8 * scale))
+            pygame.draw.rect(screen, theme.final, box, 1, border_radius=round(5 * scale))
+            spots.append((box, partial(tour.reply, k)))
+        y += 11 * scale * (tour.state == "asks")
     chapters, small = tour.lesson.chapters, round(12 * scale)
-    y = max(y + 24 * scale, top + height - 62 * scale - row * len(chapters))
+    y, bottom = y + 6 * scale, top + height - 62 * scale
+    row = min(23 * scale, max((bottom - y) / len(chapters), 15 * scale))
+    y = max(y, bottom - row * len(chapters))
     for k, chapter in enumerate(chapters):
         now = k == tour.number
         colour = theme.ink if now else theme.faint
@@ -63,6 +75,8 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
         canvas.stamp(partial(sprites.dot, 3.5 * scale, fill), (x + 4 * scale, y + 8 * scale))
         words = shortened(chapter.title, small, wide - 18 * scale, now)
         screen.blit(label(words, small, colour, now), (round(x + 16 * scale), round(y)))
+        box = pygame.Rect(round(x), round(y - 3 * scale), round(wide), round(row))
+        spots.append((box, partial(tour.skip, k - tour.number)))
         y += row
     bar = pygame.Rect(round(x), round(top + height - 46 * scale), round(wide), max(3, round(3 * scale)))
     pygame.draw.rect(screen, mix(theme.panel, theme.ink, 0.15), bar, border_radius=bar.height)
@@ -70,3 +84,4 @@ def draw_tour(screen: pygame.Surface, layout: Layout, theme: Theme, tour: Lesson
     pygame.draw.rect(screen, theme.final, bar, border_radius=bar.height)
     hint = label("← → chapters · Space · F2 just play · Esc ends", round(11 * scale), theme.faint)
     screen.blit(hint, (round(x), round(top + height - 32 * scale)))
+    return spots

@@ -75,6 +75,7 @@ class LessonPlayer:
         self._viewer, self._fit = viewer, fit
         self.alone = alone  # nobody is there to answer or to do tasks, as in a film
         self._before = viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active
+        self._asked_before = viewer.hand.selected
         self.session = _begun(saved)
         self.session.clock.budget = viewer.session.clock.budget
         self._workspace = Workspace(self.session, None)
@@ -82,6 +83,7 @@ class LessonPlayer:
         self.state = "plays"  # or asks, task, ended, left
         self.answer: int | None = None  # from 1
         self._waited = 0.0
+        self.held = False
         self._begin(0)
 
     @property
@@ -91,8 +93,6 @@ class LessonPlayer:
     @property
     def asks(self) -> list[str]:
         chapter = self.chapter
-        if self.state == "left":
-            return ["Just play. F2 comes back to this chapter, Esc leaves the lesson."]
         question, lines = chapter.question, []
         if question is not None and self.state == "asks":
             lines = [question.text, *(f"{k}  {each}" for k, each in enumerate(question.answers, 1))]
@@ -132,8 +132,13 @@ class LessonPlayer:
                 session.playing = False
         elif self.state == "task" and chapter.task is not None and holds(chapter.task.until, session):
             self._turn("ended")
-        elif self.state == "ended" and self._waited >= READING:
+        elif self.state == "ended" and self._waited >= self._reading and not self.held:
             self.skip(1)
+
+    @property
+    def _reading(self) -> float:
+        """Seconds until the next chapter: longer where somebody has an answer to read."""
+        return READING + (0.0 if self.alone else 0.25 * len(" ".join(self.asks).split()))
 
     def reply(self, answer: int) -> None:
         question = self.chapter.question
@@ -148,8 +153,9 @@ class LessonPlayer:
         else:
             self._begin(max(self.number + by, 0))
 
-    def leave(self) -> None:
-        if self.state != "task":
+    def leave(self, *, task: bool = False) -> None:
+        """Let whoever watches play with what is there; a `task` is left only where that is asked for."""
+        if task or self.state != "task":
             self._turn("left")
 
     def leave_or_come_back(self) -> None:
@@ -161,13 +167,21 @@ class LessonPlayer:
     def end(self) -> None:
         viewer = self._viewer
         self._workspace.close()
-        viewer.workspace, viewer.map_name, viewer.shown, viewer.tool, viewer.active = self._before
+        viewer.workspace, map_name, viewer.shown, viewer.tool, viewer.active = self._before
         viewer.show_session(viewer.workspace.session)
+        viewer.map_name = map_name
+        viewer.hand.selected = self._asked_before
+        viewer.say("the lesson has ended; what was before it is there again")
         self._fit()
         self.done = True
 
+    def hold(self) -> str:
+        """Let a chapter that has ended stay, or let the next one come; return words for it."""
+        self.held, self.session.playing = not self.held, False
+        return "this chapter stays until Space or →" if self.held else "on to the next chapter"
+
     def _turn(self, state: str) -> None:
-        self.state, self._waited = state, 0.0
+        self.state, self._waited, self.held = state, 0.0, False
         self._viewer.version += 1
 
     def _begin(self, number: int) -> None:

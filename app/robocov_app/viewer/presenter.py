@@ -11,6 +11,7 @@ from robocov.environment import Point
 from robocov.errors import InputError, ParameterError, RobocovError
 from robocov.mapfile import bundled_maps, load_map, save_map
 from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.autosave import Record
 from robocov_app.viewer.costs import Costs
 from robocov_app.viewer.parameters import Parameter, Pick, gain_parameters, limit_parameters, with_limit
 from robocov_app.viewer.session.clock import SPEEDS, speed_index, speed_words
@@ -41,7 +42,7 @@ class Presenter:
         file: Path | None = None,  # of the session
     ) -> None:
         self.session, self.costs, self.shown, self.folder = session, costs, shown, folder
-        self.map_name, self._kept_in = map_name, kept_in
+        self._map_names, self._kept_in = {session.environment.name: map_name}, kept_in
         self.laws = list(dict.fromkeys([*CONTROLLERS, *laws]))
         self.tools = toolbox()
         self.hand = cast(Hand, self.tools["hand"])
@@ -56,8 +57,19 @@ class Presenter:
         self.cursor: Point | None = None
         self.cursor_pane = 0
         self._mapped: object = None
+        self.rested: object = None  # the touch after which the team has settled, though it may sway again
         self.workspace = Workspace(session, kept_in, file)
         self.look_at_map()
+
+    @property
+    def map_name(self) -> str:
+        """Bundled name or path of the map of the present, also where undo has led to another one."""
+        name = self.session.environment.name
+        return self._map_names.get(name, name)
+
+    @map_name.setter
+    def map_name(self, name: str) -> None:
+        self._map_names[self.session.environment.name] = name
 
     @property
     def numbers(self) -> list[int]:
@@ -189,8 +201,10 @@ class Presenter:
         self.active = (self.active + 1) % len(self.session.panes)
 
     def undo(self) -> None:
+        other = "; Alt ← leads to other branches" if self.session.document.nodes[1:] else ""
+        nothing = f"nothing to undo{other}"
         words = self.session.undo()
-        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else "nothing to undo")
+        self.say(f"undone: {words}; back at {self.session.time:.1f} s" if words else nothing)
 
     def redo(self) -> None:
         words = self.session.redo()
@@ -269,8 +283,10 @@ class Presenter:
         self._note_recent(path)
         self.say(f"session opened: {path}")
 
-    def recover(self) -> str:
-        if not (found := recoverable(self._kept_in)):
+    def recover(self, work: Record | None = None) -> str:
+        """Go on with a session that was left behind, by default the newest."""
+        found = recoverable(self._kept_in) if work is None else (work,)
+        if not found:
             return "nothing was left behind"
         self._take(*recovered(found[0], self.laws, self._kept_in))
         return f"recovered: {offer(found[0])}"

@@ -61,7 +61,8 @@ def cursor_words(viewer: Presenter) -> str:
 
 def suggestion(viewer: Presenter) -> str:
     session = viewer.session
-    if not (viewer.suggests and session.settled and session.live) or session.hand is not None:
+    rested = session.settled or viewer.rested is session.head
+    if not (viewer.suggests and rested and session.live) or session.hand is not None:
         return ""
     tried = {node.kind for node in session.document.nodes}
     tried |= {"pane"} if len(session.panes) > 1 else set()

@@ -75,7 +75,8 @@ def edited(session: Session, environment: Environment, words: str) -> str:
         words += f"; {pushed} robot{'s' if pushed > 1 else ''} pushed out of the way"
     if gone:
         words += f"; it covers the start{'s' if len(gone) > 1 else ''} {', '.join(sorted(gone))}"
-    passage = map_edits.passage_words(before, environment, float(radius.min()))
+    robots = session.positions(session.panes[0])
+    passage = map_edits.passage_words(before, environment, float(radius.min()), robots)
     return "; ".join(filter(None, [words, passage]))
 
 

@@ -1,6 +1,6 @@
 """The window: events in, frames out. What happens between is the presenter's and the session's."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from math import dist
 from pathlib import Path
@@ -13,6 +13,7 @@ from robocov.errors import RobocovError
 from robocov_app.render.picture import standard_layers
 from robocov_app.render.theme import theme_named
 from robocov_app.terminal.output import free_name
+from robocov_app.toolkit.autosave import Record, discard
 from robocov_app.toolkit.command import Command, Commands, draw_keys, palette
 from robocov_app.toolkit.dialogs import Answer, Dialogs, Option, Question, file_choice, list_choice
 from robocov_app.toolkit.input import DOUBLE, OF_THE_MOUSE, SLIP, WHEEL, show_cursor, wheel_notches
@@ -30,11 +31,12 @@ from robocov_app.viewer.lessons import LessonPlayer, first_lesson, load_lesson
 from robocov_app.viewer.panel import TABS, Panel
 from robocov_app.viewer.presenter import Presenter, plain
 from robocov_app.viewer.session.file import SUFFIX
-from robocov_app.viewer.session.workspace import RunSaver
+from robocov_app.viewer.session.workspace import RunSaver, offer
 from robocov_app.viewer.status import HINT, facts, suggestion
 from robocov_app.viewer.tools import Brush
 
 _ASKED_AGAIN = 0.2  # seconds between two explanations of a robot
+_GAP = 0.3  # seconds at the beginning of a curve that are not missed
 _PAN = 60  # pixels that a key pans
 _GOES_ON_WITH = {  # commands that do not leave the lesson
     *("help", "theme", "screenshot", "film", "panel", "fullscreen", "quit", "pause"),
@@ -222,10 +224,12 @@ class Window(BaseWindow):
         self._reported: tuple[object, float] = None, 0.0
         self._now = self._unfilmed = self._steps_rate = 0.0
         self._answers, self._serial = 0, -1
+        self._spots: list[tuple[pygame.Rect, Callable[[], object]]] = []
         self._arrange()
         self.draw()
 
     def close(self) -> None:
+        self._end_tour()  # what was before it is kept
         if self.film is not None:
             self.viewer.attempt(self.toggle_film)
         self.viewer.costs.close()
@@ -276,6 +280,8 @@ class Window(BaseWindow):
         except RobocovError as error:
             steps = 0
             viewer.say(plain(str(error)), trouble=True)
+        if session.settled:
+            viewer.rested = session.head
         if session.playing != playing:
             viewer.version += 1
             if session.settled:
@@ -297,6 +303,7 @@ class Window(BaseWindow):
             fresh = known is not None and point is None and abs(known.time - session.time) < 1e-9
             if known is None or not (fresh and np.array_equal(known.result.positions, positions)):
                 viewer.costs.ask(pane.number, session.time, positions, point, session.setup(pane).speeds)
+        self._ask_beginning()
         for number, known in viewer.costs.poll():
             self._answers += 1
             for pane in session.panes:
@@ -304,6 +311,23 @@ class Window(BaseWindow):
                     pane.curve.add(known.time, known.result.mean_distance)
                     if known.travel_time is not None:
                         pane.curves["time"].add(known.time, known.travel_time)
+
+    def _ask_beginning(self) -> None:
+        """Ask in turn with the present for the costs of the time in which nobody answered yet."""
+        session, costs = self.viewer.session, self.viewer.costs
+        if session.head.kind != "begin" or not session.live or (session.playing and self._answers % 2):
+            return
+        for pane in session.panes:
+            first = min(pane.curve.time, default=0.0)
+            if first <= _GAP:
+                continue
+            k = session.history.at(first - _GAP if first > 2 * _GAP else 0.0)
+            state, speeds = (
+                session.history[k].states[pane.number],
+                session.history[k].states[pane.number].setup.speeds,
+            )
+            if speeds is None or len(speeds) == len(state.positions):
+                costs.ask(pane.number, session.history.time(k), state.positions, speeds=speeds, aside=True)
 
     def _arrange(self) -> None:
         viewer, session = self.viewer, self.viewer.session
@@ -333,9 +357,14 @@ class Window(BaseWindow):
         self.chart.draw(self.screen)
         filmed = None if self.film is None else self.film.frames / FILM_FPS
         line = facts(viewer, self.rate, self._steps_rate, filmed)
-        draw_status(self.screen, layout.status, theme, layout.scale, line, self.hint)
-        if (lesson := self._lesson) is not None:
-            (draw_tour if layout.panel[2] else draw_caption)(self.screen, layout, theme, lesson)
+        waits = self.tour is not None and self._lesson is None
+        hint = "F2 back to the lesson · Esc ends it" if waits else self.hint
+        draw_status(self.screen, layout.status, theme, layout.scale, line, hint)
+        self._spots = []
+        if (lesson := self._lesson) is not None and layout.panel[2]:
+            self._spots = draw_tour(self.screen, layout, theme, lesson)
+        elif lesson is not None:
+            draw_caption(self.screen, layout, theme, lesson)
         elif layout.panel[2]:
             self.panel.draw(self.screen)
         said, trouble = viewer.message, bool(viewer.message) and viewer.trouble
@@ -363,6 +392,10 @@ class Window(BaseWindow):
     def do(self, name: str) -> None:
         if self._lesson is not None and name in ("back", "forward"):
             self._lesson.skip(1 if name == "forward" else -1)
+            return
+        if name == "pause" and self.tour is not None and self.tour.state in ("asks", "ended"):
+            first = "first say what you expect: press its number, or click it"
+            self.viewer.say(first if self.tour.state == "asks" else self.tour.hold())
             return
         if name == "cancel" and self._end_tour():
             return
@@ -412,7 +445,6 @@ class Window(BaseWindow):
             return False
         self.tour.end()
         self.tour = None
-        self.viewer.say("the lesson has ended; what was before it is there again")
         return True
 
     def _zoom(self, factor: float) -> None:
@@ -470,6 +502,34 @@ class Window(BaseWindow):
         answers = [Answer("Lesson 1", begin_lesson), Answer("Just let me play", go_on)]
         self.dialogs.ask(Question("Welcome to robocov", words, answers, go_on))
 
+    def offer_recovery(self, found: Sequence[Record]) -> None:
+        """Ask whether to go on with what windows left behind, the newest first; until then the team waits."""
+        viewer, session, newest = self.viewer, self.viewer.session, found[0]
+        playing, session.playing = session.playing, False
+
+        def later() -> None:
+            session.playing = playing
+
+        def recover() -> None:
+            later()
+            viewer.attempt(lambda: viewer.recover(newest))
+
+        def throw_away() -> None:
+            discard(newest.folder)
+            later()
+            if found[1:]:
+                self.offer_recovery(found[1:])
+
+        words = f"A window ended without saving: {offer(newest)}."
+        if more := len(found) - 1:
+            words += f"\n{more} more {'are' if more > 1 else 'is'} kept besides."
+        answers = [
+            Answer("Recover", recover, "r"),
+            Answer("Discard", throw_away, "d"),
+            Answer("Later", later, "l"),
+        ]
+        self.dialogs.ask(Question("Recover unsaved work?", words, answers, later))
+
     def _toggle_help(self) -> None:
         self.help = not self.help
 
@@ -491,6 +551,10 @@ class Window(BaseWindow):
     def _lesson(self) -> LessonPlayer | None:
         """The lesson, where it has the place of the panel."""
         return self.tour if self.tour is not None and self.tour.state != "left" else None
+
+    def _spot(self, at: tuple[int, int]) -> Callable[[], object] | None:
+        """What a click does on the page of a lesson."""
+        return next((do for box, do in self._spots if box.collidepoint(at)), None)
 
     def leave_lesson(self) -> None:
         if self.tour is not None:
@@ -533,6 +597,8 @@ class Window(BaseWindow):
                 self.dialogs.swallow(event.unicode)
         elif event.type == pygame.MOUSEBUTTONDOWN and self.help:
             self.help = False
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1 and (spot := self._spot(event.pos)):
+            spot()
         elif event.type in OF_THE_MOUSE:
             self.pointer.take(event, self._now)
         elif event.type == pygame.WINDOWLEAVE:

@@ -8,17 +8,19 @@ import numpy as np
 import pygame
 import pytest
 from driven_window import MIDDLE, opened
-from touched_run import HALL, RAPF, begun
+from touched_run import HALL, RAPF, begun, stepped
 
 from robocov.mapfile import save_map
 from robocov_app.render.canvas import Canvas
 from robocov_app.render.fonts import text_width
+from robocov_app.toolkit.autosave import FOLDER as DRAFTS
 from robocov_app.toolkit.dialogs import Choice, Question
 from robocov_app.toolkit.settings import FOLDER, loaded, settings_file
 from robocov_app.toolkit.window import display
 from robocov_app.viewer import launch as opening
 from robocov_app.viewer.launch import Launcher, Settings
 from robocov_app.viewer.session.scenario import ControllerChoice
+from robocov_app.viewer.session.workspace import Workspace, recoverable
 from robocov_app.viewer.status import cursor_words, facts, suggestion
 
 FOUR = (RAPF, ControllerChoice("rpf"), ControllerChoice("lloyd"), ControllerChoice("geodesic-lloyd"))
@@ -52,6 +54,25 @@ def test_a_caption_has_the_numbers_of_the_chart_with_their_time(tmp_path: Path, 
             assert session.end - pane.curve.last_time > 1.0
             caption = f"mean distance {value} m at {pane.curve.last_time:.1f} s"
             assert caption in words and any(value in each and each != caption for each in words)
+
+
+def test_a_curve_begins_at_the_beginning_also_if_nobody_answered_then(tmp_path: Path) -> None:
+    with opened(tmp_path, RAPF, ControllerChoice("rpf")) as driver:
+        session, window = driver.session, driver.window
+        wanted = {pane.number: pane.curve.at(0.0) for pane in session.panes}
+        for pane in session.panes:
+            pane.curves["distance"].__init__()  # as if the worker had not begun yet
+        for _ in range(90):
+            session.step()
+        window.update(0.0)
+        for playing in (True, False):
+            session.playing = playing
+            for _ in range(12):
+                window.update(1 / 50)
+                assert all(abs(each.time - session.time) < 0.1 for each in window.viewer.costs.known.values())
+        for pane in session.panes:
+            times, values = pane.curve.time, pane.curve.value
+            assert times[0] == 0.0 and np.diff(times).max() < 0.7 and values[0] == wanted[pane.number]
 
 
 def test_the_cursor_tells_of_the_pane_below_it_and_of_the_map_as_it_is(tmp_path: Path) -> None:
@@ -102,6 +123,17 @@ def test_each_of_four_panes_has_its_cost(tmp_path: Path, words: list[str], size:
         )
 
 
+def test_a_name_is_whole_beside_a_cost_that_is_more_than_twice_the_best(
+    tmp_path: Path, words: list[str]
+) -> None:
+    with opened(tmp_path, ControllerChoice("atlas"), RAPF) as driver:
+        for pane, value in zip(driver.session.panes, (1.856, 4.023), strict=True):
+            pane.curve.add(0.0, value)
+        words.clear()
+        driver.window.draw()
+        assert "RAPF  4.023  +117 %" in words
+
+
 def test_frames_a_second_stay_in_sight_when_they_are_few(tmp_path: Path) -> None:
     with opened(tmp_path) as driver:
         driver.move(*driver.pixel(MIDDLE))
@@ -122,6 +154,8 @@ def test_the_next_step_is_suggested_once_the_team_has_settled(tmp_path: Path) ->
         driver.window._patient = False
         driver.settle()
         assert not driver.same(before)
+        session.settled = False
+        assert suggestion(viewer), "it does not blink while somebody sways"
         session.fail_robot(2)
         assert suggestion(viewer) == ""  # something is going on again
         session.settled = True
@@ -162,6 +196,35 @@ def test_who_starts_for_the_first_time_is_offered_the_lesson_once(
             assert window.viewer.session.time > 0.0
         with opened_for_a_person(monkeypatch, folder, offers_lesson=True).window() as window:
             assert window.dialogs.asked is None
+
+
+def test_work_that_was_left_behind_is_offered_and_waits_for_the_answer(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(DRAFTS, str(tmp_path / "drafts"))
+    for _ in range(2):
+        workspace = Workspace(stepped(begun(), 5), tmp_path / "drafts")
+        workspace.session.fail_robot(2)
+        workspace.keep({})
+        workspace.close()
+    everybody = (1, 2, 3)
+    for chosen, left, numbers in (
+        (pygame.K_l, 2, everybody),
+        (pygame.K_d, 1, everybody),
+        (pygame.K_r, 0, (1, 3)),
+    ):
+        launcher = opened_for_a_person(monkeypatch, tmp_path, offers_lesson=True)
+        launcher.session.playing = True
+        with launcher.window() as window:
+            assert isinstance(window.dialogs.asked, Question)
+            assert "1 touch, never saved" in window.dialogs.asked.words
+            window.frame(0.5)
+            assert window.viewer.session.time == 0.0
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=chosen, mod=0, unicode="", scancode=0))
+            window.frame(0.0)
+            assert window.viewer.session.numbers == numbers
+            assert (window.dialogs.asked is not None) is (left == 1)  # the next one is offered
+            assert len(recoverable(tmp_path / "drafts")) == left
 
 
 def test_who_opens_something_of_his_own_is_not_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -207,6 +270,26 @@ def test_files_are_opened_from_a_list_with_recent_sessions_first(tmp_path: Path)
         asked = driver.window.dialogs.asked
         assert isinstance(asked, Choice) and "nothing.robocov" in asked.trouble
         assert asked.text == "nothing.robocov"
+
+
+def test_files_are_dropped_on_the_window(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        viewer = driver.viewer
+        save_map(HALL, tmp_path / "other.json")
+        viewer.session.fail_robot(2)
+        viewer.save_session(tmp_path / "story.robocov")
+        (tmp_path / "bad.robocov").write_text("{}")
+
+        def dropped(name: str) -> None:
+            pygame.event.post(pygame.event.Event(pygame.DROPFILE, file=str(tmp_path / name)))
+            driver.settle()
+
+        dropped("other.json")
+        assert viewer.map_name == str(tmp_path / "other.json") and viewer.session.numbers == (1, 2, 3)
+        dropped("story.robocov")
+        assert viewer.session.numbers == (1, 3) and viewer.workspace.path == tmp_path / "story.robocov"
+        dropped("bad.robocov")
+        assert viewer.trouble and "bad.robocov" in viewer.message and viewer.session.numbers == (1, 3)
 
 
 def test_recent_sessions_are_remembered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -99,7 +99,9 @@ def test_a_report_takes_stories_and_sessions(tmp_path: Path, capsys: pytest.Capt
     page = (tmp_path / "told" / "report.html").read_text()
     titles = ["0.0 to 0.2 s, begun", "0.2 to 0.4 s, circle drawn", "0.4 to 0.6 s, robot 4 joined"]
     assert all(f" · {title}</h2>" in page for title in titles)
+    capsys.readouterr()
     assert main(["report", path]) == 0
+    assert capsys.readouterr().out.startswith(f"{Path(path).stem}"), "not the temporary folder of its parts"
     page = (tmp_path / "story.html").read_text()
     assert "0.2 to 0.4 s, robot 2 failed</h2>" in page and titles[2] in page, "all branches are there"
     assert str(tmp_path) not in page and "/robocov-" not in page, "no place of a machine"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -84,8 +85,27 @@ def test_a_chapter_does_again_what_was_done_asks_and_hands_over(tmp_path: Path, 
         driver.frames(2)
         assert lesson.state == "ended"
         assert lesson.asks == ["Not quite: Much", "So it is.", "Well done."]
+        lesson.advance(lessons.READING)
+        assert lesson.state == "ended" and not lesson.done, "there is something to read"
+        driver.key("space")
+        lesson.advance(100.0)
+        assert lesson.state == "ended" and not viewer.session.playing, "it is paused between chapters too"
+        driver.key("space")
+        assert not lesson.held
         driver.key("escape")
         assert driver.window.tour is None and viewer.session is before and before.numbers == (1, 2)
+
+
+def test_its_end_is_told_and_nobody_is_asked_who_was_not(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path, robot=1))
+        driver.key("right")
+        assert driver.viewer.selected == 1
+        driver.key("right")
+        driver.frames(1)
+        assert driver.window.tour is None and driver.viewer.selected is None
+        assert driver.viewer.message.startswith("the lesson has ended")
 
 
 def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
@@ -105,6 +125,57 @@ def test_it_can_be_paused_left_and_come_back_to(tmp_path: Path) -> None:
         assert lesson.number == 1
         driver.key("left")
         assert lesson.number == 0
+
+
+def test_answers_and_chapters_are_clicked_and_a_question_is_not_played_past(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        driver.window._patient = False
+        driver.window.start_lesson(short(tmp_path))
+        lesson = driver.window.tour
+        assert lesson is not None
+        driver.settle()
+        driver.click(*driver.window._spots[1][0].center)
+        assert (lesson.number, lesson.state) == (1, "asks")
+        driver.key("space")
+        driver.frames(10)
+        assert driver.session.time == 0.0 and "what you expect" in driver.viewer.message
+        driver.click(*driver.window._spots[1][0].center)
+        assert (lesson.answer, lesson.state) == (2, "plays")
+        driver.frames(30)
+        assert lesson.state == "task"
+        driver.key("f2")
+        assert lesson.state == "left" and not driver.window._spots
+        driver.key("f2")
+        assert lesson.state == "asks"
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 720)])
+def test_all_of_every_chapter_has_room_on_its_page(tmp_path: Path, size: tuple[int, int]) -> None:
+    with opened(tmp_path, size=size) as driver:
+        driver.window._patient = False
+        driver.key("f2")
+        lesson = driver.window.tour
+        assert lesson is not None
+        for _ in LESSON.chapters:
+            driver.settle()
+            boxes = [box for box, _ in driver.window._spots]
+            assert all(above.bottom <= below.top + 1 for above, below in itertools.pairwise(boxes))
+            assert boxes[-1].bottom <= size[1] - 46
+            driver.key("right")
+
+
+def test_closing_ends_it_and_what_was_before_is_what_is_kept(tmp_path: Path) -> None:
+    with opened(tmp_path) as driver:
+        session, shown = driver.session, set(driver.viewer.shown)
+        driver.window.start_lesson(short(tmp_path, show=["distances"]))
+        driver.key("right")
+        driver.window.close()
+        assert driver.window.tour is None and driver.session is session and driver.viewer.shown == shown
+
+
+def test_controllers_have_the_names_of_the_window_in_the_lesson() -> None:
+    told = {answer for each in LESSON.chapters if each.question for answer in each.question.answers}
+    assert "LA" not in told and told >= {"RAPF", "RPF", "Lloyd"}
 
 
 def test_without_anybody_it_plays_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -265,6 +265,24 @@ def test_failing_reviving_and_removing_need_a_robot_that_is_asked() -> None:
     assert viewer.session.numbers == (1, 3) and viewer.selected is None
 
 
+def test_undo_says_what_began_anew_and_the_map_has_its_name_again() -> None:
+    viewer = viewer_of()
+    viewer.change_robots(1)
+    viewer.open_map("square")
+    viewer.add_pane()
+    assert viewer.map_name == "square"
+    for words, name in (
+        ("RPF compared", "square"),
+        ("map Square", "hall"),
+        ("4 robots", "hall"),
+    ):
+        do(viewer, "undo")
+        assert viewer.message == f"undone: {words}; back at 0.0 s" and viewer.map_name == name
+    do(viewer, "redo")
+    do(viewer, "redo")
+    assert viewer.message == "done again: map Square" and viewer.map_name == "square"
+
+
 def test_undo_and_redo_say_what_they_did() -> None:
     viewer = viewer_of()
     do(viewer, "undo")
@@ -274,6 +292,8 @@ def test_undo_and_redo_say_what_they_did() -> None:
     viewer.session.add_robot((5.0, 3.0))
     do(viewer, "undo")
     assert viewer.message == "undone: robot 4 joined; back at 0.0 s" and viewer.session.numbers == (1, 2, 3)
+    do(viewer, "undo")
+    assert viewer.message == "nothing to undo; Alt ← leads to other branches"
     do(viewer, "redo")
     assert viewer.message == "done again: robot 4 joined" and viewer.session.numbers == (1, 2, 3, 4)
 

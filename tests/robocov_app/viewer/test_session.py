@@ -51,9 +51,9 @@ def test_everything_can_be_undone_to_the_first_moment_also_restarts() -> None:
     session.add_robot((3.4, 3.0))
     session.restart(seed=3)
     assert robots_of(session) == ((1, 2, 3), ())
-    assert [session.undo() for _ in range(4)] == ["begun anew", "robot 4 joined", "circle drawn", None]
+    assert [session.undo() for _ in range(4)] == ["seed 3", "robot 4 joined", "circle drawn", None]
     assert session.environment is HALL and session.head.parent is None
-    assert [session.redo() for _ in range(4)] == ["circle drawn", "robot 4 joined", "begun anew", None]
+    assert [session.redo() for _ in range(4)] == ["circle drawn", "robot 4 joined", "seed 3", None]
     assert session.scenario.seed == 3 and robots_of(session) == ((1, 2, 3), ())
 
 

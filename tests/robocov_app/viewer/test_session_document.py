@@ -20,6 +20,7 @@ from robocov.density import Gaussian, Gaussians
 from robocov.environment import CircleObstacle, ObstaclePath
 from robocov.errors import InputError, MapError, RobocovError
 from robocov.mapfile import load_map
+from robocov_app.cli import main
 from robocov_app.viewer.session import session as module
 from robocov_app.viewer.session.changes import SetDensity
 from robocov_app.viewer.session.file import dumped, load_session, save_session, session_json, session_schema
@@ -295,8 +296,9 @@ def test_a_file_is_small_and_says_what_it_is(tmp_path: Path) -> None:
         (("step",), 999, "step: 999, but a step of the head, 10 to 30 was wanted"),
         (("touches", 1, "parent"), 1, "touches[1].parent: 1, but null for the first"),
         (("touches", 1, "at"), 999, "touches[1].at: 999, but a step of touch 0, 0 to 10 was wanted"),
-        (("touches", 1, "changes", 0, "robot"), "two", 'touches[1].changes[0].robot: "two", but'),
-        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0]"),
+        (("touches", 1, "changes", 0, "robot"), "two", 'changes[0].robot: "two", but an integer was wanted'),
+        (("touches", 1, "changes", 0, "do"), "fly", "touches[1].changes[0].do: \"fly\", but one of 'drag', "),
+        (("touches", 1, "changes"), [], "touches[1].changes: [], but at least 1 item was wanted"),
         (
             ("touches", 0, "changes", 0, "scenario", "robots"),
             0,
@@ -322,6 +324,19 @@ def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, place,
     with pytest.raises(MapError) as caught:
         load_session(path)
     assert words in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_what_cannot_be_done_again_is_said_with_the_file_and_the_touch(tmp_path: Path, capsys) -> None:
+    session = stepped(begun(RAPF), 10)
+    session.fail_robot(1)
+    stepped(session, 20)
+    content = json.loads(dumped(session_json(session.document, session.head, session.step_now, {})))
+    content["touches"][1]["changes"][0]["robot"] = 77
+    path = tmp_path / "story.robocov"
+    path.write_text(json.dumps(content))
+    assert main(["run", str(path), "--out", str(tmp_path / "told")]) == 2
+    assert f"{path}: touches[1], “robot 1 failed”: there is no robot 77\n" in capsys.readouterr().err
+    assert not (tmp_path / "told").exists()
 
 
 def test_a_controller_of_ones_own_is_never_run_because_a_file_says_so(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from robocov.arrays import Array
 from robocov.conditions import SOON
 from robocov.environment import Point
-from robocov.errors import ParameterError
+from robocov.errors import InputError, ParameterError
 from robocov_app.viewer.session import changes
 from robocov_app.viewer.session.changes import Change, Drag, Fail, Join, Place, Release, Restart, Touch
 from robocov_app.viewer.session.history import Curve, Moment, PaneSetup
@@ -172,9 +172,13 @@ class Node:
         return self.at if self.scenario is None else 0
 
     def carry_out(self, run: Lockstep) -> None:
+        """Change a run that goes on from one step to the next as was done here; InputError names it."""
         for change in self.changes:
             if change.step == run.step and not isinstance(change, Restart):
-                run.apply(change)
+                try:
+                    run.apply(change)
+                except InputError as error:
+                    raise InputError(f"touches[{self.number}], “{self.words}”: {error}") from None
 
 
 class Branch(NamedTuple):

@@ -6,6 +6,7 @@ named by its path, and never run because a file says so.
 
 import hashlib
 import json
+import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache, partial
@@ -321,6 +322,10 @@ def _digest(document: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]
 
 
+_TAG = re.compile(r"Input tag '(?P<found>.*?)' found using '(?P<key>\w+)' .* expected tags: (?P<known>.*)")
+"""What pydantic says of a kind that there is not."""
+
+
 def _mistake(detail: Any) -> Mistake:
     """Return one structural error in the project's words: place, value, what was wanted."""
     steps = list(detail["loc"])
@@ -335,5 +340,12 @@ def _mistake(detail: Any) -> Mistake:
         return Mistake.at(path, "unknown key", at_key=True)
     if detail["type"] in ("model_type", "dataclass_type"):
         return Mistake.at(path, f"{shown_json(detail['input'])}, but an object was wanted")
-    words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid ", "a ")
+    if (tag := _TAG.match(str(detail["msg"]))) is not None:
+        return Mistake.at(
+            (*path, tag["key"]), f"{shown_json(tag['found'])}, but one of {tag['known']} was wanted"
+        )
+    words = str(detail["msg"]).removeprefix("Input should be ").replace("a valid integer", "an integer")
+    words = re.sub(
+        r".* should have (.*?)( after validation)?, not \d+", r"\1", words.replace("a valid ", "a ")
+    )
     return Mistake.at(path, f"{shown_json(detail['input'])}, but {words} was wanted")

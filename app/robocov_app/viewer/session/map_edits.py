@@ -8,6 +8,7 @@ from itertools import groupby
 import numpy as np
 import shapely
 
+from robocov.arrays import Array
 from robocov.density import Raster, sampled
 from robocov.environment import (
     CircleObstacle,
@@ -91,14 +92,24 @@ def snapped(environment: Environment, point: Point, reach: float) -> Point:
     return x, y
 
 
-def passage_words(before: Environment, after: Environment, radius: float) -> str:
-    """Return what an edit cuts off from robots of a radius, m, and what gap it leaves too narrow for them."""
-    words = []
+def passage_words(
+    before: Environment, after: Environment, radius: float, robots: Array | Sequence[Point] = ()
+) -> str:
+    """Return what an edit cuts off from robots of a radius, m, and what gap it leaves too narrow for them.
+
+    `robots`: where they are, (n, 2) m.
+    """
+    words, stands = [], shapely.points(np.asarray(robots, dtype=float).reshape(-1, 2))
     rooms = [shapely.get_parts(each.free.buffer(-radius, quad_segs=4)) for each in (before, after)]
     inside = shapely.STRtree(rooms[0]).query(shapely.point_on_surface(rooms[1]), predicate="intersects")
-    for room in range(len(rooms[0])):  # of what hung together the largest part counts as what is left of it
+    for room in range(len(rooms[0])):  # what hung together is left where robots are, else where it is largest
         parts = rooms[1][inside[0][inside[1] == room]]
-        lost = shapely.union_all(parts[np.argsort(shapely.area(parts))[:-1]])  # of places of centres
+        left = np.array([(shapely.distance(stands, part) <= radius).any() for part in parts], dtype=bool)
+        if left.sum() > 1:
+            words.append(f"the team is parted in {left.sum()}")
+        if not left.any():
+            left = shapely.area(parts) == shapely.area(parts).max(initial=0.0)
+        lost = shapely.union_all(parts[~left])  # of places of centres
         area = shapely.area(shapely.intersection(after.free, shapely.buffer(lost, radius)))
         if area > radius * radius:
             words.append(f"{area:.1f} m² cut off")

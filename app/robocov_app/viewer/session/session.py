@@ -446,7 +446,11 @@ class Session:
         known = {None, "uniform", *scenario.environment.starts}  # an obstacle may have covered it
         if "environment" in changed or scenario.start not in known:
             changed.setdefault("start", None)
-        scenario = replace(scenario, **changed)  # type: ignore[arg-type]
+        new: Scenario = replace(scenario, **changed)  # type: ignore[arg-type]
+        self.begin(new, _anew(scenario, new))
+
+    def begin(self, scenario: Scenario, words: str) -> None:
+        """Begin another scenario at time 0; undo comes back to this one."""
         self.remake()
         run = Lockstep(scenario)
         self.stow()
@@ -538,3 +542,17 @@ def _sensed_in(history: History, pane: int) -> Sensed:
         sensor.show(time)
         found.add(time, setup.numbers, sensor.nearest(state.positions, setup.team.sensing_range))
     return found
+
+
+def _anew(before: Scenario, after: Scenario) -> str:
+    """Return in words what is different where a run begins anew."""
+    words = [f"{law.label} compared" for law in after.laws[len(before.laws) :]]
+    if after.environment is not before.environment:
+        words.append(f"map {after.environment.name}")
+    elif after.start_name != before.start_name:
+        words.append(f"start {after.start_name}")
+    if after.robots != before.robots:
+        words.append(f"{after.robots} robots")
+    if after.seed != before.seed:
+        words.append(f"seed {after.seed}")
+    return ", ".join(words) or "begun anew"
